@@ -170,10 +170,11 @@ class Robot(Node):
 
 
 class Onlooker(Node):
-    """Subscribes to topics and keeps the bytes of all that it hears; decoding is for later."""
+    """Subscribes to topics and diagnostics and keeps the bytes of all that it hears."""
 
     def __init__(self, context, topics: dict[str, tuple[type, QoSProfile]], **options) -> None:
         super().__init__('onlooker', context=context, **options)
+        topics = topics | {'/diagnostics': (DiagnosticArray, QoSProfile(depth=100))}
         self.types = {topic: message for topic, (message, _) in topics.items()}
         self.heard: dict[str, list[bytes]] = {topic: [] for topic in topics}
         for topic, (message, profile) in topics.items():
@@ -181,17 +182,12 @@ class Onlooker(Node):
 
     def newest(self, topic: str):
         """The last message of a topic, None if there was none."""
-        heard = self.heard[topic]
-        return deserialize_message(heard[-1], self.types[topic]) if heard else None
+        return self.decoded(topic, -1) if self.heard[topic] else None
 
     def shows(self, topic: str, condition) -> bool:
         """Whether the last message of a topic is there and meets a condition."""
         newest = self.newest(topic)
         return newest is not None and condition(newest)
-
-    def first(self, topic: str):
-        """The first message of a topic."""
-        return self.decoded(topic, 0)
 
     def decoded(self, topic: str, row: int):
         """A message of a topic, by its number."""
@@ -205,10 +201,12 @@ class Onlooker(Node):
                     return status
         return None
 
+    def tells(self, name: str, text: str, level: bytes | None = None) -> bool:
+        """Whether the last status of a task says that, at this level if one is given."""
+        status = self.status(name)
+        return status is not None and text in status.message and level in (None, status.level)
 
-DIAGNOSTICS = {'/diagnostics': (DiagnosticArray, QoSProfile(depth=100))}
-
-
-def values_of(status) -> dict[str, str]:
-    """Key-values of a DiagnosticStatus."""
-    return {value.key: value.value for value in status.values}
+    def value(self, name: str, key: str) -> str | None:
+        """A value of the last status of a task, None if there is none."""
+        status = self.status(name)
+        return {v.key: v.value for v in status.values}.get(key) if status else None

@@ -43,11 +43,11 @@ def robot(ros_context, spin, wait_until):
 
 @pytest.fixture
 def onlooker(ros_context, spin):
-    """`onlooker({topic: (type, QoS)})`: a node that keeps what it hears."""
+    """`onlooker({topic: (type, QoS)})`: a node that keeps what it hears, diagnostics too."""
     from nodes.cell import Onlooker
 
-    def onlooker(topics) -> Onlooker:
-        node = Onlooker(ros_context, topics)
+    def onlooker(topics=None) -> Onlooker:
+        node = Onlooker(ros_context, topics or {})
         spin(node)
         return node
 
@@ -80,10 +80,7 @@ def painted(wait_until):
     from nodes.cell import TWO_PASSES_POSES
 
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:
-        wait_until(
-            lambda: node.film.counts.received >= count,
-            what=f'{count} poses painted',
-        )
+        wait_until(lambda: node.film.counts.received >= count, what=f'{count} poses painted')
         node.up_to_date()
         return node.film.up_to_date().film_um
 

@@ -19,17 +19,3 @@ def test_a_folder_that_is_no_demo_is_left_alone(repository: Path, tmp_path):
     (line,) = done.stderr.splitlines()
     assert line.startswith(f'demo: {tmp_path} exists and is not from an older demo; ')
     assert (tmp_path / 'readings/door.csv').read_text() == 'years of work'
-
-
-@pytest.mark.slow
-def test_an_older_demo_and_an_empty_folder_are_taken(repository: Path, tmp_path):
-    script = (
-        f'import sys; sys.path.insert(0, {str(repository / "demo")!r})\n'
-        'from pathlib import Path; from demo import fresh_folder\n'
-        f'folder = fresh_folder(Path({str(tmp_path)!r}))\n'
-        "(folder / 'older.csv').write_text('')\n"
-        "assert not (fresh_folder(folder) / 'older.csv').exists()\n"
-        "fresh_folder(folder / 'new/one')\n"
-    )
-    subprocess.run([sys.executable, '-c', script], check=True, timeout=100)
-    assert (tmp_path / 'new/one').is_dir()

@@ -18,22 +18,15 @@ from paint_msgs.srv import SaveFilm
 from rclpy.qos import QoSProfile
 
 from booth import SAMPLES
-from nodes.cell import (
-    DIAGNOSTICS,
-    Robot,
-    offline_um,
-    parameters,
-    two_passes,
-    values_of,
-    write_panel,
-)
+from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 
 MOTION = two_passes()
+EVENTS = '/deposition_simulator/transition_event'
+POSES, STATE = 'deposition_simulator: poses', 'deposition_simulator: state'
 
 
 class Manager:
@@ -61,7 +54,7 @@ class Manager:
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker(DIAGNOSTICS)
+    return onlooker()
 
 
 @pytest.fixture
@@ -86,9 +79,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
                                              wait_until):  # fmt: skip
     node = simulator(autostart=False)
     managed = manager(node)
-    events = onlooker(
-        {'/deposition_simulator/transition_event': (TransitionEvent, QoSProfile(depth=50))}
-    )
+    events = onlooker({EVENTS: (TransitionEvent, QoSProfile(depth=50))})
     assert managed.state == 'unconfigured'
     assert not node.count_subscribers('atomizer/pose')
     assert managed.activate() == (False, 'unconfigured')
@@ -110,8 +101,8 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     assert managed.configure() == (True, 'inactive')
     assert node.film.counts.received == 0
     assert managed.shutdown() == (True, 'finalized')
-    (heard,) = events.heard.values()
-    states = [events.decoded(*events.heard, row).goal_state.label for row in range(len(heard))]
+    rows = range(len(events.heard[EVENTS]))
+    states = [events.decoded(EVENTS, row).goal_state.label for row in rows]
     assert states[-2:] == ['shuttingdown', 'finalized']
 
 
@@ -124,11 +115,8 @@ def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
     source = robot(node)
     source.send(MOTION, slice(0, 300))
 
-    def status():
-        return viewer.status('deposition_simulator: poses')
-
-    wait_until(lambda: status() and '300 poses came and were not painted' in status().message)
-    assert status().level == b'\x01'
+    told = '300 poses came and were not painted'
+    wait_until(lambda: viewer.tells(POSES, told, b'\x01'))
     managed.activate()
     source.send(MOTION, slice(300, 600))
     film = painted(node, 300)
@@ -140,26 +128,35 @@ def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
         quaternions_xyzw=MOTION.quaternions_xyzw[300:],
     )
     assert np.array_equal(film, offline_um(node, second_pass))
-    wait_until(lambda: status().message == 'painting')
-    assert values_of(status())['poses not painted while inactive'] == '300'
+    wait_until(lambda: viewer.tells(POSES, 'painting', b'\x00'))
+    assert viewer.value(POSES, 'poses not painted while inactive') == '300'
 
 
-def test_a_part_that_cannot_be_read_leaves_it_unconfigured(simulator, manager, viewer, wait_until,
-                                                           tmp_path):  # fmt: skip
-    mesh = tmp_path / 'late.stl'
-    mesh.write_text('no mesh')
-    node = simulator(autostart=False, mesh_file=str(mesh))
+def test_what_it_reads_can_be_changed_while_it_is_not_configured(
+    simulator, manager, viewer, wait_until, tmp_path
+):
+    """A part that cannot be read leaves it unconfigured, and it says so."""
+    (tmp_path / 'late.stl').write_text('no mesh')
+    other = str(write_panel(tmp_path / 'other.stl'))
+    node = simulator(autostart=False, mesh_file=str(tmp_path / 'late.stl'))
     managed = manager(node)
     assert managed.configure() == (False, 'unconfigured')
 
-    def status():
-        return viewer.status('deposition_simulator: state')
+    def told(**values) -> str:
+        return node.set_parameters_atomically(parameters(**values)).reason
 
-    wait_until(lambda: status() and status().level == b'\x02')
-    assert 'late.stl' in status().message
-    write_panel(mesh)
+    wait_until(lambda: viewer.tells(STATE, 'late.stl', b'\x02'))
+    assert told(mesh_file=other, max_edge_length_m=0.2, atomizers=['left', 'right']) == ''
+    assert 'not all zero' in told(down=[0.0, 0.0, 0.0])
     assert managed.configure() == (True, 'inactive')
-    wait_until(lambda: status().level == b'\x00' and status().message.startswith('inactive'))
+    wait_until(lambda: viewer.tells(STATE, 'inactive', b'\x00'))
+    assert (node.mesh_file, node.gun_names) == (other, ['left', 'right'])
+    refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
+    assert told(max_edge_length_m=0.1).startswith(refused)
+    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    managed.cleanup()
+    assert told(max_edge_length_m=0.1) == ''
+    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
 
 
 class Faulty(ManagedNode):
@@ -181,8 +178,7 @@ def test_an_error_that_nobody_foresaw_leads_back_to_the_beginning(ros_context, s
     assert managed.configure() == (True, 'inactive')
     assert managed.activate() == (False, 'unconfigured')
     assert len(list(node.publishers)) == publishers
-    wait_until(lambda: (status := viewer.status('faulty: state')) and status.level == b'\x02')
-    assert 'ZeroDivisionError: by nothing' in viewer.status('faulty: state').message
+    wait_until(lambda: viewer.tells('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
     with pytest.raises(ZeroDivisionError):
         Faulty('faulty', context=ros_context)
 
@@ -194,6 +190,11 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_conte
     spin(source)
     assert managed.configure() == (True, 'inactive')
     assert not list(tmp_path.iterdir())
+    # A run that is there is not overwritten.
+    (tmp_path / 'run').mkdir()
+    assert managed.activate() == (False, 'inactive')
+    assert not list((tmp_path / 'run').iterdir())
+    (tmp_path / 'run').rmdir()
     for rows in (slice(0, 150), slice(300, 600)):
         assert managed.activate() == (True, 'active')
         wait_until(lambda: source.pose_publisher.get_subscription_count() == 1)
@@ -208,70 +209,15 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_conte
     assert managed.shutdown() == (True, 'finalized')
 
 
-def test_a_run_that_is_there_is_not_overwritten(recorder, manager, tmp_path):
-    (tmp_path / 'run').mkdir()
-    managed = manager(recorder)
-    managed.configure()
-    assert managed.activate() == (False, 'inactive')
-    assert not list((tmp_path / 'run').iterdir())
-
-
-def test_what_it_reads_can_be_changed_while_it_is_not_configured(simulator, manager, tmp_path):
-    node = simulator(autostart=False)
-    managed = manager(node)
-    other = write_panel(tmp_path / 'other.stl')
-
-    def told(**values) -> str:
-        return node.set_parameters_atomically(parameters(**values)).reason
-
-    assert told(mesh_file=str(other), max_edge_length_m=0.2, atomizers=['left', 'right']) == ''
-    assert 'not all zero' in told(down=[0.0, 0.0, 0.0])
-    assert managed.configure() == (True, 'inactive')
-    assert (node.mesh_file, node.gun_names) == (str(other), ['left', 'right'])
-    refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
-    assert told(max_edge_length_m=0.1).startswith(refused)
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
-    managed.cleanup()
-    assert told(max_edge_length_m=0.1) == ''
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
-
-
-SLOW = """
-import sys, time
-from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.process import run_node
-
-class Slow(ManagedNode):
-    def __init__(self, **kwargs):
-        super().__init__('slow', **kwargs)
-        self.create_timer(0.02, self.trigger_configure)
-
-    def _prepare(self):
-        print('loading', flush=True)
-        while True:
-            time.sleep(0.01)
-
-sys.exit(run_node(Slow))
-"""
-
-
 def of_this_process() -> tuple[int, int]:
     return threading.active_count(), len(os.listdir('/proc/self/fd'))
 
 
-@pytest.mark.parametrize('name', ['deposition_simulator', 'model_comparison', 'run_recorder'])
-def test_repeated_cycles_leave_nothing_behind(ros_context, spin, manager, tmp_path, name):
-    panel = SAMPLES / 'panel_study'
-    part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.2}
-    node_class, values = {
-        'deposition_simulator': (DepositionSimulator, part),
-        'model_comparison': (
-            ModelComparison,
-            part | {'measurements_file': str(panel / 'panel_577.csv')},
-        ),
-        'run_recorder': (RunRecorder, {'output_directory': str(tmp_path)}),
-    }[name]
-    values = values | {'autostart': False}
+@pytest.mark.parametrize('node_class', [DepositionSimulator, RunRecorder])
+def test_repeated_cycles_leave_nothing_behind(ros_context, spin, manager, tmp_path, node_class):
+    panel = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
+    values = {'autostart': False, 'output_directory': str(tmp_path)}
+    values |= panel if node_class is DepositionSimulator else {}
     node = node_class(context=ros_context, parameter_overrides=parameters(**values))
     spin(node)
     managed = manager(node)
@@ -282,7 +228,7 @@ def test_repeated_cycles_leave_nothing_behind(ros_context, spin, manager, tmp_pa
 
     at_first = entities()
     found = []
-    for _ in range(4):
+    for _ in range(3):
         for transition in (managed.configure, managed.activate, managed.deactivate,
                            managed.cleanup):  # fmt: skip
             assert transition()[0]

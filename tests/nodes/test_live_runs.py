@@ -14,7 +14,7 @@ from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters
 from std_srvs.srv import Trigger
 
-from nodes.cell import Onlooker, parameters, two_passes, write_own_model, write_panel
+from nodes.cell import parameters, two_passes, write_own_model, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
@@ -76,9 +76,7 @@ def test_a_replay_waits_for_who_is_still_loading_and_gives_the_offline_film(
     assert np.abs(live_um - offline_um).max() < 1e-6 * offline_um.max()
 
 
-def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(
-    ros_domain, ros_context, spin, wait_until, tmp_path
-):
+def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(ros_domain, onlooker, wait_until, tmp_path):
     films = tmp_path / 'films'
     with NodeProcess(
         tmp_path / 'simulator',
@@ -87,9 +85,7 @@ def test_ctrl_c_while_a_film_is_saved_lets_it_be_saved(
         max_edge_length_m=0.004,
         output_directory=films,
     ) as simulator:
-        caller = Onlooker(ros_context, {})
-        spin(caller)
-        client = caller.create_client(SaveFilm, '/deposition_simulator/save_film')
+        client = onlooker().create_client(SaveFilm, '/deposition_simulator/save_film')
         wait_until(client.service_is_ready, what='the service')
         client.call_async(SaveFilm.Request(name='film'))
         wait_until(lambda: films.is_dir() and any(films.iterdir()), what='the first file')

@@ -24,6 +24,7 @@ from paint_deposition.nodes.replay.bag_player import BagPlayer
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.
 PART_POSE = [1.0, 0.0, 0.5, 0.0, 0.0, math.sqrt(0.5), math.sqrt(0.5)]
+SET_PARAMETERS = '/deposition_simulator/set_parameters'
 HAS_TF = importlib.util.find_spec('tf2_ros') is not None
 
 
@@ -50,25 +51,22 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     return recorder.run.folder, film
 
 
-def test_it_is_simulated_without_being_told_where_the_part_stood(recorded, simulator):
+def test_it_is_simulated_without_being_told_where_the_part_stood(
+    recorded, simulator, ros_context, executor, capfd
+):
     run, film = recorded
     read = read_recording(run)
     assert read.frame_id == 'part'
     assert "'base_link' to 'part'" in read.notes[-1]
     assert film.max() > 2.0
-    offline = offline_um(simulator(), read)
+    node = simulator()
+    offline = offline_um(node, read)
     assert np.abs(offline - film).max() < 1e-6 * film.max()
-
-
-@pytest.mark.skipif(HAS_TF, reason='tf2 is installed')
-def test_its_replay_says_what_to_give_the_simulator_where_there_is_no_tf(
-    recorded, ros_context, executor, capfd
-):
-    player = BagPlayer(
-        context=ros_context,
-        parameter_overrides=parameters(bag=str(recorded[0]), start_paused=True),
-    )
-    executor.add_node(player)
+    if HAS_TF:
+        return
+    # Its replay says what to give the simulator.
+    chosen = parameters(bag=str(run), start_paused=True)
+    executor.add_node(BagPlayer(context=ros_context, parameter_overrides=chosen))
     said = capfd.readouterr().err
     assert "part_parent_frame: 'base_link' and part_pose: [1, 0, 0.5, 0, 0, 0.70710" in said
 
@@ -88,17 +86,17 @@ def test_its_replay_brings_the_transforms_along(
     assert np.abs(replayed - film).max() < 1e-6 * film.max()
 
 
-@pytest.mark.parametrize('kind', ['byte', 'bool', 'double'])
-def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, onlooker, call,
-                                                                    kind):  # fmt: skip
+def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, onlooker, call):
     node = simulator(part_pose=PART_POSE, part_parent_frame='base_link')
-    assert node.frame.transform_from('base_link', 0) is not None
-    type_ = getattr(ParameterType, f'PARAMETER_{kind.upper()}_ARRAY')
-    request = SetParameters.Request(
-        parameters=[ParameterMessage(name='part_pose', value=ParameterValue(type=type_))]
-    )
-    service = f'/{node.get_name()}/set_parameters'
-    (result,) = call(onlooker({}), SetParameters, service, request).results
-    assert result.successful, result.reason
-    assert list(node.values['part_pose']) == []
-    assert list(node.get_parameter('part_pose').value) == []
+    viewer = onlooker({})
+    for kind in ('BYTE', 'BOOL', 'DOUBLE'):
+        assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
+        assert node.frame.transform_from('base_link', 0) is not None
+        value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
+        request = SetParameters.Request(
+            parameters=[ParameterMessage(name='part_pose', value=value)]
+        )
+        (result,) = call(viewer, SetParameters, SET_PARAMETERS, request).results
+        assert result.successful, result.reason
+        assert list(node.values['part_pose']) == []
+        assert list(node.get_parameter('part_pose').value) == []

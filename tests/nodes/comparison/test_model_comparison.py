@@ -11,13 +11,14 @@ from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
 
-from nodes.cell import Onlooker, offline_um, parameters, two_passes, write_panel
+from nodes.cell import offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
@@ -69,27 +70,15 @@ def comparison(ros_context, spin, readings, tmp_path):
 
 
 @pytest.fixture
-def viewer(ros_context, spin):
+def viewer(onlooker):
     """A node that looks at the comparison."""
-    node = Onlooker(
-        ros_context,
-        {
-            'comparison/stats': (ComparisonStats, topics.LATCHED),
-            'comparison/mesh': (Marker, topics.LATCHED),
-            'comparison/legend': (MarkerArray, topics.LATCHED),
-        },
-    )
-    spin(node)
-    return node
+    kinds = {'stats': ComparisonStats, 'mesh': Marker, 'legend': MarkerArray}
+    return onlooker({f'comparison/{t}': (kind, topics.LATCHED) for t, kind in kinds.items()})
 
 
 def _true_model(tmp_path) -> str:
     write_model(tmp_path / 'truth.yaml', TRUTH)
     return str(tmp_path / 'truth.yaml')
-
-
-def _at(stamp) -> int:
-    return stamp.sec * 1_000_000_000 + stamp.nanosec
 
 
 def test_the_error_falls_to_the_noise_as_the_part_is_painted(
@@ -105,11 +94,11 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
         newest = MOTION.stamps_ns[rows][-1]
         wait_until(
             lambda newest=newest: viewer.shows(
-                'comparison/stats', lambda m: _at(m.header.stamp) == newest
+                'comparison/stats', lambda m: stamp_ns(m.header) == newest
             )
         )
         errors.append(viewer.newest('comparison/stats').rmse_um)
-    before_any = viewer.first('comparison/stats')
+    before_any = viewer.decoded('comparison/stats', 0)
     measured = node._readings.thickness_um
     assert before_any.rmse_um == pytest.approx(np.sqrt(np.mean(measured**2)))
     assert before_any.readings_painted == 0
@@ -123,34 +112,30 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
 
 
 def test_a_better_model_set_at_run_time_lowers_the_error(
-    comparison, robot, viewer, wait_until, tmp_path
+    comparison, robot, viewer, call, wait_until, tmp_path
 ):
+    """Predictions are those of an offline run in double precision, and a service says it."""
     node = comparison()
-    source = robot(node)
-    source.send(MOTION)
+    robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
     wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
     without = viewer.newest('comparison/stats')
     assert without.model == 'default model'
     assert without.rmse_um > 3 * SIGMA_UM
+    offline = offline_um(node, MOTION, precision='double')
+    found = node.residuals()
+    assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
+    readings_um = node._readings.thickness_um
+    assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
+    answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
+    assert answer.success
+    assert '\n' not in answer.message
+    assert f'rms {found.rmse_um:.2f} µm' in answer.message
+    assert '40 readings, 40 where' in answer.message
     node.set_parameters(parameters(model_file=_true_model(tmp_path)))
     wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
     assert viewer.newest('comparison/stats').model == 'truth.yaml'
-
-
-def test_predictions_are_those_of_an_offline_run_in_double_precision(
-    comparison, robot, wait_until
-):
-    node = comparison()
-    robot(node).send(MOTION)
-    wait_until(lambda: node.film.counts.received == len(MOTION))
-    offline = offline_um(node, MOTION, precision='double')
-    predicted = node.residuals().predicted_um
-    assert np.array_equal(predicted, np.repeat(offline[:20], 2))
-    assert np.allclose(
-        predicted + node.residuals().residual_um, node._readings.thickness_um, rtol=1e-14
-    )
 
 
 def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
@@ -161,7 +146,7 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
     newest = MOTION.stamps_ns[-1]
-    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: _at(m.header.stamp) == newest))
+    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: stamp_ns(m.header) == newest))
     wait_until(lambda: viewer.newest('comparison/legend'), what='the legend')
     mesh = viewer.newest('comparison/mesh')
     colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
@@ -175,31 +160,13 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
 
 
-def test_compare_says_it_in_a_line(comparison, robot, viewer, wait_until):
-    node = comparison()
-    robot(node).send(MOTION)
-    wait_until(lambda: node.film.counts.received == len(MOTION))
-    client = viewer.create_client(Trigger, '/model_comparison/compare')
-    wait_until(client.service_is_ready)
-    future = client.call_async(Trigger.Request())
-    wait_until(future.done)
-    answer = future.result()
-    assert answer.success
-    assert '\n' not in answer.message
-    assert f'rms {node.residuals().rmse_um:.2f} µm' in answer.message
-    assert '40 readings, 40 where' in answer.message
-
-
-@pytest.mark.parametrize(
-    ('values', 'words'),
-    [
+def test_bad_input_is_one_line(comparison):
+    for values, words in (
         ({'measurements_file': ''}, 'measurements_file is empty'),
         ({'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
         ({'mesh_file': ''}, 'mesh_file is empty'),
         ({'mesh_scale': 0.01}, "lie off the part's surface"),
-    ],
-)
-def test_bad_input_is_one_line(comparison, values, words):
-    with pytest.raises(PaintError, match=words) as caught:
-        comparison(**values)
-    assert '\n' not in str(caught.value)
+    ):
+        with pytest.raises(PaintError, match=words) as caught:
+            comparison(**values)
+        assert '\n' not in str(caught.value)

@@ -13,12 +13,7 @@ pytest.importorskip('rclpy')
 
 from visualization_msgs.msg import Marker
 
-from nodes.cell import (
-    offline_um,
-    parameters,
-    two_passes,
-    write_panel,
-)
+from nodes.cell import offline_um, parameters, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -82,17 +77,12 @@ def test_the_gun_tells_which_side_of_a_solid_is_outward(simulator, robot, painte
 def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wait_until,
                                                          tmp_path):  # fmt: skip
     """100,000 triangles go out five times a second, to a subscriber, while poses come."""
-    node = simulator(
-        max_edge_length_m=0.0045,
-        publish_rate_hz=5.0,
-        pose_queue_depth=5000,
-    )
+    node = simulator(max_edge_length_m=0.0045, publish_rate_hz=5.0, pose_queue_depth=5000)
     assert len(node.surface.faces) > 100_000
     viewer = onlooker({'thickness/mesh': (Marker, topics.LATCHED)})
     motion = two_passes(poses=750, trigger=False)
     bag = write_pose_bag(tmp_path / 'motion', motion)
-    player = 'bag_player'
-    with NodeProcess(tmp_path / 'player', player, bag=bag) as replay:
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag) as replay:
         wait_until(lambda: replay.exit_code is not None, what='the replay')
     wait_until(lambda: node.film.counts.received == len(motion), what='every pose painted')
     assert node.film.counts.rejected == 0
@@ -106,9 +96,9 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     assert min(map(len, meshes)) > 120 * 100_000
 
 
-@pytest.mark.parametrize(
-    ('values', 'words'),
-    [
+def test_bad_input_is_one_line(ros_context, tmp_path):
+    panel = {'mesh_file': str(write_panel(tmp_path / 'panel.stl'))}
+    for values, words in (
         ({'mesh_file': ''}, 'mesh_file is empty'),
         ({'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
         ({'model_file': 'nowhere.yaml'}, 'nowhere.yaml: no such file'),
@@ -117,10 +107,8 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
         ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]}, 'unit quaternion'),
         ({'down': [0.0, 0.0, 0.0]}, 'not all zero'),
         ({'mesh_fil': 'x'}, "did you mean 'mesh_file'?"),
-    ],
-)
-def test_bad_input_is_one_line(ros_context, tmp_path, values, words):
-    chosen = {'mesh_file': str(write_panel(tmp_path / 'panel.stl'))} | values
-    with pytest.raises(PaintError, match=words) as caught:
-        DepositionSimulator(context=ros_context, parameter_overrides=parameters(**chosen))
-    assert '\n' not in str(caught.value)
+    ):
+        overrides = parameters(**panel | values)
+        with pytest.raises(PaintError, match=words) as caught:
+            DepositionSimulator(context=ros_context, parameter_overrides=overrides)
+        assert '\n' not in str(caught.value)

@@ -17,13 +17,7 @@ from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 
 from brushes import two_brushes
-from nodes.cell import (
-    PANEL_M,
-    offline_um,
-    parameters,
-    two_passes,
-    write_panel,
-)
+from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
@@ -79,6 +73,18 @@ def wider(tmp_path):
     return str(path)
 
 
+@pytest.fixture
+def asked(onlooker, wait_until):
+    """`asked(**fields)`: the future of the simulator's answer, whoever spins."""
+    client = onlooker({}).create_client(ChangePart, SERVICE)
+
+    def asked(**fields):
+        wait_until(client.service_is_ready)
+        return client.call_async(ChangePart.Request(**fields))
+
+    return asked
+
+
 def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, wider, onlooker,
                                             wait_until, tmp_path):  # fmt: skip
     node = simulator()
@@ -104,66 +110,63 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
     assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
     source.send(later(MOTION))
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
-    wait_until(lambda: (p := viewer.newest('part')) and p.serial == '4712', what='the part')
+    wait_until(lambda: viewer.shows('part', lambda p: p.serial == '4712'), what='the part')
     part = viewer.newest('part')
     assert (part.type, part.coat, part.mesh_file) == ('wide door', 1, wider)
-    wait_until(
-        lambda: (
-            (s := viewer.newest('thickness/stats'))
-            and (s.run, s.poses_received) == ('4712', len(MOTION))
-        )
-    )
+    now = '4712', len(MOTION)
+    wait_until(lambda: viewer.shows('thickness/stats', lambda s: (s.run, s.poses_received) == now))
 
 
-def test_poses_that_wait_belong_to_the_part_before(simulator, robot, painted, onlooker,
-                                                    wait_until):  # fmt: skip
-    """A request must not overtake the poses that were sent before it."""
-    node = simulator(pose_queue_depth=5000)
-    source, operator = robot(node), onlooker({})
-    client = operator.create_client(ChangePart, SERVICE)
-    wait_until(client.service_is_ready)
+def test_poses_belong_to_the_part_that_was_there_when_they_were_sent(
+    simulator, robot, painted, asked, wider, wait_until
+):
+    """Those before a request wait beside it; those after it wait while the mesh is read."""
+    node = simulator(pose_queue_depth=5000, max_edge_length_m=0.015)
+    source = robot(node)
+    asked(prepare=True)  # so that the service is known
     source.send(MOTION)
-    # Nothing has been handed out yet: the request waits beside the poses.
-    future = client.call_async(ChangePart.Request(serial='1'))
+    future = asked(serial='1', mesh_file=wider)
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(later(MOTION))
     wait_until(future.done, what='the change')
     answer = future.result()
     assert answer.success, answer.message
     figures = json.loads(Path(answer.paths[2]).read_text())
     assert figures['poses']['received'] == len(MOTION)
-    assert node.film.counts.received == 0
-
-
-def test_the_gun_stays_as_it_is(simulator, robot, painted, change, wider):
-    """A gun that was closed before the change is closed after it, without another word."""
-    node = simulator()
-    source = robot(node)
-    source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0)
-    source.send(WITHOUT_TRIGGER)
-    painted(node, 300)
-    source.send_state(WITHOUT_TRIGGER.stamps_ns[-1], 0.0)
-    assert change(serial='1', mesh_file=wider).success
-    source.send(later(WITHOUT_TRIGGER))
-    assert painted(node, 300).max() == 0.0
-
-
-def test_poses_that_come_while_a_mesh_is_read_wait_for_it(simulator, robot, painted, onlooker,
-                                                          wider, wait_until):  # fmt: skip
-    node = simulator(max_edge_length_m=0.015)
-    source, operator = robot(node), onlooker({})
-    client = operator.create_client(ChangePart, SERVICE)
-    wait_until(client.service_is_ready)
-    future = client.call_async(ChangePart.Request(serial='1', mesh_file=wider))
-    wait_until(lambda: node.parts.waiting, what='the request')
-    source.send(MOTION)
-    wait_until(future.done, what='the change')
-    assert future.result().success, future.result().message
     film = painted(node, len(MOTION))
     assert node.mesh_file == wider
-    assert np.array_equal(film, offline_um(node, MOTION))
+    assert np.array_equal(film, offline_um(node, later(MOTION)))
 
 
-def test_a_mesh_that_was_read_ahead_is_there_at_once(simulator, change, wider, tmp_path):
-    """And so is the one of the part that has left."""
+def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
+    simulator, robot, painted, change, wider, wait_until, tmp_path
+):
+    """Closed before the change it is closed after it, and it sprays on with its brush."""
+    brushes = two_brushes()
+    write_model(tmp_path / 'brushes.yaml', brushes)
+    other = DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
+    write_model(tmp_path / 'other.yaml', other)
+    node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
+    source = robot(node)
+    source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0, brush=2)
+    source.send(WITHOUT_TRIGGER)
+    painted(node, len(WITHOUT_TRIGGER))
+    assert change(serial='1', mesh_file=wider).success
+    node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
+    wait_until(lambda: not node.repainting, what='the end of the trial')
+    assert 'brush 2 is not in the model' in node.model_problem
+    source.send(later(WITHOUT_TRIGGER))
+    assert painted(node, len(WITHOUT_TRIGGER)).max() > 1.0
+    source.send_state(later(WITHOUT_TRIGGER).stamps_ns[-1], 0.0)
+    assert change(serial='2').success
+    source.send(later(later(WITHOUT_TRIGGER)))
+    assert painted(node, len(WITHOUT_TRIGGER)).max() == 0.0
+
+
+def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
+    simulator, change, wider, tmp_path
+):
+    """Read ahead, or of a part that has left; one that was exported anew is read again."""
     node = simulator()
     first, third = node.mesh_file, str(write_panel(tmp_path / 'third.stl', reverse=True))
     prepared = change(mesh_file=third, prepare=True)
@@ -174,6 +177,9 @@ def test_a_mesh_that_was_read_ahead_is_there_at_once(simulator, change, wider, t
     def ready() -> str:
         return node.parts.status().values['meshes prepared']
 
+    def width_m() -> float:
+        return np.ptp(node.points.positions_m[:, 0])
+
     assert ready() == third
     assert change(serial='1', mesh_file=third).success
     assert ready() == first
@@ -181,18 +187,25 @@ def test_a_mesh_that_was_read_ahead_is_there_at_once(simulator, change, wider, t
     assert ready() == f'{first} {third}'
     assert change(serial='3', mesh_file=first).success
     assert ready() == f'{third} {wider}'
+    # Under the name of the part in the cell, and of one that was there before.
+    narrow = Path(first).read_bytes()
+    shutil.copy(wider, first)
+    assert change(serial='4').success
+    assert width_m() == pytest.approx(1.3 * PANEL_M)
+    Path(first).write_bytes(narrow)
+    assert change(serial='5', mesh_file=wider).success
+    assert change(serial='6', mesh_file=first).success
+    assert width_m() == pytest.approx(PANEL_M)
 
 
-def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change, wider,
+def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change,
                                                       tmp_path):  # fmt: skip
     node = simulator()
     source = robot(node)
     assert change(serial='A-1').success
     source.send(MOTION)
     once = painted(node, len(MOTION))
-    refused = change(serial='A-1')
-    assert not refused.success
-    assert "serial 'A-1' is the part in the cell: say coat: true" in refused.message
+    assert "serial 'A-1' is the part in the cell: say coat: true" in change(serial='A-1').message
     other = change(serial='A-2', coat=True)
     assert "coat: the part in the cell is 'A-1' of " in other.message
     coat = change(serial='A-1', coat=True)
@@ -201,10 +214,8 @@ def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted,
     source.send(later(MOTION))
     assert painted(node, 2 * len(MOTION)) == pytest.approx(2.0 * once, rel=1e-5, abs=1e-6)
     assert change(serial='A-2').success
-    figures = [
-        json.loads((tmp_path / 'films' / run / 'film.json').read_text())
-        for run in ('A-1', 'A-1_coat_2')
-    ]
+    files = [tmp_path / 'films' / run / 'film.json' for run in ('A-1', 'A-1_coat_2')]
+    figures = [json.loads(file.read_text()) for file in files]
     assert [f['part']['coat'] for f in figures] == [1, 2]
     assert figures[1]['mean_um'] == pytest.approx(2.0 * figures[0]['mean_um'], rel=0.1)
     done_before = change(serial='A-1')
@@ -212,25 +223,22 @@ def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted,
     assert 'A-1 is there already: a part has one run for each coat' in done_before.message
 
 
-@pytest.mark.parametrize(
-    ('fields', 'message'),
-    [
+def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted, change,
+                                                      tmp_path):  # fmt: skip
+    node = simulator()
+    robot(node).send(MOTION)
+    film = painted(node, len(MOTION))
+    for fields, message in (
         ({'serial': ''}, "serial '': use letters, digits"),
         ({'serial': '../4711'}, "serial '../4711': use letters, digits"),
         ({'serial': '..'}, "serial '..': use letters"),
         ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
         ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
         ({'prepare': True}, 'prepare without a mesh_file'),
-    ],
-)
-def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted, change, fields,
-                                                      message, tmp_path):  # fmt: skip
-    node = simulator()
-    robot(node).send(MOTION)
-    film = painted(node, len(MOTION))
-    answer = change(**fields)
-    assert not answer.success
-    assert message in answer.message
+    ):
+        answer = change(**fields)
+        assert not answer.success
+        assert message in answer.message
     assert np.array_equal(node.film.up_to_date().film_um, film)
     assert not (tmp_path / 'films').exists()
 
@@ -271,23 +279,8 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
         assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
 
 
-def test_a_mesh_exported_anew_is_painted_in_its_new_shape(simulator, robot, painted, change,
-                                                          wider):  # fmt: skip
-    """Under the name of the part in the cell, and of one that was there before."""
-    node = simulator()
-    first = node.mesh_file
-    narrow = Path(first).read_bytes()
-    shutil.copy(wider, first)
-    assert change(serial='1').success
-    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
-    Path(first).write_bytes(narrow)
-    assert change(serial='2', mesh_file=wider).success
-    assert change(serial='3', mesh_file=first).success
-    assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(PANEL_M)
-
-
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
-def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot, painted, onlooker,
+def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot, painted, asked,
                                                                wait_until, tmp_path, pose,
                                                                frame):  # fmt: skip
     """Poses that came while the next mesh was read are painted where the old part stands."""
@@ -296,14 +289,11 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     mesh = read_mesh(large, max_edge_length_m=0.005)
     trimesh.Trimesh(mesh.vertices_m, mesh.faces).export(large)
     broken.write_text('no mesh')
-    source, operator = robot(node), onlooker({})
-    client = operator.create_client(ChangePart, SERVICE)
-    wait_until(client.service_is_ready)
+    source = robot(node)
     # The broken mesh is looked at after the large one.
-    client.call_async(ChangePart.Request(prepare=True, mesh_file=str(large)))
+    asked(prepare=True, mesh_file=str(large))
     aside = [0.3, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    request = ChangePart.Request(serial='1', mesh_file=str(broken), part_pose=aside)
-    future = client.call_async(request)
+    future = asked(serial='1', mesh_file=str(broken), part_pose=aside)
     wait_until(lambda: node.parts.waiting, what='the request')
     source.send(MOTION, frame_id=frame)
     wait_until(future.done, what='the answer')
@@ -311,24 +301,3 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     assert list(node.values['part_pose']) == pose
     film, expected = painted(node, len(MOTION)), offline_um(node, MOTION)
     assert np.abs(film - expected).max() <= 1e-6 * expected.max()
-
-
-def test_a_carried_brush_must_be_in_a_new_model(simulator, robot, painted, change, wider,
-                                                wait_until, tmp_path):  # fmt: skip
-    """The gun sprays on with it when the next part comes."""
-    brushes = two_brushes()
-    write_model(tmp_path / 'brushes.yaml', brushes)
-    other = DepositionModel.of_brushes([Brush(number=1, planar=brushes.planar)])
-    write_model(tmp_path / 'other.yaml', other)
-    node = simulator(model_file=str(tmp_path / 'brushes.yaml'), repaint=False)
-    source = robot(node)
-    source.send_state(WITHOUT_TRIGGER.stamps_ns[0], 1.0, brush=2)
-    source.send(WITHOUT_TRIGGER)
-    painted(node, len(WITHOUT_TRIGGER))
-    assert change(serial='1', mesh_file=wider).success
-    node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))
-    wait_until(lambda: not node.repainting, what='the end of the trial')
-    assert 'brush 2 is not in the model' in node.model_problem
-    source.send(later(WITHOUT_TRIGGER))
-    film = painted(node, len(WITHOUT_TRIGGER))
-    assert film.max() > 1.0

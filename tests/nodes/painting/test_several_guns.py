@@ -12,7 +12,7 @@ pytest.importorskip('rclpy')
 
 from paint_msgs.msg import ThicknessField, ThicknessStats
 
-from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes, values_of
+from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
@@ -30,9 +30,7 @@ def from_behind(motion: Trajectory) -> Trajectory:
     half_turn = Rotation.from_euler('z', np.pi)
     turned = half_turn * Rotation.from_quat(motion.quaternions_xyzw)
     return replace(
-        motion,
-        positions_m=half_turn.apply(motion.positions_m),
-        quaternions_xyzw=turned.as_quat(),
+        motion, positions_m=half_turn.apply(motion.positions_m), quaternions_xyzw=turned.as_quat()
     )
 
 
@@ -62,72 +60,49 @@ def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, pa
     expected = offline_um(node, HIGH) + offline_um(node, LOW, THIN)
     alone = [offline_um(node, HIGH).max(), offline_um(node, LOW, THIN).max()]
     assert min(alone) > 1.0
-    films = []
-    for order in ('one after the other', 'the second before the first', 'in turn'):
-        if order == 'one after the other':
-            first.send(HIGH)
-            second.send(LOW)
-        elif order == 'the second before the first':
-            second.send(LOW)
-            painted(node, len(LOW))
-            first.send(HIGH)
-        else:
-            for start in range(0, len(HIGH), 37):
-                second.send(LOW, slice(start, start + 37))
-                first.send(HIGH, slice(start, start + 37))
-                painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(LOW)))
-        films.append(painted(node, len(HIGH) + len(LOW)))
-        node.reset()
-    for film in films:
-        assert np.array_equal(film, expected)
+    # One after the other.
+    first.send(HIGH)
+    second.send(LOW)
+    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
+    # In turn, the second first.
+    node.reset()
+    for start in range(0, len(HIGH), 37):
+        second.send(LOW, slice(start, start + 37))
+        first.send(HIGH, slice(start, start + 37))
+        painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(LOW)))
+    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
 
 
 def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
     fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
-    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields | DIAGNOSTICS)
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields)
     first, second = guns(node)
     first.send(HIGH)
     second.send(LOW)
     painted(node, len(HIGH) + len(LOW))
     alone = [offline_um(node, motion) for motion in (HIGH, LOW)]
 
-    def newest():
-        stats = viewer.newest('thickness/stats')
-        shown = [viewer.newest(topic) for topic in fields]
-        done = stats and stats.poses_received == len(HIGH) + len(LOW) and all(shown)
-        return done and np.max(shown[1].thickness_um) > 1.0 and stats
-
-    wait_until(newest, what='statistics of all poses')
-    stats = newest()
+    poses, films = len(HIGH) + len(LOW), dict(zip(fields, alone, strict=True))
+    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == poses))
+    stats = viewer.newest('thickness/stats')
     volumes = np.array([film @ node.surface.vertex_areas_m2 for film in alone])
     assert stats.atomizers == GUNS
     assert np.allclose(stats.atomizer_volume_cm3, volumes, rtol=1e-12)
     assert np.allclose(stats.atomizer_share, volumes / volumes.sum(), rtol=1e-12)
     assert sum(stats.atomizer_volume_cm3) == pytest.approx(stats.painted_volume_cm3, rel=1e-12)
-    for topic, film in zip(fields, alone, strict=True):
+    for topic, film in films.items():
+        shown = film.astype(np.float32)
         wait_until(
-            lambda t=topic, f=film: np.array_equal(
-                viewer.newest(t).thickness_um, f.astype(np.float32)
-            ),
+            lambda t=topic, s=shown: viewer.shows(t, lambda m: np.array_equal(m.thickness_um, s)),
             what=topic,
         )
     share = f'{volumes[1] / volumes.sum():.1%}'
-    wait_until(
-        lambda: (
-            (s := viewer.status('deposition_simulator: film'))
-            and values_of(s).get('share of robot_2') == share
-        )
-    )
+    task = 'deposition_simulator: film'
+    wait_until(lambda: viewer.value(task, 'share of robot_2') == share, what=share)
     # Of each gun's poses by themselves.
-    status = viewer.status('deposition_simulator: robot_2/poses')
-    wait_until(
-        lambda: (
-            values_of(viewer.status('deposition_simulator: robot_2/poses'))['poses taken']
-            == str(len(LOW))
-        ),
-        what=str(status),
-    )
+    task = 'deposition_simulator: robot_2/poses'
+    wait_until(lambda: viewer.value(task, 'poses taken') == str(len(LOW)), what='its poses')
 
 
 def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait_until):
@@ -148,14 +123,16 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     thin, sagging = str(tmp_path / 'thin.yaml'), str(tmp_path / 'sagging.yaml')
     write_model(tmp_path / 'thin.yaml', THIN)
     write_model(tmp_path / 'sagging.yaml', THIN.with_effect(Sag.typical()))
-    with pytest.raises(PaintError, match='model_files names 1 models for 2 atomizers: give'):
-        simulator(atomizers=GUNS, model_files=[thin])
-    with pytest.raises(PaintError, match='atomizers and model_file another: give model_file'):
-        simulator(atomizers=GUNS, model_files=[thin, thin], model_file=thin)
     one_film = r'robot_1 and robot_2 differ in what acts on the finished film.*\(sag\)'
-    with pytest.raises(PaintError, match=one_film):
-        simulator(atomizers=GUNS, model_files=[thin, sagging])
-    with pytest.raises(PaintError, match=r'atomizers is .*must be different names'):
-        simulator(atomizers=['robot_1', 'robot_1'])
-    with pytest.raises(PaintError, match=r'atomizers is .*must be different names'):
-        simulator(atomizers=['../robot'])
+    for values, words in (
+        ({'model_files': [thin]}, 'model_files names 1 models for 2 atomizers: give'),
+        (
+            {'model_files': [thin, thin], 'model_file': thin},
+            'atomizers and model_file another: give model_file',
+        ),
+        ({'model_files': [thin, sagging]}, one_film),
+        ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*must be different names'),
+        ({'atomizers': ['../robot']}, r'atomizers is .*must be different names'),
+    ):
+        with pytest.raises(PaintError, match=words):
+            simulator(**{'atomizers': GUNS} | values)

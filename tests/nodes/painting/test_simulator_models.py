@@ -7,46 +7,67 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-
-from nodes.cell import DIAGNOSTICS, offline_um, parameters, two_passes, write_own_model
+from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
 
 MOTION = two_passes()
+# One effect that acts on each ray, and one that needs whole strokes.
+MODEL = DepositionModel(
+    effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
+)
+THIN = DepositionModel(planar={'K1_cm3_per_s': 0.19})
 
 
-@pytest.mark.parametrize('effect', ['incidence_attraction', 'corner_slowdown'])
+@pytest.fixture
+def set_model(tmp_path):
+    """`set_model(node, model)`: set it at run time; None is the default one."""
+
+    def set_model(node, model: DepositionModel | None) -> None:
+        path = tmp_path / 'new.yaml'
+        if model is not None:
+            write_model(path, model)
+        changes = parameters(model_file=str(path) if model is not None else '')
+        assert node.set_parameters(changes)[0].successful
+
+    return set_model
+
+
 def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, wait_until,
-                                                    tmp_path, effect):  # fmt: skip
-    model = DepositionModel().with_effect(effect_class(effect).typical())
-    write_model(tmp_path / 'new.yaml', model)
+                                                    set_model):  # fmt: skip
     node = simulator()
     source = robot(node)
     source.send(MOTION, slice(0, 300))
     painted(node, 300)
-    assert node.set_parameters(parameters(model_file=str(tmp_path / 'new.yaml')))[0].successful
+    set_model(node, MODEL)
     # Poses keep coming while the model is compiled.
     source.send(MOTION, slice(300, None))
     wait_until(lambda: not node.repainting, what='repainting')
     film = painted(node)
-    assert node.film.guns[0].model == model
-    assert np.array_equal(film, offline_um(node, MOTION, model))
+    assert node.film.guns[0].model == MODEL
+    assert np.array_equal(film, offline_um(node, MOTION, MODEL))
     assert not np.array_equal(film, offline_um(node, MOTION))
     # Back to the model of before: as if it had never been another.
-    assert node.set_parameters(parameters(model_file=''))[0].successful
+    set_model(node, None)
     wait_until(lambda: not node.repainting)
     assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, MOTION))
+    # A reset while a model is prepared is kept.
+    set_model(node, MODEL)
+    node.reset()
+    source.send(MOTION)
+    wait_until(lambda: not node.repainting)
+    assert np.array_equal(painted(node), offline_um(node, MOTION, MODEL))
 
 
 def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
-    simulator, robot, painted, wait_until, tmp_path
+    simulator, robot, painted, onlooker, wait_until, tmp_path
 ):
     """Neither compiling it nor using it may hold up the executor."""
     own = write_own_model(tmp_path)
     node = simulator(allow_user_effects=True)
-    source = robot(node)
+    source, viewer = robot(node), onlooker()
     source.send(MOTION, slice(0, 300))
     painted(node, 300)
     (result,) = node.set_parameters(parameters(model_file=str(own)))
@@ -57,32 +78,22 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     assert np.array_equal(film, offline_um(node, MOTION))
     (tmp_path / 'gate').touch()
     wait_until(lambda: not node.repainting, what='repainting')
-    assert np.array_equal(
-        node.film.up_to_date().film_um, offline_um(node, MOTION, read_model(own))
-    )
+    painted_anew = node.film.up_to_date().film_um
+    assert np.array_equal(painted_anew, offline_um(node, MOTION, read_model(own)))
     # Within 45 degrees of the axis the factor is 1.35 to 1.5.
-    assert 1.2 < node.film.up_to_date().film_um.max() / film.max() <= 1.5
+    assert 1.2 < painted_anew.max() / film.max() <= 1.5
 
-
-def test_an_effect_that_does_not_compile_is_told_and_the_old_model_goes_on(
-    simulator, robot, painted, onlooker, wait_until, tmp_path
-):
-    own = write_own_model(tmp_path)
+    # One that does not compile is told, and the old model goes on.
     code = (tmp_path / 'own.py').read_text()
     (tmp_path / 'own.py').write_text(code.replace('1.0 + gain *', "'one' + gain *"))
-    node = simulator(allow_user_effects=True)
-    viewer = onlooker(DIAGNOSTICS)
-    robot(node).send(MOTION)
-    painted(node)
     (result,) = node.set_parameters(parameters(model_file=str(own)))
     assert result.successful, result.reason
     wait_until(lambda: not node.repainting, what='the end of the trial')
-    assert 'own.py: Own has a flux_factor that does not compile' in node.model_problem
-    assert '\n' not in node.model_problem
-    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, MOTION))
     problem = node.model_problem
-    task = 'deposition_simulator: film'
-    wait_until(lambda: (s := viewer.status(task)) and s.message == problem, what='diagnostics')
+    assert 'own.py: Own has a flux_factor that does not compile' in problem
+    assert '\n' not in problem
+    assert np.array_equal(node.film.up_to_date().film_um, painted_anew)
+    wait_until(lambda: viewer.tells('deposition_simulator: film', problem), what='diagnostics')
     # Painting again, for another reason, is done with the model that is in use.
     node.set_parameters(parameters(max_pose_gap_s=0.3))
     wait_until(lambda: not node.repainting, what='repainting')
@@ -109,14 +120,12 @@ def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
 
 
 def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted, wait_until,
-                                                      tmp_path):  # fmt: skip
-    thin = DepositionModel(planar={'K1_cm3_per_s': 0.19})
-    write_model(tmp_path / 'thin.yaml', thin)
+                                                      set_model):  # fmt: skip
     node = simulator(repaint=False)
     source = robot(node)
     source.send(MOTION, slice(0, 300))
     before = painted(node, 300)
-    node.set_parameters(parameters(model_file=str(tmp_path / 'thin.yaml')))
+    set_model(node, THIN)
     wait_until(lambda: not node.repainting)
     source.send(MOTION, slice(300, None))
     whole = offline_um(node, MOTION)
@@ -125,27 +134,10 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted,
     assert np.abs(painted(node) - expected).max() < 0.05 * whole.max()
 
 
-def test_a_reset_while_a_model_is_prepared_is_kept(simulator, robot, painted, wait_until,
-                                                   tmp_path):  # fmt: skip
-    model = DepositionModel().with_effect(effect_class('incidence_attraction').typical())
-    write_model(tmp_path / 'new.yaml', model)
-    node = simulator()
-    source = robot(node)
-    source.send(MOTION)
-    painted(node)
-    node.set_parameters(parameters(model_file=str(tmp_path / 'new.yaml')))
-    node.reset()
-    source.send(MOTION)
-    wait_until(lambda: not node.repainting)
-    assert np.array_equal(painted(node), offline_um(node, MOTION, model))
-
-
 def test_a_gun_that_was_off_before_a_reset_stays_off_in_a_new_model(
-    simulator, robot, painted, wait_until, tmp_path
+    simulator, robot, painted, wait_until, set_model
 ):
     """The model is taken over after the reset and before the next pose."""
-    model = DepositionModel(planar={'K1_cm3_per_s': 0.19})
-    write_model(tmp_path / 'new.yaml', model)
     node = simulator()
     source = robot(node)
     motion = two_passes(trigger=False)
@@ -154,8 +146,8 @@ def test_a_gun_that_was_off_before_a_reset_stays_off_in_a_new_model(
     source.send(motion, slice(100, 300))
     painted(node, 300)
     node.reset()
-    assert node.set_parameters(parameters(model_file=str(tmp_path / 'new.yaml')))[0].successful
+    set_model(node, THIN)
     wait_until(lambda: not node.repainting, what='the new model')
     source.send(motion, slice(300, None))
     assert painted(node, 300).max() == 0.0
-    assert node.film.guns[0].model == model
+    assert node.film.guns[0].model == THIN

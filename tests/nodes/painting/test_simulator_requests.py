@@ -16,10 +16,7 @@ from paint_msgs.srv import SaveFilm
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import MarkerArray
 
-from nodes.cell import (
-    parameters,
-    two_passes,
-)
+from nodes.cell import parameters, two_passes
 from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
@@ -57,7 +54,7 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     mesh = trimesh.load_mesh(folder / 'door_7.ply', process=False)
     assert np.array_equal(mesh.faces, node.surface.faces)
     figures = json.loads((folder / 'door_7.json').read_text())
-    assert figures['mesh_id'] == node.display.shown_as.mesh_id
+    assert figures['mesh_id'] == node.surface.mesh_id
     assert figures['poses']['received'] == len(MOTION)
     again = call(source, SaveFilm, service, SaveFilm.Request(name='door_7'))
     assert not again.success
@@ -66,18 +63,22 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     for name in ('../up', 'a/b', '.hidden', 'a b'):
         refused = call(source, SaveFilm, service, SaveFilm.Request(name=name))
         assert not refused.success, name
+    # A folder that cannot be written is told in a line.
+    node.values['output_directory'] = '/dev/null/films'
+    refused = call(source, SaveFilm, service, SaveFilm.Request(name='film'))
+    assert not refused.success
+    assert '/dev/null/films' in refused.message
+    assert '\n' not in refused.message
+    node.values['output_directory'] = str(folder)
     chosen = call(source, SaveFilm, service, SaveFilm.Request())
     assert chosen.success
     assert len(list(folder.iterdir())) == 6
 
 
-@pytest.mark.parametrize(
-    ('values', 'reason'),
-    [
-        (
-            {'mesh_file': 'other.stl'},
-            'cannot change while the node is configured: the film so far lies on',
-        ),
+def test_changes_that_cannot_be_are_refused_with_the_reason(simulator):
+    node = simulator()
+    for values, reason in (
+        ({'mesh_file': 'other.stl'}, 'cannot change while the node is configured: the film so'),
         ({'max_edge_length_m': 0.01}, 'the film so far lies on this mesh'),
         ({'frame_id': 'other'}, 'in this frame'),
         ({'pose_queue_depth': 10}, 'the subscriptions and the pose memory are made with it'),
@@ -88,16 +89,13 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
         ({'model_file': 'none.yaml'}, 'none.yaml: no such file'),
         ({'part_pose': [0.0, 1.0], 'part_parent_frame': 'cell'}, 'seven numbers'),
         ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'without part_parent_frame'),
-    ],
-)
-def test_changes_that_cannot_be_are_refused_with_the_reason(simulator, values, reason):
-    node = simulator()
-    before = {name: node.get_parameter(name).value for name in values}
-    result = node.set_parameters_atomically(parameters(**values))
-    assert not result.successful
-    assert reason in result.reason
-    assert '\n' not in result.reason
-    assert {name: node.get_parameter(name).value for name in values} == before
+    ):
+        before = {name: node.get_parameter(name).value for name in values}
+        result = node.set_parameters_atomically(parameters(**values))
+        assert not result.successful
+        assert reason in result.reason
+        assert '\n' not in result.reason
+        assert {name: node.get_parameter(name).value for name in values} == before
 
 
 def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, onlooker,

@@ -11,7 +11,7 @@ from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
-from nodes.cell import DIAGNOSTICS, Robot, offline_um, two_passes
+from nodes.cell import Robot, offline_um, two_passes
 
 POSES = 'deposition_simulator: poses'
 UNTRIGGERED = two_passes(trigger=False)
@@ -20,7 +20,7 @@ UNTRIGGERED = two_passes(trigger=False)
 def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, painted, onlooker,
                                                          wait_until):  # fmt: skip
     node = simulator()
-    viewer = onlooker(DIAGNOSTICS)
+    viewer = onlooker()
     source = robot(node)
     source.send_fields(UNTRIGGERED.stamps_ns[0], spraying=True)
     source.send(UNTRIGGERED)
@@ -29,13 +29,7 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, paint
     assert np.array_equal(film, offline_um(node, UNTRIGGERED))
     # It says that it sprays, and that no paint flows.
     source.send_fields(UNTRIGGERED.stamps_ns[-1], spraying=True, flow=0.0)
-
-    def shown():
-        status = viewer.status(POSES)
-        return status and '1 states that spray with flow 0' in status.message and status
-
-    wait_until(shown)
-    assert shown().level == b'\x01'
+    wait_until(lambda: viewer.tells(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
 def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, spin, wait_until,
@@ -64,20 +58,14 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
 
 def test_poses_that_stop_while_the_gun_sprays_are_told(simulator, robot, painted, onlooker,
                                                        wait_until):  # fmt: skip
-    node = simulator()
-    viewer = onlooker(DIAGNOSTICS)
-    source = robot(node)
-
-    def shown(text, level):
-        status = viewer.status(POSES)
-        return status and text in status.message and status.level == level
-
-    motion = two_passes()
+    node, viewer = simulator(), onlooker()
+    source, motion = robot(node), two_passes()
     source.send(motion)
     painted(node)
-    wait_until(lambda: shown('the gun sprays, and no pose has come for', b'\x01'))
+    silent = 'the gun sprays, and no pose has come for'
+    wait_until(lambda: viewer.tells(POSES, silent, b'\x01'))
     source.send_state(motion.stamps_ns[-1] + 1, 0.0)
-    wait_until(lambda: shown('waiting for poses', b'\x00'))
+    wait_until(lambda: viewer.tells(POSES, 'waiting for poses', b'\x00'))
 
 
 def test_poses_of_any_reliability_are_heard(simulator, ros_context, spin, painted, wait_until):

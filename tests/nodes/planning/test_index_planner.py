@@ -13,17 +13,8 @@ pytest.importorskip('rclpy')
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex
-from rclpy.node import Node
 
-from nodes.cell import (
-    DIAGNOSTICS,
-    PANEL_M,
-    Onlooker,
-    parameters,
-    values_of,
-    write_panel,
-)
-from nodes.processes import NodeProcess
+from nodes.cell import PANEL_M, parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -48,22 +39,21 @@ def planner(ros_context, spin):
 
 
 @pytest.fixture
-def ask(ros_context, spin, wait_until):
+def viewer(onlooker):
+    return onlooker({'planned_path': (Path, topics.LATCHED)})
+
+
+@pytest.fixture
+def ask(viewer, call):
     """`ask(**request)`: what the service answers."""
-    user = Node('user', context=ros_context)
-    client = user.create_client(RecommendIndex, 'recommend_index')
-    spin(user)
 
     def ask(**request) -> RecommendIndex.Response:
-        wait_until(client.service_is_ready, what='discovery of recommend_index')
-        future = client.call_async(RecommendIndex.Request(**request))
-        wait_until(future.done, what='the answer')
-        return future.result()
+        return call(viewer, RecommendIndex, 'recommend_index', RecommendIndex.Request(**request))
 
     return ask
 
 
-def test_answer_is_the_recommendation(planner, ask):
+def test_answer_is_the_recommendation(planner, ask, viewer, wait_until):
     planner()
     answer = ask(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5)
     expected = recommend(
@@ -81,23 +71,23 @@ def test_answer_is_the_recommendation(planner, ask):
     np.testing.assert_array_equal(answer.curve_sigma_n, expected.curve.sigma_n)
     assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]
     assert 'keeps its orientation' in answer.message
+    name = 'index_planner: index'
+    wait_until(lambda: viewer.tells(name, 'sigma_n'), what='diagnostics')
+    assert viewer.value(name, 'model') == 'a 50 mm bell'
 
 
-@pytest.mark.parametrize(
-    ('request_', 'words'),
-    [
+def test_impossible_requests_say_why(planner, ask):
+    node = planner()
+    for request, words in (
         ({}, 'neither speed_m_per_s nor target_um'),
         ({'speed_m_per_s': math.nan}, 'speed_m_per_s is nan'),
         ({'speed_m_per_s': 0.2, 'tolerance': 1e-6}, 'the closest is'),
-    ],
-)
-def test_impossible_requests_say_why(planner, ask, request_, words):
-    node = planner()
-    answer = ask(**request_)
-    assert not answer.success
-    assert words in answer.message
-    assert '\n' not in answer.message
-    assert node._status().level == DiagnosticStatus.WARN
+    ):
+        answer = ask(**request)
+        assert not answer.success
+        assert words in answer.message
+        assert '\n' not in answer.message
+        assert node._status().level == DiagnosticStatus.WARN
 
 
 def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path):
@@ -114,15 +104,11 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
 
 
-def test_passes_are_planned_on_a_mesh_and_latched(
-    planner, ros_context, spin, wait_until, tmp_path
-):
+def test_passes_are_planned_on_a_mesh_and_latched(planner, viewer, wait_until, tmp_path):
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(mesh_file=str(mesh), frame_id='panel', speed_m_per_s=0.0, target_um=15.0)
-    late = Onlooker(ros_context, {'planned_path': (Path, topics.LATCHED)})
-    spin(late)
-    wait_until(lambda: late.newest('planned_path'), what='the latched path')
-    path = late.newest('planned_path')
+    wait_until(lambda: viewer.newest('planned_path'), what='the latched path')
+    path = viewer.newest('planned_path')
     assert path.header.frame_id == 'panel'
     at = np.array([[p.pose.position.x, p.pose.position.y, p.pose.position.z] for p in path.poses])
     # The panel stands in x-z and looks to -y; passes run along x, past both its edges.
@@ -130,21 +116,3 @@ def test_passes_are_planned_on_a_mesh_and_latched(
     assert np.ptp(at[:, 0]) > PANEL_M + 0.4
     stamps = [p.header.stamp.sec * 10**9 + p.header.stamp.nanosec for p in path.poses]
     assert all(later > earlier for earlier, later in pairwise(stamps))
-
-
-def test_diagnostics_name_model_and_last_answer(planner, ask, ros_context, spin, wait_until):
-    planner()
-    onlooker = Onlooker(ros_context, DIAGNOSTICS)
-    spin(onlooker)
-    ask(speed_m_per_s=0.2)
-    name = 'index_planner: index'
-    wait_until(lambda: (s := onlooker.status(name)) and 'sigma_n' in s.message, what='diagnostics')
-    assert values_of(onlooker.status(name))['model'] == 'a 50 mm bell'
-
-
-def test_bad_model_ends_the_process_with_one_line_and_exit_code_2(ros_domain, tmp_path):
-    module = 'index_planner'
-    with NodeProcess(tmp_path / 'planner', module, model_file='nowhere.yaml') as process:
-        assert process.wait() == 2
-        assert process.err.count('\n') == 1
-        assert 'nowhere.yaml' in process.err

@@ -11,7 +11,6 @@ from nav_msgs.msg import Path
 from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
 from rclpy.action import ActionClient
-from rclpy.node import Node
 
 from nodes.cell import parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -41,13 +40,12 @@ def planner(ros_context, spin):
 
 
 @pytest.fixture
-def ask(ros_context, spin, wait_until):
+def ask(onlooker, wait_until):
     """`ask(action, name, cancel_at='', **goal)`: the status, the result and the feedback.
 
     A goal that is cancelled at a stage must end within two seconds.
     """
-    user = Node('user', context=ros_context)
-    spin(user)
+    user = onlooker({})
 
     def ask(action, action_name, cancel_at='', **goal):
         client = ActionClient(user, action, action_name)
@@ -95,23 +93,13 @@ def test_passes_are_planned_with_feedback(planner, ask, onlooker, wait_until, tm
     assert len(path.poses) > 10
 
 
-def test_what_has_no_answer_is_aborted_with_the_reason(planner, ask):
-    planner()
-    status, result, _ = ask(PlanPasses, 'plan_passes')
-    assert status == GoalStatus.STATUS_ABORTED
-    assert result.message == 'mesh_file is empty: name the mesh of the part'
-    status, result, _ = ask(PlanPasses, 'plan_passes', mesh_file='nowhere.stl')
-    assert 'nowhere.stl: no such mesh file' in result.message
-
-
 def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
-    planner, ask, ros_context, spin, wait_until, tmp_path
+    planner, ask, onlooker, wait_until, tmp_path
 ):
+    """What has no answer is aborted with the reason."""
     mesh = write_panel(tmp_path / 'panel.stl')
     planner(max_edge_length_m=0.01)
-    asker = Node('asker', context=ros_context)
-    spin(asker)
-    client = asker.create_client(RecommendIndex, 'recommend_index')
+    client = onlooker({}).create_client(RecommendIndex, 'recommend_index')
     wait_until(client.service_is_ready)
     answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
     status, result, heard = ask(
@@ -122,3 +110,8 @@ def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
     assert heard[-1].stage == 'single passes'
     wait_until(answer.done)
     assert answer.result().success
+    status, result, _ = ask(PlanPasses, 'plan_passes')
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.message == 'mesh_file is empty: name the mesh of the part'
+    status, result, _ = ask(PlanPasses, 'plan_passes', mesh_file='nowhere.stl')
+    assert 'nowhere.stl: no such mesh file' in result.message

@@ -14,9 +14,7 @@ def record(ros_context, spin, tmp_path):
     def record(namespace='', **chosen) -> RunRecorder:
         values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen
         recorder = RunRecorder(
-            context=ros_context,
-            namespace=namespace,
-            parameter_overrides=parameters(**values),
+            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
         )
         spin(recorder)
         return recorder

@@ -8,12 +8,9 @@ import contextlib
 import itertools
 import shutil
 import subprocess
-import time
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import PoseProgress
-from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
@@ -24,7 +21,6 @@ from nodes.recording.runs import pose
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.nodes.runtime import topics
 
 MODULE = 'run_recorder'
 
@@ -40,23 +36,6 @@ def test_a_run_that_is_taken_away_ends_the_recorder(ros_domain, wait_until, tmp_
         assert process.exit_code == 2
         assert f'error: {run}/run_0.mcap: No such file or directory' in process.err
         assert 'Traceback' not in process.err
-
-
-class RobotStream:
-    """Publishes poses at 250 Hz from a timer, numbered by their stamps."""
-
-    def __init__(self, cell: Node) -> None:
-        self.sent = 0
-        profile = QoSProfile(depth=2_000)
-        self._publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', profile)
-        self._start_s = time.monotonic()
-        cell.create_timer(0.004, self._publish)
-
-    def _publish(self) -> None:
-        connected = self._publisher.get_subscription_count() > 0
-        while connected and self.sent < 250 * (time.monotonic() - self._start_s):
-            self.sent += 1
-            self._publisher.publish(pose(START_NS + self.sent * 4_000_000))
 
 
 def test_a_killed_recorder_keeps_what_came_a_moment_before(
@@ -90,23 +69,6 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
         assert connection.ext.offered_qos_profiles[0].reliability.name == 'RELIABLE'
 
 
-@pytest.mark.parametrize('how', ['interrupt_as_launch_does', 'terminate'])
-def test_a_recorder_told_to_end_completes_its_run(ros_domain, cell, wait_until, tmp_path, how):
-    reports: list[PoseProgress] = []
-    RobotStream(cell)
-    cell.create_subscription(PoseProgress, 'atomizer/progress', reports.append, topics.PROGRESS)
-    with NodeProcess(
-        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run'
-    ) as process:
-        wait_until(lambda: reports and reports[-1].poses_received > 50, what='poses recorded')
-        getattr(process, how)()
-        assert process.wait() == 0
-        assert 'file complete: ' in process.err.splitlines()[-1]
-        assert 'Traceback' not in process.err
-    poses = read_trajectory(tmp_path / 'run')
-    assert len(poses) > 50
-
-
 @pytest.fixture
 def small_disk(tmp_path):
     """A file system of one megabyte."""
@@ -135,10 +97,7 @@ def test_a_full_disk_ends_the_recorder(ros_domain, cell, wait_until, tmp_path, s
         compression='none',
     ) as process:
         wait_until(lambda: chatter.get_subscription_count() > 0)
-        cell.create_timer(
-            0.002,
-            lambda: chatter.publish(String(data=noise.bytes(5_000).hex())),
-        )
+        cell.create_timer(0.002, lambda: chatter.publish(String(data=noise.bytes(5_000).hex())))
         wait_until(lambda: process.exit_code is not None, what='the end')
         assert process.exit_code == 2
         assert 'No space left on device; run `paint recover' in process.err

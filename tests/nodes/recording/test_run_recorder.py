@@ -7,12 +7,12 @@ pytest.importorskip('rclpy')
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import ThicknessStats
-from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
 from files.recorded import START_NS, straight_pass
+from nodes.cell import parameters
 from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -28,15 +28,8 @@ def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_unti
     written = straight_pass(900)
     bag = write_pose_bag(tmp_path / 'pass', written)
     recorder = record()
-    player = BagPlayer(
-        context=ros_context,
-        parameter_overrides=[
-            Parameter(name, value=value)
-            for name, value in {
-                'bag': str(bag), 'rate': 0.0, 'state_topic': '/atomizer/state',
-            }.items()
-        ],
-    )  # fmt: skip
+    replay = parameters(bag=str(bag), rate=0.0, state_topic='/atomizer/state')
+    player = BagPlayer(context=ros_context, parameter_overrides=replay)
     spin(player)
     wait_until(player.finished.done, what='the end of the replay')
     information = finish(recorder)
@@ -80,8 +73,13 @@ def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until
     finish(recorder)
 
 
-def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, cell):
-    recorder = record(topics=['chatter', '/cell/gun', 'never'])
+def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, cell, tmp_path):
+    """With what the run was made with."""
+    mesh, model = tmp_path / 'door.stl', tmp_path / 'model.yaml'
+    mesh.write_bytes(b'solid door')
+    model.write_text('planar: {K1_cm3_per_s: 1.9}\n')
+    wanted = ['chatter', '/cell/gun', 'never']
+    recorder = record(topics=wanted, mesh_file=str(mesh), model_file=str(model))
     chatter = publisher(String, 'chatter', topics.RESULTS)
     gun = publisher(Bool, '/cell/gun', topics.RESULTS)
     other = cell.create_publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
@@ -89,7 +87,12 @@ def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, 
     chatter.publish(String(data='hello'))
     gun.publish(Bool(data=True))
     wait_until(lambda: recorder.run.message_count == 2, what='both messages')
-    assert counts(finish(recorder)) == {'/chatter': 1, '/cell/gun': 1}
+    information = finish(recorder)
+    assert counts(information) == {'/chatter': 1, '/cell/gun': 1}
+    notes = information['custom_data']
+    assert notes['mesh_file'] == str(mesh)
+    assert len(notes['mesh_sha256']) == 64
+    assert notes['model_yaml'] == 'planar: {K1_cm3_per_s: 1.9}\n'
 
 
 def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_until):
@@ -103,16 +106,6 @@ def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_unti
     assert counts(finish(recorder)) == {'/atomizer/pose': 500}
 
 
-def test_what_the_run_was_made_with_is_kept(record, tmp_path):
-    mesh, model = tmp_path / 'door.stl', tmp_path / 'model.yaml'
-    mesh.write_bytes(b'solid door')
-    model.write_text('planar: {K1_cm3_per_s: 1.9}\n')
-    notes = finish(record(mesh_file=str(mesh), model_file=str(model)))['custom_data']
-    assert notes['mesh_file'] == str(mesh)
-    assert len(notes['mesh_sha256']) == 64
-    assert notes['model_yaml'] == 'planar: {K1_cm3_per_s: 1.9}\n'
-
-
 def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin, wait_until):
     planner = IndexPlanner(context=ros_context)
     spin(planner)
@@ -121,7 +114,7 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
     wait_until(
         lambda: all(p.get_subscription_count() > 0 for p in events), what='the subscription'
     )
-    (result,) = planner.set_parameters([Parameter('width_m', value=0.75)])
+    (result,) = planner.set_parameters(parameters(width_m=0.75))
     assert result.successful
     wait_until(lambda: recorder.run.counts.get('/parameter_events', 0) >= 1, what='the event')
     finish(recorder)
@@ -132,15 +125,12 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
     assert (change.name, change.value.double_value) == ('width_m', 0.75)
 
 
-@pytest.mark.parametrize(
-    ('parameters', 'says'),
-    [
+def test_bad_input_is_told_at_the_start(record):
+    for values, says in (
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
         ({'compression': 'zip'}, "compression is 'zip': choose one of zstd, lz4, none"),
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
         ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
-    ],
-)
-def test_bad_input_is_told_at_the_start(record, parameters, says):
-    with pytest.raises(PaintError, match=says):
-        record(**parameters)
+    ):
+        with pytest.raises(PaintError, match=says):
+            record(**values)

@@ -19,9 +19,7 @@ def play(ros_context, spin):
     def play(bag, namespace='', **chosen) -> BagPlayer:
         values = {'bag': str(bag)} | chosen
         player = BagPlayer(
-            context=ros_context,
-            namespace=namespace,
-            parameter_overrides=parameters(**values),
+            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
         )
         spin(player)
         return player

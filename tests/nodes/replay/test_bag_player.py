@@ -7,18 +7,10 @@ pytest.importorskip('rclpy')
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
-from rclpy.node import Node
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
-from files.recorded import (
-    START_NS,
-    STATE_TYPES,
-    Messages,
-    pose_entries,
-    straight_pass,
-    write_bag,
-)
+from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
 from nodes.replay.listener import recorded
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -26,9 +18,13 @@ from paint_deposition.files.recordings.headers import stamp_ns
 
 
 @pytest.mark.parametrize('rate', [0.0, 20.0])
-def test_the_recorded_bytes_arrive_in_order(play, listen, wait_until, pass_bag, rate):
+def test_the_recorded_bytes_arrive_in_order(play, listen, wait_until, still, pass_bag, rate):
+    """Nothing is sent before somebody listens; without its clock a player publishes none."""
+    player = play(pass_bag, rate=rate, state_topic='/atomizer/state', publish_clock=False)
+    still(0.3)
+    assert player.poses_published == 0
+    assert not player.count_publishers('/clock')
     listener = listen()
-    player = play(pass_bag, rate=rate, state_topic='/atomizer/state')
     wait_until(player.finished.done, what='the end of the replay')
     wait_until(lambda: len(listener.poses) == 700, what='the last poses')
     assert listener.poses == recorded(pass_bag)
@@ -78,10 +74,8 @@ def test_a_bool_of_another_clock_is_refused(play, tmp_path):
         play(bag, state_topic='/gun')
 
 
-def test_pause_and_resume(ros_context, play, listen, spin, call, wait_until, still, pass_bag):
-    caller = Node('caller', context=ros_context)
-    spin(caller)
-    listener = listen()
+def test_pause_and_resume(onlooker, play, listen, call, wait_until, still, pass_bag):
+    caller, listener = onlooker({}), listen()
     player = play(pass_bag, rate=1.0, start_paused=True)
 
     def tell(name: str) -> Trigger.Response:
@@ -93,7 +87,7 @@ def test_pause_and_resume(ros_context, play, listen, spin, call, wait_until, sti
     assert tell('pause').success
     assert tell('pause').message == 'already paused'
     paused_at = player.poses_published
-    still(0.5)
+    still(0.2)
     assert player.poses_published - paused_at <= 1
     assert tell('resume').success
     wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
@@ -109,18 +103,14 @@ def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
     assert not player.finished.done()
 
 
-@pytest.mark.parametrize(
-    ('parameters', 'says'),
-    [
+def test_bad_input_is_told_at_the_start(play, pass_bag):
+    for values, says in (
         ({'bag': ''}, 'bag is empty: give the path of a recording'),
         ({'bag': '/nowhere'}, 'no bag at /nowhere'),
         ({'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
         ({'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
         ({'rate': -1.0}, 'rate is -1.0: must be at least 0.0'),
         ({'topic': 'x'}, 'bag_player has no parameter topic; did you mean'),
-    ],
-)
-def test_bad_input_is_told_at_the_start(play, pass_bag, parameters, says):
-    values = {'bag': str(pass_bag)} | parameters
-    with pytest.raises((PaintError, RecordingError), match=says):
-        play(**values)
+    ):
+        with pytest.raises((PaintError, RecordingError), match=says):
+            play(**{'bag': str(pass_bag)} | values)

@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.time import Time
 from scipy.spatial.transform import Rotation
 
-from nodes.cell import DIAGNOSTICS, START_NS, parameters
+from nodes.cell import START_NS, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.motion.part_frame import Rigid
@@ -61,7 +61,7 @@ class Broadcaster(Node):
 
 @pytest.fixture
 def viewer(onlooker):
-    return onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))} | DIAGNOSTICS)
+    return onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))})
 
 
 @pytest.fixture

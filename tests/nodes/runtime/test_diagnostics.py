@@ -4,14 +4,10 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from diagnostic_msgs.msg import DiagnosticArray
-from rclpy.node import Node
-
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 
 
-def test_every_task_reports_each_period(ros_context, spin, wait_until):
+def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until):
     node = PaintNode('painter', context=ros_context, namespace='cell1')
     calls = []
 
@@ -20,17 +16,15 @@ def test_every_task_reports_each_period(ros_context, spin, wait_until):
         return Status(WARN, f'call {len(calls)}', {'poses': 3, 'gap s': 0.5})
 
     Diagnostics(node, {'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
-    listener = Node('listener', context=ros_context)
-    got = []
-    listener.create_subscription(DiagnosticArray, '/diagnostics', got.append, topics.DIAGNOSTICS)
-    spin(node, listener)
-    wait_until(lambda: len(got) >= 3, what='diagnostics')
-    first, later = got[0], got[2]
-    gun_status, mesh_status = first.status
+    viewer = onlooker()
+    spin(node)
+    wait_until(lambda: len(viewer.heard['/diagnostics']) >= 3, what='diagnostics')
+    first, later = (viewer.decoded('/diagnostics', row) for row in (0, 2))
+    (gun_status, mesh_status), later_status = first.status, later.status[0]
     assert gun_status.name == 'cell1/painter: gun'
     assert mesh_status.name == 'cell1/painter: mesh'
     assert (gun_status.level, mesh_status.level) == (b'\x01', b'\x00')
     assert gun_status.hardware_id == '/cell1/painter'
     assert [(v.key, v.value) for v in gun_status.values] == [('poses', '3'), ('gap s', '0.5')]
     assert first.header.stamp.sec > 0
-    assert later.status[0].message != gun_status.message
+    assert later_status.message != gun_status.message

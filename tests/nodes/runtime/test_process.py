@@ -79,77 +79,42 @@ def worker(ros_domain, tmp_path):
             process.kill()
 
 
-def complaints(text: str) -> list[str]:
+def complaints(process: NodeProcess) -> list[str]:
     """What a node says beside that it is ready."""
-    return [line for line in text.strip().splitlines() if not line.endswith(': ready')]
+    return [line for line in process.err.strip().splitlines() if not line.endswith(': ready')]
 
 
-def one_line(text: str) -> str:
-    (line,) = complaints(text)
-    return line
-
-
-def test_two_interrupts_at_once_end_cleanly(worker, wait_until):
-    process = worker('run')
-    wait_until(lambda: 'ready' in process.out, what='the node')
-    process.interrupt_as_launch_does()
-    # And once more while it finishes its files.
-    process.interrupt_as_launch_does()
-    assert process.wait() == 0
-    assert process.out.split() == ['ready', 'closed']
-    assert process.err.strip().endswith('[worker]: ready')
-    assert complaints(process.err) == []
-
-
-def test_a_callback_is_completed_first(worker, wait_until, tmp_path):
-    process = worker('work')
-    wait_until(lambda: 'working' in process.out, what='the callback')
-    process.interrupt_as_launch_does()
-    assert process.wait() == 0
+def test_an_interrupt_ends_it_cleanly(worker, wait_until, tmp_path):
+    """Between callbacks, within one, which is completed first, and while it loads."""
+    run, work, load = map(worker, ('run', 'work', 'load'))
+    for process, word in ((run, 'ready'), (work, 'working'), (load, 'loading')):
+        wait_until(lambda p=process, w=word: w in p.out, what=word)
+        process.interrupt_as_launch_does()
+        # And once more while it finishes its files.
+        process.interrupt_as_launch_does()
+    assert [process.wait() for process in (run, work, load)] == [0, 0, 0]
+    assert run.out.split() == ['ready', 'closed']
+    assert run.err.strip().endswith('[worker]: ready')
+    assert complaints(run) == []
     assert (tmp_path / 'worked').exists()
-    assert process.out.split()[-1] == 'closed'
+    assert work.out.split()[-1] == 'closed'
+    assert load.err == ''
 
 
-def test_an_interrupt_while_loading(worker, wait_until):
-    process = worker('load')
-    wait_until(lambda: 'loading' in process.out, what='the node')
-    process.interrupt_as_launch_does()
-    assert process.wait() == 0
-    assert process.err == ''
-
-
-def test_an_interrupt_between_loading_and_running_closes_the_node(worker):
-    process = worker('begin')
-    assert process.wait() == 0
-    assert process.out.split()[-1] == 'closed'
-    assert process.err == ''
-
-
-def test_bad_input_is_one_line_and_exit_code_2(worker):
-    process = worker('refuse')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: mesh none.stl does not exist; give a mesh'
-
-
-def test_bad_ros_arguments_are_exit_code_2(ros_domain, tmp_path):
+def test_errors_and_signals_end_it_with_a_code_and_a_line(worker, tmp_path):
+    begin, refuse, fail, crash = map(worker, ('begin', 'refuse', 'fail', 'crash'))
+    assert [process.wait() for process in (begin, refuse, fail, crash)] == [0, 2, 2, 1]
+    # Interrupted between loading and running: the node is closed.
+    assert begin.out.split()[-1] == 'closed'
+    assert begin.err == ''
+    assert complaints(refuse) == ['error: mesh none.stl does not exist; give a mesh']
+    assert complaints(fail) == ['error: the disk is full; empty it']
+    assert fail.out.split() == crash.out.split() == ['ready', 'closed']
+    assert 'ZeroDivisionError: never mind' in crash.err
     with NodeProcess(tmp_path / 'bad', '', code=NODE, ros_arguments=('-p', 'does')) as process:
         assert process.wait() == 2
         assert process.err.strip().splitlines()[-1].startswith('error: ')
         assert 'Traceback' not in process.err
-
-
-def test_an_error_in_a_callback_closes_the_node(worker):
-    process = worker('fail')
-    assert process.wait() == 2
-    assert one_line(process.err) == 'error: the disk is full; empty it'
-    assert process.out.split() == ['ready', 'closed']
-
-
-def test_a_defect_shows_its_traceback(worker):
-    process = worker('crash')
-    assert process.wait() == 1
-    assert 'ZeroDivisionError: never mind' in process.err
-    assert process.out.split() == ['ready', 'closed']
 
 
 INTERRUPTED_IMPORT = """

@@ -26,7 +26,7 @@ from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.node import OK, Status, Task
-from paint_deposition.nodes.runtime.parameters import NodeParameter, thickness
+from paint_deposition.nodes.runtime.parameters import NodeParameter, read_to_configure, thickness
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -35,11 +35,11 @@ SHARE_OF_READING = 0.25
 
 COMPARISON = dict(
     **PAINTING,
-    measurements_file=NodeParameter(
-        '',
-        'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]',
-        fixed_because='the film is painted where they were taken; clean the node up or restart it',
-        read_to_configure=True,
+    **read_to_configure(
+        'the film is painted where they were taken; clean the node up or restart it',
+        measurements_file=NodeParameter(
+            '', 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]'
+        ),
     ),
     color_max_um=thickness(
         'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
@@ -67,14 +67,12 @@ class ModelComparison(PaintingNode):
 
     def _configure(self) -> None:
         super()._configure()
-        self._outputs = {
-            topic: self.create_publisher(message, topic, topics.LATCHED)
-            for topic, message in (
-                ('comparison/mesh', Marker),
-                ('comparison/stats', ComparisonStats),
-                ('comparison/legend', MarkerArray),
+        self._mesh_out, self._stats_out, self._legend_out = (
+            self.create_publisher(message, f'comparison/{topic}', topics.LATCHED)
+            for message, topic in (
+                (Marker, 'mesh'), (ComparisonStats, 'stats'), (MarkerArray, 'legend'),
             )
-        }
+        )  # fmt: skip
         self.offer('~/compare', self._compare)
         self._publish_legend()
         self.publish()
@@ -97,19 +95,15 @@ class ModelComparison(PaintingNode):
     def _take_surface(self, surface: Surface) -> None:
         self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
         super()._take_surface(surface)
-        self._mesh = ColouredMesh(
-            surface.vertices_m, surface.faces, self.frame.frame_id, 'residual'
-        )
+        frame_id = self.frame.frame_id
+        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
 
     def _spread_colours(self) -> None:
-        count, points = len(self._experiment), self.points
-        self._spreading = spreading(
-            self.surface,
-            points.positions_m[:count],
-            points.normals[:count],
-            self.values['color_radius_m'],
-        )
+        at = slice(len(self._experiment))
+        places, normals = self.points.positions_m[at], self.points.normals[at]
+        radius_m = self.values['color_radius_m']
+        self._spreading = spreading(self.surface, places, normals, radius_m)
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
@@ -149,19 +143,16 @@ class ModelComparison(PaintingNode):
         self._shown = film
         residuals = self.residuals()
         stamp_ns = self.film.newest_ns or 0
-        self._outputs['comparison/stats'].publish(self._stats(residuals, stamp_ns))
+        self._stats_out.publish(self._stats(residuals, stamp_ns))
         means = self._experiment.means
         at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._outputs['comparison/mesh'].publish(
-            self._mesh.serialised(stamp_ns, scale.palette, rows)
-        )
+        self._mesh_out.publish(self._mesh.serialised(stamp_ns, scale.palette, rows))
 
     def _publish_legend(self) -> None:
-        self._outputs['comparison/legend'].publish(
-            legend(self._scale, 'µm', self.surface, self.frame.frame_id)
-        )
+        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
+        self._legend_out.publish(bar)
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self._readings.positions_m[residuals.worst].tolist()
@@ -179,33 +170,27 @@ class ModelComparison(PaintingNode):
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
 
-    def summary(self) -> str:
+    def _compare(self) -> tuple[bool, str]:
         """The comparison in one line."""
+        self.up_to_date()
         found = self.residuals()
         x, y, z = self._readings.positions_m[found.worst]
-        return (
+        line = (
             f'{self._model_name}: {len(found)} readings, {found.painted.sum()} where '
             f'paint is predicted; residual {found.bias_um:+.2f} µm on average, rms '
             f'{found.rmse_um:.2f} µm (gauge {self._noise.typical_um:.2f} µm, '
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
             f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
         )
+        self.get_logger().info(line)
+        return True, line
 
     def _status(self) -> Status:
         found = self.residuals()
-        return Status(
-            OK,
-            f'rms {found.rmse_um:.2f} µm at {len(found)} readings',
-            {
-                'readings': self.values['measurements_file'],
-                'bias [µm]': f'{found.bias_um:.3f}',
-                'noise of the gauge [µm]': f'{self._noise.typical_um:.3f}',
-                'noise known from': self._noise.source,
-            },
-        )
-
-    def _compare(self) -> tuple[bool, str]:
-        self.up_to_date()
-        found = self.summary()
-        self.get_logger().info(found)
-        return True, found
+        values = {
+            'readings': self.values['measurements_file'],
+            'bias [µm]': f'{found.bias_um:.3f}',
+            'noise of the gauge [µm]': f'{self._noise.typical_um:.3f}',
+            'noise known from': self._noise.source,
+        }
+        return Status(OK, f'rms {found.rmse_um:.2f} µm at {len(found)} readings', values)

@@ -20,12 +20,8 @@ from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
 from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import (
-    PROGRESS_TOPIC,
-    of_gun,
-)
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, of_gun
 
-FOLLOW_PERIOD_S = 0.1
 # Messages are taken together: to wake for each pose would cost more than to paint it.
 TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
@@ -80,27 +76,19 @@ class AtomizerInput:
         self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         self._flushed_s = -math.inf
-        self._stamps: list[int] = []
-        self._poses: list[tuple[np.ndarray, np.ndarray]] = []
+        # The poses to pass on next.
+        self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
-        self.tf_queue = TfQueue()
-        self.reset()
+        self.tf_queue = TfQueue(self._place, self._refuse)
+        self.count_from_zero()
+        depth = node.values['pose_queue_depth']
         self._topics = [
+            AtomizerTopic(node, PoseStamped, self._pose_topic, self._take_pose, depth=depth),
+            # The last state holds until the next one, whenever it was published.
             AtomizerTopic(
-                node,
-                message,
-                topic,
-                take,
-                depth=node.values['pose_queue_depth'],
-                # The last state holds until the next one, whenever it was published.
-                latched=message is AtomizerState,
-            )
-            for message, topic, take in (
-                (PoseStamped, self._pose_topic, self._take_pose),
-                (AtomizerState, self._state_topic, self._take_state),
-            )
+                node, AtomizerState, self._state_topic, self._take_state, depth=depth, latched=True
+            ),
         ]
-        node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
         self._progress = node.create_publisher(
             PoseProgress, of_gun(name, PROGRESS_TOPIC), topics.PROGRESS
         )
@@ -121,14 +109,13 @@ class AtomizerInput:
         """Count from zero; poses that were not passed on yet are dropped."""
         self.count_from_zero()
         self.tf_queue.clear()
-        self._stamps.clear()
         self._poses.clear()
         if self._held is not None:
             self._held[:] = [kept for kept in self._held if isinstance(kept, AtomizerState)]
 
     def count_from_zero(self) -> None:
         """Forget what was wrong so far."""
-        self.refused_frames: dict[str, int] = {}
+        self.refused_frames: Counter[str] = Counter()
         self.refusal = ''
         self.odd: Counter[str] = Counter()
         self.refusals_of_states: set[str] = set()
@@ -155,11 +142,16 @@ class AtomizerInput:
         """Pass on what was kept, as if it came now."""
         held, self._held = self._held or [], None
         for message in held:
-            if isinstance(message, AtomizerState):
-                self._use_state(message)
-            else:
-                self._queue(message)
+            self._use(message)
         self.flush()
+
+    def _use(self, message: PoseStamped | AtomizerState) -> None:
+        if self._held is not None:
+            self._held.append(message)
+        elif isinstance(message, AtomizerState):
+            self._use_state(message)
+        else:
+            self.tf_queue.add(message, time.monotonic())
 
     # --- taking and passing on
 
@@ -173,18 +165,16 @@ class AtomizerInput:
         for topic in self._topics:
             topic.take_waiting()
         waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
-        if waited or len(self._stamps) >= POSES_A_BATCH:
+        if waited or len(self._poses) >= POSES_A_BATCH:
             self.flush()
 
     def flush(self) -> None:
         """Pass on the poses that were taken, except those that wait for their transform."""
         self._flushed_s = time.monotonic()
-        self.tf_queue.release(time.monotonic(), self._place, self._refuse)
-        if not self._stamps:
+        self.tf_queue.release(self._flushed_s)
+        if not self._poses:
             return
-        stamps = np.array(self._stamps, dtype=np.int64)
-        positions, quaternions = map(np.array, zip(*self._poses, strict=True))
-        self._stamps.clear()
+        stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._poses.clear()
         self.intervals.add(stamps)
         self.speed.add(stamps, positions)
@@ -197,27 +187,15 @@ class AtomizerInput:
             )
         self._on_poses(PoseBatch(stamps, positions, quaternions))
 
-    def _follow_publishers(self) -> None:
-        for topic in self._topics:
-            topic.follow_publishers()
-
     # --- poses
 
     def _take_pose(self, message: PoseStamped) -> None:
         self.poses_received += 1
         self._newest = message
         self.pose_s = time.monotonic()
-        if self._held is not None:
-            self._held.append(message)
-        else:
-            self._queue(message)
+        self._use(message)
         if self.poses_received % POSES_A_BATCH == 0:
             self._report_progress()
-
-    def _queue(self, message: PoseStamped) -> None:
-        now_s = time.monotonic()
-        self.tf_queue.add(message, now_s)
-        self.tf_queue.release(now_s, self._place, self._refuse)
 
     def _place(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
@@ -228,8 +206,7 @@ class AtomizerInput:
             self.odd['poses without a frame'] += not frame_id
         else:
             pose = self._frame.transform_from(frame_id, stamp).applied(*pose)
-        self._stamps.append(stamp)
-        self._poses.append(pose)
+        self._poses.append((stamp, *pose))
 
     def _refuse(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
@@ -240,16 +217,13 @@ class AtomizerInput:
                 f"{self._pose_topic}: poses in frame '{frame_id}' are refused: the mesh is in "
                 f"frame '{self._frame.frame_id}' and {missing}"
             )
-        self.refused_frames[frame_id] = self.refused_frames.get(frame_id, 0) + 1
+        self.refused_frames[frame_id] += 1
 
     # --- states
 
     def _take_state(self, message: AtomizerState) -> None:
         self.states_received += 1
-        if self._held is not None:
-            self._held.append(message)
-        else:
-            self._use_state(message)
+        self._use(message)
 
     def _use_state(self, message: AtomizerState) -> None:
         stamp = stamp_ns(message.header)

@@ -8,12 +8,13 @@ from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
 from rclpy.event_handler import SubscriptionEventCallbacks
-from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
+from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import accepting
 
+FOLLOW_PERIOD_S = 0.1
 # More than a publisher keeps for those who come late.
 REMEMBERED = 1000
 
@@ -49,7 +50,7 @@ class AtomizerTopic:
 
     def __init__(
         self,
-        node: Node,
+        node: PaintNode,
         message: type,
         topic: str,
         take: Callable[[Any], None],
@@ -57,55 +58,42 @@ class AtomizerTopic:
         depth: int,
         latched: bool = False,
     ) -> None:
-        self._node = node
         self.lost = 0
-        self._message = message
-        self._topic = topic
-        self._take = take
+        self._node, self._message, self._topic, self._take = node, message, topic, take
         self._latched = latched
         self._group = Polled()
-        self._first = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
-        self._subscription: Subscription | None = None
-        self._subscribe(self._first)
-
-    def follow_publishers(self) -> None:
-        """Look who publishes, and subscribe anew if another quality of service serves better."""
-        profile = self._best()
-        if (profile.reliability, profile.durability) != (
-            self._profile.reliability,
-            self._profile.durability,
-        ):
-            self._subscribe(profile)
+        self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
+        self._subscription = self._subscribed()
+        node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
 
     def take_waiting(self) -> None:
         """Take what has come."""
-        if self._subscription is not None:
-            self._drain(self._subscription)
+        self._drain(self._subscription)
 
-    def _best(self) -> QoSProfile:
+    def _follow_publishers(self) -> None:
+        """Look who publishes, and subscribe anew if another quality of service serves better."""
         publishers = self._node.get_publishers_info_by_topic(self._topic)
-        offered = [info.qos_profile for info in publishers]
-        if not offered:
-            return self._first
-        profile = accepting(offered, self._first.depth)
-        # More reliable in mid-stream would lose what is sent until both ends have met again.
-        if self._profile.reliability > profile.reliability:
-            profile.reliability = self._profile.reliability
-        if not self._latched:
-            profile.durability = DurabilityPolicy.VOLATILE
-        return profile
-
-    def _subscribe(self, profile: QoSProfile) -> None:
-        before, self._profile = self._subscription, profile
-        # The new one is there before the old one goes: nothing is lost between them.
-        self._subscription = self._node.create_subscription(
-            self._message, self._topic, self._on_message, profile, callback_group=self._group,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._count_lost),
-        )  # fmt: skip
-        if before is not None:
+        best = accepting([info.qos_profile for info in publishers], self._profile.depth)
+        if publishers:
+            # More reliable in mid-stream would lose what is sent until both ends have met again.
+            best.reliability = max(best.reliability, self._profile.reliability)
+        if not (self._latched and publishers):
+            best.durability = DurabilityPolicy.VOLATILE
+        now = self._profile.reliability, self._profile.durability
+        if (best.reliability, best.durability) != now:
+            before, self._profile = self._subscription, best
+            # The new one is there before the old one goes: nothing is lost between them.
+            self._subscription = self._subscribed()
             self._drain(before)
             self._node.destroy_subscription(before)
+
+    def _subscribed(self) -> Subscription:
+        return self._node.create_subscription(
+            self._message, self._topic, self._on_message, self._profile,
+            callback_group=self._group,
+            event_callbacks=SubscriptionEventCallbacks(message_lost=self._count_lost),
+        )  # fmt: skip
 
     def _count_lost(self, event: Any) -> None:
         self.lost += event.total_count_change

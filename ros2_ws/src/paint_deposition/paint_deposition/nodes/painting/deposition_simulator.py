@@ -22,6 +22,7 @@ from paint_deposition.nodes.painting.part_change import PartChange, version_of
 from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
+    read_to_configure,
     require_file_name,
     thickness,
 )
@@ -34,12 +35,13 @@ SIMULATOR = PAINTING | {
         'How often statistics go out while the film changes, and large messages at the most [Hz]',
         (0.1, 30.0),
     ),
-    'precision': NodeParameter(
-        'single',
-        'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
-        choices=('single', 'double'),
-        fixed_because='the film so far was summed in it; clean the node up or restart it',
-        read_to_configure=True,
+    **read_to_configure(
+        'the film so far was summed in it; clean the node up or restart it',
+        precision=NodeParameter(
+            'single',
+            'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
+            choices=('single', 'double'),
+        ),
     ),
     'color_min_um': thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
     'color_max_um': thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
@@ -84,7 +86,7 @@ class DepositionSimulator(PaintingNode):
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
         self.display = FilmDisplay(self)
-        self.parts = PartChange(self, self.display, self._mesh_version, saving)
+        self.parts = PartChange(self, self._mesh_version, self._saving, saving)
         self.publish()
 
     def _cleanup(self) -> None:
@@ -124,8 +126,7 @@ class DepositionSimulator(PaintingNode):
         try:
             require_file_name('name', stem)
             self.up_to_date()
-            mesh_id = self.display.of(self.surface).mesh_id
-            write = film_to_save(self, mesh_id, Path(self.values['output_directory']), stem)
+            write = film_to_save(self, Path(self.values['output_directory']), stem)
             paths = await self.in_a_thread(self._saving.submit(write))
         except Exception as error:  # the caller of the service gets it
             response.message = str(error)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sys
 import time
+from array import array
 from collections.abc import Callable
 from typing import Any
 
@@ -13,24 +15,55 @@ from rclpy.event_handler import PublisherEventCallbacks
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import CommonFilm
-from paint_deposition.nodes.painting.film_files import figures_of, laid_by
-from paint_deposition.nodes.painting.film_messages import ShownFilm, stats_message
+from paint_deposition.nodes.painting.film_files import figures_of, laid_by, shares
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.topics import of_gun
 from paint_deposition.part.surface import Surface
 
-# Of one core that making and sending such a message may take.
+# Of one core that making and sending a large message may take.
 SHARE = 0.2
 # A listener that acknowledges nothing for so long does not hold up the others.
 PATIENCE_S = 5.0
-AT_ONCE = Duration(nanoseconds=0)
+POINT = ('x', 'y', 'z', 'thickness_um')
+FIGURES = (
+    'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
+    'painted_volume_cm3', 'capture_fraction',
+)  # fmt: skip
+
+
+def cloud_of(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
+    """x, y, z [m] and thickness_um (V,) of all vertices."""
+    points = np.column_stack([surface.vertices_m, film_um]).astype(np.float32)
+    kind = PointField.FLOAT32
+    return PointCloud2(
+        header=at,
+        height=1,
+        width=len(points),
+        fields=[
+            PointField(name=name, offset=4 * k, datatype=kind, count=1)
+            for k, name in enumerate(POINT)
+        ],
+        is_bigendian=sys.byteorder == 'big',
+        point_step=4 * len(POINT),
+        row_step=points.nbytes,
+        data=array('B', points.tobytes()),
+        is_dense=True,
+    )
+
+
+def field_of(surface: Surface, film_um: np.ndarray, at: Header) -> ThicknessField:
+    """(V,) film [um] in the order of the vertices."""
+    thickness_um = array('f', film_um.astype(np.float32).tobytes())
+    return ThicknessField(header=at, mesh_id=surface.mesh_id, thickness_um=thickness_um)
 
 
 class LargeTopic:
@@ -47,22 +80,20 @@ class LargeTopic:
             message, topic, profile,
             event_callbacks=PublisherEventCallbacks(matched=self._count_listeners),
         )  # fmt: skip
-        self._edition: int | None = None
-        self._greeted = 0
+        # The last edition sent, and how many newcomers there had been.
+        self._sent: tuple[int, int] | None = None
         self._sent_s = self._rested_s = 0.0
 
     def offer(self, edition: int, make: Callable[[], Any]) -> None:
         """Publish an edition, if it is wanted and the link is free; otherwise offer it again."""
         # Not the publisher's own count: it grows before the newcomer is counted.
-        newcomers = self._newcomers
-        known = edition == self._edition and newcomers == self._greeted
-        if not self._listeners or known or not self._is_free():
+        wanted = edition, self._newcomers
+        if not self._listeners or wanted == self._sent or not self._is_free():
             return
         began_s = time.monotonic()
         self._publisher.publish(make())
-        self._sent_s = time.monotonic()
+        self._sent, self._sent_s = wanted, time.monotonic()
         self._rested_s = began_s + (self._sent_s - began_s) / SHARE
-        self._edition, self._greeted = edition, newcomers
 
     def _count_listeners(self, event: Any) -> None:
         self._listeners = event.current_count
@@ -72,14 +103,12 @@ class LargeTopic:
         now_s = time.monotonic()
         if now_s < self._rested_s:
             return False
-        return self._publisher.wait_for_all_acked(AT_ONCE) or now_s > self._sent_s + PATIENCE_S
+        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
+        return acknowledged or now_s > self._sent_s + PATIENCE_S
 
 
 class FilmDisplay:
-    """Publishes `thickness/...`: statistics, legend, and the large messages to who listens.
-
-    `shown_as` are the messages of the part.
-    """
+    """Publishes `thickness/...`: statistics, legend, and the large messages to who listens."""
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
@@ -97,25 +126,16 @@ class FilmDisplay:
                 *((topic, ThicknessField, topics.RESULTS) for topic in self._share_topics),
             )
         }
+        self._surface: Surface | None = None
+        self._mesh: ColouredMesh | None = None
         self._stats = ThicknessStats()
+        self._counts: tuple | None = None
         # Counts what has been shown: another film, or the same in other colours.
         self._edition = 0
         self._film_um = np.empty(0)
         self._scale = film_scale(self._film_um)
-        self._took_s = 0.0
-        self.take(node.surface)
-
-    def take(self, surface: Surface) -> None:
-        """Show another part, or the same turned."""
-        self.shown_as = ShownFilm(surface, self._node.frame.frame_id)
-        self._counts: tuple | None = None
         self._legend_ends: tuple[float, float] | None = None
-
-    def of(self, surface: Surface) -> ShownFilm:
-        """The messages of the part as it is now, which the gun may have turned."""
-        if self.shown_as.surface is not surface:
-            self.take(surface)
-        return self.shown_as
+        self._took_s = 0.0
 
     def details(self) -> dict[str, object]:
         """What the diagnostics say of the film beside part and model."""
@@ -126,43 +146,54 @@ class FilmDisplay:
     def show(self, film: CommonFilm, changed: bool, run: str) -> None:
         """Publish the film if it has changed, or to those who do not have it yet."""
         began_s = time.monotonic()
-        self.of(self._node.surface)
+        if self._surface is not self._node.surface:  # another part, or the same turned
+            self._surface, self._mesh, self._legend_ends = self._node.surface, None, None
+        at = header(self._node.frame.frame_id, self._node.film.newest_ns or 0)
         if changed:
-            self._sum_up(film, run)
-        self._offer(film)
+            self._sum_up(film, run, at)
+        self._offer(film, at)
         if changed:
             self._took_s = time.monotonic() - began_s
         self._publish_stats()
 
-    def _sum_up(self, film: CommonFilm, run: str) -> None:
+    def _sum_up(self, film: CommonFilm, run: str, at: Header) -> None:
         node, values = self._node, self._node.values
         self._edition += 1
-        self._film_um = film_um = film.film_um
-        figures = figures_of(values, node.surface, film_um, film.emitted_cm3)
+        self._film_um = film.film_um
+        figures = figures_of(values, node.surface, self._film_um, film.emitted_cm3)
         laid_cm3 = laid_by(node.gun_names, node.surface, film)
-        stamp_ns = node.film.newest_ns or 0
-        self._stats = stats_message(node.frame.frame_id, stamp_ns, figures, laid_cm3)
-        self._stats.run = run
+        self._stats = ThicknessStats(
+            header=at,
+            run=run,
+            atomizers=list(laid_cm3),
+            atomizer_volume_cm3=list(laid_cm3.values()),
+            atomizer_share=list(shares(laid_cm3).values()),
+            **{name: getattr(figures, name) for name in FIGURES},
+        )
         self._counts = None
-        scale = film_scale(film_um, values['color_min_um'], values['color_max_um'])
-        self._scale = scale
-        if (scale.low, scale.high) != self._legend_ends:
-            self._legend_ends = scale.low, scale.high
-            self._legend.publish(legend(scale, 'µm', node.surface, node.frame.frame_id))
+        self._scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
+        ends = self._scale.low, self._scale.high
+        if ends != self._legend_ends:
+            self._legend_ends = ends
+            self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
 
-    def _offer(self, film: CommonFilm) -> None:
-        film_um, shown_as, scale = self._film_um, self.shown_as, self._scale
-        values, stamp_ns = self._node.values, self._node.film.newest_ns or 0
+    def _offer(self, film: CommonFilm, at: Header) -> None:
+        film_um, surface, values = self._film_um, self._node.surface, self._node.values
 
         def mesh() -> bytes:
-            rows = scale.rows(film_um, film_um > values['painted_above_um'])
-            return shown_as.mesh.serialised(stamp_ns, scale.palette, rows)
+            if self._mesh is None:
+                self._mesh = ColouredMesh(
+                    surface.vertices_m, surface.faces, at.frame_id, 'thickness'
+                )
+            rows = self._scale.rows(film_um, film_um > values['painted_above_um'])
+            stamp_ns = self._node.film.newest_ns or 0
+            return self._mesh.serialised(stamp_ns, self._scale.palette, rows)
 
         large: dict[str, Callable[[], Any]] = {
-            'thickness/cloud': lambda: shown_as.cloud(stamp_ns, film_um),
-            'thickness/field': lambda: shown_as.field(stamp_ns, film_um),
+            'thickness/cloud': lambda: cloud_of(surface, film_um, at),
+            'thickness/field': lambda: field_of(surface, film_um, at),
         } | {
-            topic: lambda gun=gun: shown_as.field(stamp_ns, film.shares_um[gun])
+            topic: lambda gun=gun: field_of(surface, film.shares_um[gun], at)
             for gun, topic in enumerate(self._share_topics)
         }
         if values['publish_mesh']:

@@ -10,7 +10,6 @@ import numpy as np
 
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.nodes.painting.film_messages import shares
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.film import write_film
@@ -20,14 +19,8 @@ def figures_of(
     values: Mapping[str, Any], surface: Surface, film_um: np.ndarray, emitted_cm3: float
 ) -> FilmStatistics:
     """The figures of a film (V,) with the target and the limit that the parameters set."""
-    return film_statistics(
-        film_um,
-        surface.vertex_areas_m2,
-        emitted_cm3,
-        painted_above_um=values['painted_above_um'],
-        target_um=values['target_um'],
-        target_tolerance_um=values['target_tolerance_um'],
-    )
+    chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}
+    return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, **chosen)
 
 
 def laid_by(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
@@ -35,33 +28,34 @@ def laid_by(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str
     return dict(zip(guns, film.laid_cm3(surface.vertex_areas_m2).tolist(), strict=True))
 
 
+def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
+    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
+    total = sum(laid_cm3.values())
+    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
+
+
 def film_to_save(
-    node: PaintingNode,
-    mesh_id: str,
-    folder: Path,
-    stem: str,
-    part: Mapping[str, Any] | None = None,
+    node: PaintingNode, folder: Path, stem: str, part: Mapping[str, Any] | None = None
 ) -> Callable[[], list[Path]]:
     """A function that writes the film as it is now, in any thread, and returns the paths.
 
     Args:
-        node: that has painted it. mesh_id: of its refined mesh.
+        node: that has painted it.
         folder, stem: where to.
         part: what to say of the part in the statistics.
     """
     film, surface, values = node.film.up_to_date(), node.surface, dict(node.values)
     names, counts = node.gun_names, [gun.counts.to_dict() for gun in node.film.guns]
+    refused = [source.refused_frames.items() for source in node.inputs]
     details = {
         'mesh_file': node.mesh_file,
-        'mesh_id': mesh_id,
+        'mesh_id': surface.mesh_id,
         'frame_id': node.frame.frame_id,
         'down': surface.down,
         'model_file': values['model_file'],
         'effects': list(dict.fromkeys(e.id for gun in film.guns for e in gun.model.effects)),
         'poses': node.film.counts.to_dict(),
-        'poses_in_other_frames': {
-            frame: count for gun in node.inputs for frame, count in gun.refused_frames.items()
-        },
+        'poses_in_other_frames': {frame: count for frames in refused for frame, count in frames},
         **({'part': part} if part else {}),
     }
 
@@ -86,14 +80,8 @@ def film_to_save(
         if any(gun.model.brushes for gun in film.guns):
             details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
         return write_film(
-            folder,
-            surface,
-            film_um,
-            figures,
-            stem=stem,
-            statistics_file=f'{stem}.json',
-            details=details,
-            color_range_um=(values['color_min_um'], values['color_max_um']),
-        )
+            folder, surface, film_um, figures, stem=stem, statistics_file=f'{stem}.json',
+            details=details, color_range_um=(values['color_min_um'], values['color_max_um']),
+        )  # fmt: skip
 
     return write

@@ -3,34 +3,13 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future
 
-import numba
-import numpy as np
-
 from paint_deposition.film.common_film import LiveFilms
-from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.pose_stream import MotionLog, PoseBatch, TriggerChange
-from paint_deposition.part.facing import facing
-from paint_deposition.part.surface import Surface
 
 # So few poses are left to the thread that paints on: it must not be held up.
 REST_POSES = 250
-
-
-def paint_in_one_thread() -> None:
-    """Let this thread paint alone; others, one that repaints say, still share their work.
-
-    Motion comes in pieces of milliseconds: threads that wait for the next one would take more of
-    the processor than the painting.
-    """
-    numba.set_num_threads(1)
-
-
-def index_facing(surface: Surface) -> None:
-    """Make what is looked up along a gun's axis, a second's work for a large part."""
-    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])
 
 
 class Repainting:
@@ -81,7 +60,7 @@ class Repainting:
             return None
         for film, gun in zip(films.guns, current.guns, strict=True):
             if gun.log.poses or gun.log.changes:
-                film.follow(_not_in(film, gun.log))
+                film.follow(gun.log.events(film.log.poses, film.log.changes))
             else:  # a reset: the gun stays as it was before
                 film.carry_on(gun)
         return films
@@ -92,23 +71,18 @@ class Repainting:
 
     def _run(self) -> None:
         try:
-            self._prepared.set_result(self._prepare())
+            films = self._make()
+            films.warm_up()
+            if self._from_start:
+                self._follow(films)
+            self._prepared.set_result(films)
         except BaseException as error:  # it is raised again where the films are taken over
             self._prepared.set_exception(error)
 
-    def _prepare(self) -> LiveFilms:
-        films = self._make()
-        films.warm_up()
-        if self._from_start:
-            for film, log in zip(films.guns, self._logs, strict=True):
-                while log.poses - film.log.poses > REST_POSES and self._complete:
-                    for event in _not_in(film, log):
-                        if self._aborted.is_set():
-                            return films
-                        film.follow([event])
-        return films
-
-
-def _not_in(film: LiveFilm, log: MotionLog) -> Iterator[TriggerChange | PoseBatch]:
-    """What a film that follows a log has not followed yet."""
-    return log.events(film.log.poses, film.log.changes)
+    def _follow(self, films: LiveFilms) -> None:
+        for film, log in zip(films.guns, self._logs, strict=True):
+            while log.poses - film.log.poses > REST_POSES and self._complete:
+                for event in log.events(film.log.poses, film.log.changes):
+                    if self._aborted.is_set():
+                        return
+                    film.follow([event])

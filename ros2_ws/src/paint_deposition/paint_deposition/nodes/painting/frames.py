@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections import deque
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped, Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.time import Time
-from std_msgs.msg import Header
 
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import header
 
 GIVE_FRAMES = 'set part_pose and part_parent_frame, or frame_id'
 # A transform comes on another topic than the poses and is often some milliseconds late, a static
@@ -43,7 +44,13 @@ class PartFrame:
         self._from_parent: Rigid | None = None
         self._node = node
         self._publisher: Publisher | None = None
-        self._buffer = _transform_buffer(node)
+        # What listens to tf, where tf2 is installed.
+        self._buffer: Any = None
+        with contextlib.suppress(ImportError):
+            import tf2_ros
+
+            self._buffer = tf2_ros.Buffer(node=node)
+            self._buffer.listener = tf2_ros.TransformListener(self._buffer, node)
 
     def place(self, parent_frame: str, part_pose: Sequence[float]) -> None:
         """Set the part's pose [x y z qx qy qz qw] in another frame, [] for none.
@@ -58,17 +65,11 @@ class PartFrame:
             self._publisher = self._node.create_publisher(
                 TransformStamped, PART_POSE_TOPIC, topics.LATCHED
             )
-        x, y, z, *quaternion = Rigid.of(part_pose).values
-        self._publisher.publish(
-            TransformStamped(
-                header=Header(frame_id=self._parent, stamp=self._node.get_clock().now().to_msg()),
-                child_frame_id=self.frame_id,
-                transform=Transform(
-                    translation=Vector3(x=x, y=y, z=z),
-                    rotation=Quaternion(**dict(zip('xyzw', quaternion, strict=True))),
-                ),
-            )
-        )
+        placed = TransformStamped(child_frame_id=self.frame_id)
+        placed.header = header(self._parent, self._node.get_clock().now().nanoseconds)
+        t, q = placed.transform.translation, placed.transform.rotation
+        t.x, t.y, t.z, q.x, q.y, q.z, q.w = Rigid.of(part_pose).values
+        self._publisher.publish(placed)
 
     def is_own(self, frame_id: str) -> bool:
         """Whether a pose in this frame can be taken as it is."""
@@ -92,62 +93,55 @@ class PartFrame:
             )
         except tf2_ros.TransformException as error:
             words = ' '.join(str(error).split())
+            reason = f'tf knows no transform between them ({words}); {GIVE_FRAMES}'
             if isinstance(error, tf2_ros.ExtrapolationException):
                 reason = (
                     f'tf does not cover the time of the poses ({words}); publish it by the same '
                     'clock as the poses'
                 )
-            else:
-                reason = f'tf knows no transform between them ({words}); {GIVE_FRAMES}'
             raise NoTransform(reason, may_come=True) from None
         t, q = found.transform.translation, found.transform.rotation
         return Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
-
-
-def _transform_buffer(node: Node) -> Any:
-    """A buffer that listens to tf, None where tf2 is not installed."""
-    try:
-        import tf2_ros
-    except ImportError:
-        return None
-    buffer = tf2_ros.Buffer(node=node)
-    buffer.listener = tf2_ros.TransformListener(buffer, node)
-    return buffer
 
 
 class TfQueue:
     """A queue of poses that leave it in the order in which they came, at most `TIMEOUT_S` late.
 
     A pose without a transform holds back all behind it. It is refused when its transform cannot
-    come, has not come in time, or more than `LONGEST` poses wait.
+    come, has not come in time, or more than `LONGEST` poses wait. Times are monotonic seconds.
+
+    Args:
+        place: takes a pose, and raises NoTransform where that cannot be done yet.
+        refuse: gets the others.
     """
 
-    def __init__(self) -> None:
+    def __init__(
+        self,
+        place: Callable[[PoseStamped], None],
+        refuse: Callable[[PoseStamped, NoTransform], None],
+    ) -> None:
+        self._place, self._refuse = place, refuse
         self._waiting: deque[tuple[float, PoseStamped]] = deque()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def add(self, pose: PoseStamped, now_s: float) -> None:
-        """Queue a pose that came just now, in monotonic seconds."""
+        """Queue a pose that came just now, and place what can be placed."""
         self._waiting.append((now_s, pose))
+        self.release(now_s)
 
-    def release(
-        self,
-        now_s: float,
-        place: Callable[[PoseStamped], None],
-        refuse: Callable[[PoseStamped, NoTransform], None],
-    ) -> None:
-        """Place what can be placed; `place` raises NoTransform for what cannot be yet."""
+    def release(self, now_s: float) -> None:
+        """Place what can be placed."""
         while self._waiting:
             since_s, pose = self._waiting[0]
             try:
-                place(pose)
+                self._place(pose)
             except NoTransform as missing:
                 in_time = now_s - since_s < TIMEOUT_S and len(self._waiting) <= LONGEST
                 if missing.may_come and in_time:
                     return
-                refuse(pose, missing)
+                self._refuse(pose, missing)
             self._waiting.popleft()
 
     def clear(self) -> None:

@@ -27,38 +27,23 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
         + (widths.max() + 0.08 * size - widths.mean()) * across
         + (heights.min() - heights.mean()) * up
     )
-    bar = _bar(scale, corner, size * up, 0.04 * size * across, frame_id)
-    labels = [
-        _label(
-            number,
-            f'{scale.low + (scale.high - scale.low) * share:g} {unit}',
-            corner + share * size * up + 0.1 * size * across,
-            0.04 * size,
-            frame_id,
-        )
-        for number, share in enumerate(np.linspace(0.0, 1.0, LABELS))
-    ]
-    return MarkerArray(markers=[bar, *labels])
-
-
-def _bar(
-    scale: ColourScale, corner: np.ndarray, up: np.ndarray, across: np.ndarray, frame_id: str
-) -> Marker:
-    marker = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id)
-    square = [(0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)]
+    bar = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id)
     for step in range(STEPS):
         r, g, b, a = (scale.palette[step * TABLE // STEPS] / 255.0).tolist()
-        for right, over in square:
-            x, y, z = (corner + right * across + (step + over) / STEPS * up).tolist()
-            marker.points.append(Point(x=x, y=y, z=z))
-            marker.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
-    return marker
+        for right, over in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
+            place = corner + 0.04 * size * right * across + size * (step + over) / STEPS * up
+            bar.points.append(_point(place))
+            bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
+    markers = [bar]
+    for number, share in enumerate(np.linspace(0.0, 1.0, LABELS), start=1):
+        label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
+        label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
+        label.scale = Vector3(z=0.04 * size)
+        label.pose.position = _point(corner + share * size * up + 0.1 * size * across)
+        markers.append(label)
+    return MarkerArray(markers=markers)
 
 
-def _label(number: int, text: str, place: np.ndarray, height_m: float, frame_id: str) -> Marker:
-    marker = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number + 1, frame_id)
-    marker.text = text
-    marker.scale = Vector3(z=height_m)
-    x, y, z = place.tolist()
-    marker.pose.position = Point(x=x, y=y, z=z)
-    return marker
+def _point(place_m: np.ndarray) -> Point:
+    x, y, z = place_m.tolist()
+    return Point(x=x, y=y, z=z)

@@ -35,10 +35,11 @@ IN_WORDS = {
 def poses_status(node: PaintingNode, number: int) -> Status:
     """A gun's motion since the last reset: what came and what was wrong with it."""
     source, film = node.inputs[number], node.film.guns[number]
-    counts = film.counts
-    rhythm_ns = source.intervals.typical_ns
+    counts, rhythm_ns = film.counts, source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
     counted |= {'steps faster than a robot': source.jumps.count, **source.odd}
+    programmed = source.programmed_m_per_s
+    gun = _gun_in_words(film)
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
@@ -47,44 +48,37 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'speed [m/s]': f'{source.speed.m_per_s:.3f}',
-        'programmed speed [m/s]': f'{source.programmed_m_per_s:.3f}'
-        if source.programmed_m_per_s > 0.0
-        else 'unknown',
+        'programmed speed [m/s]': f'{programmed:.3f}' if programmed > 0.0 else 'unknown',
         'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'poses not painted while inactive': source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
         'messages lost by the middleware': source.messages_lost,
-        'gun': _gun_in_words(film),
+        'gun': gun,
     }
+    if not node.active and source.unpainted:
+        words = f'inactive: {source.unpainted} poses came and were not painted'
+        return Status(WARN, words, values)
     if not node.active:
-        if not source.unpainted:
-            return Status(OK, 'inactive', values)
-        return Status(
-            WARN, f'inactive: {source.unpainted} poses came and were not painted', values
-        )
+        return Status(OK, 'inactive', values)
     now_s = time.monotonic()
     if source.refused_frames and now_s - source.refused_s < RECENT_S:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
-        return Status(
-            ERROR,
+        words = (
             f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
-            f"'{node.frame.frame_id}' and {source.refusal}",
-            values,
+            f"'{node.frame.frame_id}' and {source.refusal}"
         )
-    counted['poses refused for their frame'] = source.poses_refused
-    wrong = [f'{count} {words}' for words, count in counted.items() if count]
+        return Status(ERROR, words, values)
+    wrong = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
     silent_s = now_s - source.pose_s
     if source.sprays and silent_s > SILENT_S:
         since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
-        wrong.insert(0, f'the gun sprays, and no pose has come {since}')
+        wrong.append(f'the gun sprays, and no pose has come {since}')
+    counted['poses refused for their frame'] = source.poses_refused
+    wrong += [f'{count} {words}' for words, count in counted.items() if count]
     wrong += sorted(source.refusals_of_states)
-    if values['gun'] == NO_BRUSH and counts.received:
-        wrong.insert(0, NO_BRUSH)
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
-    if silent_s > SILENT_S:
-        return Status(OK, 'waiting for poses', values)
-    return Status(OK, 'painting', values)
+    return Status(OK, 'waiting for poses' if silent_s > SILENT_S else 'painting', values)
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
@@ -104,22 +98,16 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
         **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
         **more_values,
     }
-    level, message = OK, 'preparing a changed model' if node.repainting else 'up to date'
     if node.model_problem:
-        level, message = WARN, node.model_problem
-    elif not node.film.complete:
-        level = WARN
-        message = (
-            f'over {node.values["pose_memory"]} poses (pose_memory): a new model paints from '
-            'then on only'
-        )
-    elif factor > BUSY:
-        level = WARN
-        message = (
-            f'painting takes {factor:.0%} of the time that the motion lasts: poses may be lost; '
-            'use a larger max_edge_length_m'
-        )
-    return Status(level, message, values)
+        return Status(WARN, node.model_problem, values)
+    if not node.film.complete:
+        limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
+        return Status(WARN, f'{limit}: a new model paints from then on only', values)
+    if factor > BUSY:
+        share = f'painting takes {factor:.0%} of the time that the motion lasts'
+        remedy = 'poses may be lost; use a larger max_edge_length_m'
+        return Status(WARN, f'{share}: {remedy}', values)
+    return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
 
 
 def _gun_in_words(film: LiveFilm) -> str:
@@ -138,7 +126,4 @@ def painting_tasks(
         of_gun(source.name, 'poses'): functools.partial(poses_status, node, number)
         for number, source in enumerate(node.inputs)
     }
-    return {
-        **poses,
-        'film': lambda: film_status(node, film_values()),
-    }
+    return {**poses, 'film': lambda: film_status(node, film_values())}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import time
 from abc import ABC, abstractmethod
 from collections import deque
@@ -10,6 +9,7 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import numba
 import numpy as np
 from rclpy.timer import Timer
 
@@ -18,13 +18,14 @@ from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
-from paint_deposition.nodes.painting.film_preparation import (
-    Repainting,
-    index_facing,
-    paint_in_one_thread,
-)
+from paint_deposition.nodes.painting.film_preparation import Repainting
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
+from paint_deposition.nodes.painting.painting_parameters import (
+    PreparedPart,
+    bare_films,
+    read_part,
+    warm_up,
+)
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.model_parameters import read_chosen_models
 from paint_deposition.part.facing import facing, toward_the_gun
@@ -37,6 +38,7 @@ BATCHES = 100
 # So many poses that look at the part settle its outward side; after so many in all it stays.
 POSES_FACING = 50
 POSES_CONSIDERED = 2000
+MODELS = {'model_file', 'model_files'}
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -56,22 +58,22 @@ class PaintingNode(ManagedNode, ABC):
     """
 
     repainting: Repainting | None = None
+    model_problem = ''
+    _notes_logged = 0
+    _shown: CommonFilm | None = None
 
     def _configure(self) -> None:
         self.inputs = [
             AtomizerInput(
-                self,
-                name,
-                self.frame,
-                partial(self._add_poses, number),
+                self, name, self.frame, partial(self._add_poses, number),
                 partial(self._add_trigger, number),
             )
             for number, name in enumerate(self.gun_names)
-        ]
+        ]  # fmt: skip
         if self.starts_itself:  # what comes until it has activated itself is painted
-            self._hold()
-        self._shown: CommonFilm | None = None
-        self.offer('~/reset', self._reset)
+            self.hold()
+        self._shown = None
+        self.offer('~/reset', self.reset)
         self.create_steady_timer(TEND_PERIOD_S, self._tend)
         self._show_timer = self._new_show_timer()
 
@@ -86,14 +88,16 @@ class PaintingNode(ManagedNode, ABC):
         self._abort_repainting()
 
     def _prepare(self) -> None:
-        paint_in_one_thread()
+        # Motion comes in pieces of milliseconds: threads that wait for the next one would take
+        # more of the processor than the painting. A thread that repaints shares its work.
+        numba.set_num_threads(1)
         self.gun_names: list[str] = self.values['atomizers'] or ['']
         self.mesh_file: str = self.values['mesh_file']
+        # (time spent on painting, time that the motion lasted) of the last batches of each gun.
         self._spans: list[deque[tuple[float, float]]] = [
             deque(maxlen=BATCHES) for _ in self.gun_names
         ]
-        self.model_problem = ''
-        self._notes_logged = 0
+        self.model_problem, self._notes_logged = '', 0
         self.frame = PartFrame(self, self.values['frame_id'])
         self._place_part()
         self.models = read_chosen_models(self.values)
@@ -102,8 +106,7 @@ class PaintingNode(ManagedNode, ABC):
         self._may_turn = list(range(len(self.gun_names)))
         self.film = bare_films(self.surface, self.points, self.models, self.values)
         self.get_logger().info('getting ready; a model seen for the first time is compiled')
-        self.film.warm_up()
-        index_facing(self.surface)
+        warm_up(self.surface, self.film)
 
     # --- for the subclass
 
@@ -152,15 +155,8 @@ class PaintingNode(ManagedNode, ABC):
         sums = [np.sum(spans, axis=0) for spans in self._spans if spans]
         return float(sum(spent_s / lasted_s for spent_s, lasted_s in sums))
 
-    def reset(self) -> None:
-        """Back to bare metal, all counts to zero."""
-        for source in self.inputs:
-            source.reset()
-        self.film.reset()
-        if self.repainting is not None:
-            self._repaint()
-
-    def _hold(self) -> None:
+    def hold(self) -> None:
+        """Let the inputs keep what comes until `release`."""
         for source in self.inputs:
             source.hold()
 
@@ -169,32 +165,36 @@ class PaintingNode(ManagedNode, ABC):
         for source in self.inputs:
             source.release()
 
-    def take_part(
-        self, mesh_file: str, surface: Surface, points: SurfacePoints, film: LiveFilms
-    ) -> None:
+    def take_part(self, mesh_file: str, part: PreparedPart) -> None:
         """Paint another part from bare metal on, as the guns are now; the counts begin anew.
 
         Raises:
             ModelError: the model does not have the brush that a gun sprays with.
         """
+        film = part.film
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
-            film = bare_films(surface, points, self.models, self.values)
+            film = bare_films(part.surface, part.points, self.models, self.values)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.carry_on(old)
         for source in self.inputs:
             source.count_from_zero()
-        self.mesh_file, self.surface, self.points, self.film = mesh_file, surface, points, film
-        self._shown = None
-        self._notes_logged = len(surface.notes)
+        self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points
+        self.film, self._shown = film, None
+        self._notes_logged = len(part.surface.notes)
         self._may_turn = list(range(len(self.gun_names)))
         if self.repainting is not None:
             self._repaint()
 
-    def _reset(self) -> tuple[bool, str]:
+    def reset(self) -> tuple[bool, str]:
+        """Back to bare metal, all counts to zero; what was done, in words."""
         poses = self.film.counts.received
-        self.reset()
+        for source in self.inputs:
+            source.reset()
+        self.film.reset()
+        if self.repainting is not None:
+            self._repaint()
         self._shown = None
         self.publish()
         return True, f'bare metal again; {poses} poses forgotten'
@@ -213,11 +213,12 @@ class PaintingNode(ManagedNode, ABC):
 
     def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
         if 'max_pose_gap_s' in names and not self.film.complete:
+            memory = f'pose_memory ({self.values["pose_memory"]} poses)'
             raise PaintError(
-                f'max_pose_gap_s: the motion is longer than pose_memory '
-                f'({self.values["pose_memory"]} poses) and cannot be painted again; reset first'
+                f'max_pose_gap_s: the motion is longer than {memory} and cannot be painted again; '
+                'reset first'
             )
-        if names & {'model_file', 'model_files'}:
+        if names & MODELS:
             # Their effect files are tried out in the thread that repaints: poses must not wait.
             self._next_models = read_chosen_models(values, read_effect_file)
 
@@ -227,9 +228,9 @@ class PaintingNode(ManagedNode, ABC):
         if 'trigger_latency_s' in names:
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
-        if names & {'model_file', 'model_files'}:
+        if names & MODELS:
             self.models = self._next_models
-        if names & {'model_file', 'model_files', 'max_pose_gap_s'}:
+        if names & {*MODELS, 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
             self.destroy_timer(self._show_timer)
@@ -248,12 +249,17 @@ class PaintingNode(ManagedNode, ABC):
         surface, points, models = self.surface, self.points, self.models
 
         def make() -> LiveFilms:
-            for effect in itertools.chain.from_iterable(model.effects for model in models):
+            for effect in (effect for model in models for effect in model.effects):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
             return bare_films(surface, points, models, self.values)
 
         self.repainting = Repainting(self.film, make, from_start)
+
+    def _abort_repainting(self) -> None:
+        if self.repainting is not None:
+            self.repainting.abort()
+            self.repainting = None
 
     def _tend(self) -> None:
         """Take over films that are ready, and settle which side of the part is outward."""
@@ -274,8 +280,8 @@ class PaintingNode(ManagedNode, ABC):
             return
         if film is None:
             self._repaint()
-            return
-        self.film = film
+        else:
+            self.film = film
 
     def _turned(self) -> Surface:
         """The part with the side outward that the first gun wants whose poses look at it.
@@ -311,8 +317,3 @@ class PaintingNode(ManagedNode, ABC):
         self.film = turned
         if self.repainting is not None:
             self._repaint()
-
-    def _abort_repainting(self) -> None:
-        if self.repainting is not None:
-            self.repainting.abort()
-            self.repainting = None

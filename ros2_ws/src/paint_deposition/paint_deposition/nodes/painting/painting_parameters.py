@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     read_to_configure,
 )
+from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -91,6 +93,15 @@ PAINTING = dict(
 )
 
 
+@dataclass(frozen=True)
+class PreparedPart:
+    """A part that can be painted at once: its refined surface, the points on it, a bare film."""
+
+    surface: Surface
+    points: SurfacePoints
+    film: LiveFilms
+
+
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
     """The surface of a mesh, refined and turned as a node's parameters say.
 
@@ -110,15 +121,16 @@ def bare_films(
     values: Mapping[str, Any],
 ) -> LiveFilms:
     """Films of a model for each gun, without paint, as a node's parameters say."""
-    return LiveFilms(tuple(
-        LiveFilm(
-            points,
-            model,
-            precision=values.get('precision', 'double'),
-            occluder=surface.occluder,
-            max_pose_gap_s=values['max_pose_gap_s'],
-            trigger_latency_s=values['trigger_latency_s'],
-            limit_poses=values['pose_memory'],
-        )
-        for model in models
-    ))  # fmt: skip
+    options: dict[str, Any] = {
+        'precision': values.get('precision', 'double'),
+        'occluder': surface.occluder,
+        'limit_poses': values['pose_memory'],
+        **{name: values[name] for name in ('max_pose_gap_s', 'trigger_latency_s')},
+    }
+    return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
+
+
+def warm_up(surface: Surface, film: LiveFilms) -> None:
+    """Compile and compute what painting needs, for a large part a second's work."""
+    film.warm_up()
+    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # what is looked up along a gun's axis

@@ -6,27 +6,27 @@ import os
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
 
-from paint_msgs.msg import Part as PartMessage
+from paint_msgs.msg import Part
 from paint_msgs.srv import ChangePart
 from rclpy.callback_groups import CallbackGroup
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.common_film import LiveFilms
-from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_to_save
-from paint_deposition.nodes.painting.film_preparation import index_facing
 from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.painting_parameters import bare_films, read_part
+from paint_deposition.nodes.painting.painting_parameters import (
+    PreparedPart,
+    bare_films,
+    read_part,
+    warm_up,
+)
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 
 # Longer than this, the first poses on a part are painted late.
 LATE_S = 0.05
@@ -34,38 +34,6 @@ LATE_S = 0.05
 MOST_KEPT = 4
 # A mesh file, when it was changed [ns], its size; None where there is no such file.
 Version = tuple[str, int | None, int | None]
-
-
-@dataclass(frozen=True)
-class Part:
-    """The part in the cell, as it was announced.
-
-    Attributes:
-        mesh_file: its mesh.
-        type: what the cell calls its kind, '' where nobody said; serial: likewise.
-        coat: 1 for the first coat on it.
-        since: when it came.
-    """
-
-    mesh_file: str
-    type: str = ''
-    serial: str = ''
-    coat: int = 1
-    since: datetime = field(default_factory=lambda: datetime.now(timezone.utc))
-
-    @property
-    def run(self) -> str:
-        """The folder of its run, '' for a part without a serial number."""
-        return self.serial if self.coat == 1 else f'{self.serial}_coat_{self.coat}'
-
-
-@dataclass(frozen=True)
-class PreparedPart:
-    """A part that can be painted at once: its refined surface, the points on it, a film."""
-
-    surface: Surface
-    points: SurfacePoints
-    film: LiveFilms
 
 
 def version_of(mesh_file: str) -> Version:
@@ -83,29 +51,34 @@ class PartChange:
     Poses and states that come while the next part's mesh is still being read wait for it.
 
     Args:
-        node: paints the part. display: shows it.
+        node: paints the part, and shows it.
         version: of the mesh of the part that is in the cell.
+        saving: the thread that writes films.
         group: of the service.
 
     Attributes:
-        part: the one in the cell.
+        part: the one in the cell, as it was announced.
         waiting: whether the mesh of the next one is still being read.
     """
 
     def __init__(
-        self, node: PaintingNode, display: FilmDisplay, version: Version, group: CallbackGroup
+        self,
+        node: PaintingNode,
+        version: Version,
+        saving: ThreadPoolExecutor,
+        group: CallbackGroup,
     ) -> None:
-        self._node, self._display, self._version = node, display, version
-        self.part = Part(node.mesh_file)
+        self._node, self._version, self._saving = node, version, saving
+        self.part = Part(mesh_file=node.mesh_file, coat=1)
+        self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
         present.set_result(PreparedPart(node.surface, node.points, node.film))
         self._kept = {version: present}
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
-        self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving parts')
         self.waiting = False
         self._gap_s = 0.0
         self._unsaved = ''
-        self._publisher = node.create_publisher(PartMessage, topics.PART_TOPIC, topics.LATCHED)
+        self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
     def close(self) -> None:
@@ -113,7 +86,6 @@ class PartChange:
         self._reading.shutdown(cancel_futures=True)
         if self.part.serial and self._node.film.counts.received:
             self._film_to_save()()
-        self._saving.shutdown()
 
     def status(self) -> Status:
         """The part, and how the last change went."""
@@ -124,19 +96,15 @@ class PartChange:
             'serial number': part.serial or 'unknown',
             'coat': part.coat,
             'mesh': part.mesh_file,
-            'since': part.since.isoformat(timespec='seconds'),
+            'since': self._since.isoformat(timespec='seconds'),
             'gap of the last change [ms]': f'{self._gap_s * 1e3:.1f}',
             'meshes prepared': ' '.join(ready) or 'none',
         }
         if self._unsaved:
             return Status(ERROR, self._unsaved, values)
         if self._gap_s > LATE_S:
-            return Status(
-                WARN,
-                f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh: prepare '
-                'it before the part comes',
-                values,
-            )
+            late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
+            return Status(WARN, f'{late}: prepare it before the part comes', values)
         return Status(OK, part.run or 'the part has no serial number', values)
 
     # --- the change
@@ -145,10 +113,7 @@ class PartChange:
         self, request: ChangePart.Request, response: ChangePart.Response
     ) -> ChangePart.Response:
         try:
-            if request.prepare:
-                await self._read_ahead(request, response)
-            else:
-                await self._change(request, response)
+            await (self._read_ahead if request.prepare else self._change)(request, response)
             response.success = True
         except PaintError as error:
             response.message = str(error)
@@ -173,11 +138,8 @@ class PartChange:
         # A request overtakes poses that wait; they belong to the part before.
         node.up_to_date()
         began_s = time.monotonic()
-        notes = [
-            f'{source.name or "the gun"} sprays while the part is changed'
-            for source in node.inputs
-            if source.sprays
-        ]
+        guns = [source.name or 'the gun' for source in node.inputs if source.sprays]
+        notes = [f'{gun} sprays while the part is changed' for gun in guns]
         save = self._film_to_save() if node.film.counts.received else None
         try:
             version = version_of(following.mesh_file)
@@ -185,10 +147,10 @@ class PartChange:
             self._put_in_place(version, ready, request.part_pose)
         finally:
             node.release()
-        self.part = following
+        self.part, self._since = following, datetime.now(timezone.utc)
         self._gap_s = response.gap_s = time.monotonic() - began_s
         self._publish()
-        response.run = self.part.run
+        response.run = following.run
         if save is not None:
             response.paths = await self._saved(save)
             notes.append(f'wrote {", ".join(response.paths)}')
@@ -203,16 +165,17 @@ class PartChange:
         """
         require_file_name('serial', request.serial)
         part, mesh_file = self.part, os.path.expanduser(request.mesh_file) or self.part.mesh_file
+        following = Part(type=request.type, serial=request.serial, mesh_file=mesh_file, coat=1)
+        following.run = request.serial
         if request.coat:
-            if request.serial != part.serial or mesh_file != part.mesh_file:
+            if (request.serial, mesh_file) != (part.serial, part.mesh_file):
                 raise PaintError(
                     f"coat: the part in the cell is '{part.serial}' of {part.mesh_file}, not "
                     f"'{request.serial}' of {mesh_file}: a further coat can only lie on the part "
                     'that is there'
                 )
-            following = Part(mesh_file, request.type or part.type, part.serial, part.coat + 1)
-        else:
-            following = Part(mesh_file, request.type, request.serial)
+            following.type, following.coat = request.type or part.type, part.coat + 1
+            following.run = f'{part.serial}_coat_{following.coat}'
         if following.run == part.run:
             raise PaintError(
                 f"serial '{part.serial}' is the part in the cell: say coat: true for another "
@@ -232,8 +195,7 @@ class PartChange:
         if read.done():
             return read.result()
         self.waiting = True
-        for source in self._node.inputs:
-            source.hold()
+        self._node.hold()
         try:
             return await self._node.in_a_thread(read)
         finally:
@@ -243,19 +205,17 @@ class PartChange:
         self, version: Version, ready: PreparedPart | None, part_pose: Sequence[float]
     ) -> None:
         """Set the part's pose, if one is given, and take the bare part, if it is another one."""
-        node = self._node
-        pose = list(node.values['part_pose'] or [])
+        pose = list(self._node.values['part_pose'] or [])
         if len(part_pose):
             self._set_pose(list(part_pose))
         if ready is None:
             return
         try:
-            node.take_part(version[0], ready.surface, ready.points, ready.film)
+            self._node.take_part(version[0], ready)
         except PaintError:
             self._set_pose(pose)
             raise
         self._version = version
-        self._display.take(ready.surface)
 
     def _set_pose(self, part_pose: list[float]) -> None:
         change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
@@ -265,13 +225,11 @@ class PartChange:
 
     def _sentence(self) -> str:
         part = self.part
-        called = f' ({part.type})' if part.type else ''
+        called = part.serial + (f' ({part.type})' if part.type else '')
         if part.coat > 1:
-            return f'coat {part.coat} on {part.serial}{called}: on top of the film so far'
-        return (
-            f'{part.serial}{called} on {part.mesh_file}: bare metal, ready after '
-            f'{self._gap_s * 1e3:.0f} ms'
-        )
+            return f'coat {part.coat} on {called}: on top of the film so far'
+        gap_ms = self._gap_s * 1e3
+        return f'{called} on {part.mesh_file}: bare metal, ready after {gap_ms:.0f} ms'
 
     # --- parts, files and messages
 
@@ -292,8 +250,7 @@ class PartChange:
         surface = read_part(node.values, mesh_file)
         points = surface.points()
         film = bare_films(surface, points, node.models, node.values)
-        film.warm_up()
-        index_facing(surface)
+        warm_up(surface, film)
         return PreparedPart(surface, points, film)
 
     def _folder(self, run: str) -> Path:
@@ -301,21 +258,16 @@ class PartChange:
 
     def _film_to_save(self) -> Callable[[], list[Path]]:
         part, node = self.part, self._node
-        mesh_id = self._display.of(node.surface).mesh_id
         if not part.serial:
-            stem = time.strftime('film_%Y%m%d_%H%M%S')
-            return film_to_save(node, mesh_id, self._folder(''), stem)
+            return film_to_save(node, self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
         described = {
-            'type': part.type,
-            'serial': part.serial,
-            'coat': part.coat,
-            'run': part.run,
-            'since': part.since.isoformat(timespec='milliseconds'),
+            **{name: getattr(part, name) for name in ('type', 'serial', 'coat', 'run')},
+            'since': self._since.isoformat(timespec='milliseconds'),
             'until': datetime.now(timezone.utc).isoformat(timespec='milliseconds'),
             'part_pose': list(node.values['part_pose'] or []),
             'gap_s': self._gap_s,
         }
-        return film_to_save(node, mesh_id, self._folder(part.run), 'film', described)
+        return film_to_save(node, self._folder(part.run), 'film', described)
 
     async def _saved(self, save: Callable[[], list[Path]]) -> list[str]:
         try:
@@ -329,16 +281,8 @@ class PartChange:
 
     def _publish(self) -> None:
         part, node = self.part, self._node
-        message = PartMessage(
-            type=part.type,
-            serial=part.serial,
-            coat=part.coat,
-            run=part.run,
-            mesh_file=part.mesh_file,
-            mesh_id=self._display.of(node.surface).mesh_id,
-            part_parent_frame=node.values['part_parent_frame'],
-            part_pose=list(node.values['part_pose'] or []),
-        )
-        message.header.frame_id = node.frame.frame_id
-        message.header.stamp = node.get_clock().now().to_msg()
-        self._publisher.publish(message)
+        part.header = header(node.frame.frame_id, node.get_clock().now().nanoseconds)
+        part.mesh_id = node.surface.mesh_id
+        part.part_parent_frame = node.values['part_parent_frame']
+        part.part_pose = list(node.values['part_pose'] or [])
+        self._publisher.publish(part)

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import Any
 
 from nav_msgs.msg import Path
@@ -18,15 +17,13 @@ from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.planning.plan import Plan
 
 FEEDBACK_PERIOD_S = 0.1
+# Of a goal, named as the parameters that they stand for.
+FIELDS = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction')
 
 # What is being done, and the share of it that is done, 0 to 1; it may raise to end the work.
 Progress = Callable[[str, float], None]
 # Plans with other values of parameters, and publishes the passes.
 PlanAndShow = Callable[[Mapping[str, Any], Progress], tuple[Plan, Path]]
-
-
-class Cancelled(Exception):
-    """Whoever asked for the work does not want it any more."""
 
 
 class PassesAction:
@@ -41,13 +38,10 @@ class PassesAction:
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
         self._closed = False
         self._server = ActionServer(
-            node,
-            PlanPasses,
-            'plan_passes',
-            self._execute,
+            node, PlanPasses, 'plan_passes', self._execute,
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )
+        )  # fmt: skip
 
     def close(self) -> None:
         """Break off what is being done, and end the server."""
@@ -61,7 +55,7 @@ class PassesAction:
         def progress(stage: str, share: float) -> None:
             nonlocal reported_s, reported
             if self._closed or goal.is_cancel_requested:
-                raise Cancelled
+                raise CancelledError
             now_s = time.monotonic()
             if stage != reported or now_s - reported_s > FEEDBACK_PERIOD_S:
                 reported_s, reported = now_s, stage
@@ -70,7 +64,7 @@ class PassesAction:
         work = self._thread.submit(self._plan, goal.request, progress)
         try:
             result = await self._node.in_a_thread(work)
-        except Cancelled:
+        except CancelledError:
             goal.canceled()
             return PlanPasses.Result(message='cancelled')
         except PaintError as error:
@@ -81,14 +75,7 @@ class PassesAction:
 
     def _plan(self, goal: PlanPasses.Goal, progress: Progress) -> PlanPasses.Result:
         progress('begin', 0.0)
-        fields = {
-            'mesh_file': os.path.expanduser(goal.mesh_file),
-            'speed_m_per_s': goal.speed_m_per_s,
-            'target_um': goal.target_um,
-            'index_m': goal.index_m,
-            'direction': goal.direction,
-        }
-        given = {name: value for name, value in fields.items() if value}
+        given = {name: getattr(goal, name) for name in FIELDS if getattr(goal, name)}
         if 'target_um' in given and 'speed_m_per_s' not in given:
             given['speed_m_per_s'] = 0.0  # the target chooses it, not the parameter
         planned, path = self._plan_and_show(given, progress)

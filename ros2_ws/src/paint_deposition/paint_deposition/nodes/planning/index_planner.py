@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -33,6 +34,10 @@ from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest, PlanRequest
 
 SPACING_M = 0.02
+# Of a request for an index, and of passes; 0 stands for none.
+ASKED = ('speed_m_per_s', 'target_um', 'index_min_m', 'index_max_m', 'tolerance')
+PLANNED_IF_GIVEN = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
+PLANNED = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
 
 PLANNER = dict(
     **model_parameters(''),
@@ -105,30 +110,41 @@ class IndexPlanner(PaintNode):
         self._requests = 0
         self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
-        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
-        if self._path is not None:
-            self._path_publisher.publish(self._path)
-        self._action = PassesAction(self, self._plan_and_show)
+        self._action = PassesAction(self, self._plan)
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
     def _prepare(self) -> None:
         self._model = read_chosen_model(self.values)
-        self._path = None
+        self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
         if self.values['mesh_file']:
-            planned = self._planned(self.values)
-            self._path = self._path_of(planned)
+            self._plan({})
 
     def close(self) -> None:
         self._action.close()
 
-    # --- recommending
+    def _of_brush(self) -> DepositionModel:
+        """The model, or the brush of it that is set."""
+        brush = self.values['brush']
+        return self._model.with_brush(brush) if brush else self._model
 
     def _recommend(
         self, request: RecommendIndex.Request, response: RecommendIndex.Response
     ) -> RecommendIndex.Response:
         self._requests += 1
+        values = self.values
+        # In requests and parameters 0 stands for none.
+        asked = {name: getattr(request, name) or None for name in ASKED}
         try:
-            answer = recommend(self._of_brush(), self._request_of(request))
+            index_request = IndexRequest(
+                **asked,
+                width_m=request.width_m or values['width_m'] or None,
+                length_m=values['length_m'] or None,
+                one_way=request.one_way,
+                gun_turns=values['gun_turns'],
+                standoff_m=values['standoff_m'] or None,
+                travel_rad=values['travel_rad'],
+            )
+            answer = recommend(self._of_brush(), index_request)
         except PaintError as error:
             self._last = Status(WARN, str(error))
             response.message = str(error)
@@ -136,70 +152,29 @@ class IndexPlanner(PaintNode):
         self._last = Status(OK, answer.sentence)
         return _fill(response, answer)
 
-    def _of_brush(self) -> DepositionModel:
-        """The model, or the brush of it that is set."""
-        brush = self.values['brush']
-        return self._model.with_brush(brush) if brush else self._model
-
-    def _request_of(self, request: RecommendIndex.Request) -> IndexRequest:
-        # In requests and parameters 0 stands for none.
-        return IndexRequest(
-            speed_m_per_s=request.speed_m_per_s or None,
-            target_um=request.target_um or None,
-            index_min_m=request.index_min_m or None,
-            index_max_m=request.index_max_m or None,
-            tolerance=request.tolerance or None,
-            width_m=request.width_m or self.values['width_m'] or None,
-            length_m=self.values['length_m'] or None,
-            one_way=request.one_way,
-            gun_turns=self.values['gun_turns'],
-            standoff_m=self.values['standoff_m'] or None,
-            travel_rad=self.values['travel_rad'],
-        )
-
-    # --- planning
-
-    def _plan_and_show(self, changed: Mapping[str, Any], progress: Progress) -> tuple[Plan, Path]:
+    def _plan(
+        self, changed: Mapping[str, Any], progress: Progress = lambda stage, share: None
+    ) -> tuple[Plan, Path]:
         """Plan passes with other values of parameters, and publish them."""
-        planned = self._planned(self.values | dict(changed), progress)
-        path = self._path_of(planned)
-        self._path_publisher.publish(path)
-        return planned, path
-
-    def _planned(
-        self,
-        values: Mapping[str, Any],
-        progress: Progress = lambda stage, share: None,
-    ) -> Plan:
+        values = self.values | dict(changed)
         if not values['mesh_file']:
             raise PlanError('mesh_file is empty: name the mesh of the part')
         progress('reading the mesh', 0.0)
-        surface = read_mesh(values['mesh_file'], values['mesh_scale'], values['max_edge_length_m'])
+        mesh_file = os.path.expanduser(values['mesh_file'])
+        surface = read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)
-        frame_id = values['frame_id'].lstrip('/')
-        planned = plan(
-            surface,
-            self._of_brush(),
-            PlanRequest(
-                direction=values['direction'],
-                speed_m_per_s=values['speed_m_per_s'] or None,
-                target_um=values['target_um'] or None,
-                index_m=values['index_m'] or None,
-                standoff_m=values['standoff_m'] or None,
-                smoothing_radius_m=values['smoothing_radius_m'],
-                acceleration_m_per_s2=values['acceleration_m_per_s2'],
-                travel_rad=values['travel_rad'],
-                outward=tuple(values['outward']) or None,
-            ),
-            frame_id,
-            progress,
+        request = PlanRequest(
+            **{name: values[name] or None for name in PLANNED_IF_GIVEN},
+            **{name: values[name] for name in PLANNED},
+            outward=tuple(values['outward']) or None,
         )
+        frame_id = values['frame_id'].lstrip('/')
+        planned = plan(surface, self._of_brush(), request, frame_id, progress)
         self.get_logger().info(planned.sentence)
-        return planned
-
-    def _path_of(self, planned: Plan) -> Path:
-        return _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
+        path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
+        self._path_publisher.publish(path)
+        return planned, path
 
     # --- state
 
@@ -220,29 +195,25 @@ class IndexPlanner(PaintNode):
         return Status(self._last.level, self._last.message, values)
 
 
-def _or_nan(value: float | None) -> float:
-    return math.nan if value is None else float(value)
-
-
 def _fill(response: RecommendIndex.Response, answer: Recommendation) -> RecommendIndex.Response:
     response.success = True
     response.message = '; '.join([answer.sentence, *answer.notes])
     for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
         setattr(response, name, getattr(answer, name))
+    for name in ('tolerance', 'cycle_time_s'):
+        value = getattr(answer, name)
+        setattr(response, name, math.nan if value is None else value)
     response.index_range_m = list(answer.index_range_m)
-    response.tolerance = _or_nan(answer.tolerance)
     response.window_low_m = [low for low, _ in answer.windows_m]
     response.window_high_m = [high for _, high in answer.windows_m]
     response.minima_index_m = [minimum.index_m for minimum in answer.minima]
     response.minima_sigma_n = [minimum.sigma_n for minimum in answer.minima]
     response.passes = answer.passes or 0
-    response.cycle_time_s = _or_nan(answer.cycle_time_s)
     response.curve_index_m = answer.curve.index_m.tolist()
     response.curve_sigma_n = answer.curve.sigma_n.tolist()
-    index_drift = answer.index_drift_m or (math.nan, math.nan)
-    standoff_drift = answer.standoff_drift_m or (math.nan, math.nan)
-    response.index_drift_low_m, response.index_drift_high_m = index_drift
-    response.standoff_drift_low_m, response.standoff_drift_high_m = standoff_drift
+    none = math.nan, math.nan
+    response.index_drift_low_m, response.index_drift_high_m = answer.index_drift_m or none
+    response.standoff_drift_low_m, response.standoff_drift_high_m = answer.standoff_drift_m or none
     return response
 
 

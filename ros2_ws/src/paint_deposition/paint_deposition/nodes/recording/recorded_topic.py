@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -19,7 +18,8 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-from paint_deposition.nodes.runtime.messages import header_stamp_ns
+from paint_deposition.files.recordings.mcap_run import RunTopic
+from paint_deposition.nodes.runtime.messages import header_stamp_ns, message_class
 
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
@@ -32,7 +32,8 @@ class RecordedTopic:
     whose intervals say nothing.
 
     Attributes:
-        messages: that came. messages_before: the same in the runs before.
+        in_run: what the run says of the topic; name: the topic's.
+        messages: that came, in all runs.
         missed: that never arrived, by the jumps of the publishers' sequence numbers.
         unnumbered: messages that the middleware gave no number, whose losses nobody can count.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
@@ -40,25 +41,23 @@ class RecordedTopic:
     """
 
     def __init__(
-        self, node: Node, name: str, type_name: str, take: TakeMessage, max_gap_ns: int | None
-    ):
-        self.name = name
-        self.messages = self.messages_before = 0
+        self, node: Node, in_run: RunTopic, take: TakeMessage, max_gap_ns: int | None
+    ) -> None:
+        self.in_run, self.name = in_run, in_run.name
+        self.messages = 0
         self.count_from_zero()
         self._sequence: dict[bytes, int] = {}
         self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
-        package, kind, message = type_name.split('/')
-        self._message_class = getattr(importlib.import_module(f'{package}.{kind}'), message)
+        self._message_class = message_class(in_run.type)
         self._take = take
         self._max_gap_ns = max_gap_ns
         self._subscription: Subscription | None = None
 
     def count_from_zero(self) -> None:
         """Another run begins."""
-        self.messages_before += self.messages
-        self.messages = self.missed = self.unnumbered = self.gaps = 0
+        self.missed = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
 
     @property

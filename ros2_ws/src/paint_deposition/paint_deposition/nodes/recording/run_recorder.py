@@ -5,6 +5,7 @@ from __future__ import annotations
 import itertools
 import shutil
 import time
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -127,10 +128,8 @@ class RunRecorder(ManagedNode):
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
         # Topics of which the newest message holds until the next one, also in the next run.
-        self._newest_holds = {
-            self.resolve_topic_name(name)
-            for name in (PART_POSE, *(of_gun(gun, STATES) for gun in guns))
-        }
+        holding = (PART_POSE, *(of_gun(gun, STATES) for gun in guns))
+        self._newest_holds = set(map(self.resolve_topic_name, holding))
         self._in_force: dict[object, tuple[str, bytes, int]] = {}
         self._error: RecordingError | None = None
         self._progress = {
@@ -142,14 +141,16 @@ class RunRecorder(ManagedNode):
         self.offer('~/stop', self._stop)
 
     def _activate(self) -> None:
-        self.run = self._new_run(self._next_name(), self._notes)
+        name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        # One that this node has recorded by itself gets a date behind it.
+        name = _free_name(self._folder, name) if self.runs else name
+        self.run = self._new_run(name, self._notes)
         self.runs += 1
         self._part_run = ''
         self._topics: dict[str, RecordedTopic] = {}
-        self._run_topics: dict[str, RunTopic] = {}
         self._refused: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
-        self.create_steady_timer(FLUSH_PERIOD_S, self._flush)
+        self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 
@@ -158,16 +159,12 @@ class RunRecorder(ManagedNode):
         if self.values['name']:
             require_file_name('name', self.values['name'])
 
-    def _next_name(self) -> str:
-        """The run's name; one that this node has recorded by itself gets a date behind it."""
-        name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
-        if not self.runs:
-            return name
-        return _free_name(Path(self.values['output_directory']), name)
+    @property
+    def _folder(self) -> Path:
+        return Path(self.values['output_directory'])
 
     def _new_run(self, name: str, notes: dict[str, str]) -> RunWriter:
-        folder = Path(self.values['output_directory']) / name
-        return RunWriter(folder, notes, compression=self.values['compression'])
+        return RunWriter(self._folder / name, notes, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
         if self.runs and not self.run.complete:
@@ -191,18 +188,16 @@ class RunRecorder(ManagedNode):
         if len(types) > 1:
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
-        profile = accepting(
-            [publisher.qos_profile for publisher in publishers],
-            POSE_QUEUE_DEPTH if is_pose else QUEUE_DEPTH,
-        )
+        depth = POSE_QUEUE_DEPTH if is_pose else QUEUE_DEPTH
+        profile = accepting([publisher.qos_profile for publisher in publishers], depth)
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
             offered = [as_recorded(publisher.qos_profile) for publisher in publishers]
-            run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-            topic = RecordedTopic(self, name, types[0], self._write, max_gap_ns)
-            self._guarded(self.run.add_topic, run_topic)
-            self._topics[name], self._run_topics[name] = topic, run_topic
+            in_run = RunTopic(name, types[0], definitions.installed(types[0]), offered)
+            topic = RecordedTopic(self, in_run, self._write, max_gap_ns)
+            self._guarded(self.run.add_topic, in_run)
+            self._topics[name] = topic
         if topic.profile is None or weaker_policies(profile, topic.profile):
             topic.subscribe(profile)
 
@@ -236,7 +231,7 @@ class RunRecorder(ManagedNode):
         if self._error is not None or part.run == self._part_run:
             return
         try:
-            name = _free_name(Path(self.values['output_directory']), part.run)
+            name = _free_name(self._folder, part.run)
             following = self._new_run(name, _notes_on(part, self.values['model_file']))
             # The message overtakes others that wait; they belong to the part before.
             for recorded in self._topics.values():
@@ -245,20 +240,16 @@ class RunRecorder(ManagedNode):
             self.run.finish()
             self.get_logger().info(self.summary())
             self.run, self._part_run = following, part.run
-            for topic, run_topic in self._run_topics.items():
-                self._topics[topic].count_from_zero()
-                self.run.add_topic(run_topic)
-            for topic_name, cdr, sent_ns in self._in_force.values():
-                self.run.write(topic_name, cdr, log_time_ns, sent_ns)
+            for topic in self._topics.values():
+                topic.count_from_zero()
+                self.run.add_topic(topic.in_run)
+            for name, cdr, sent_ns in self._in_force.values():
+                self.run.write(name, cdr, log_time_ns, sent_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
             self._record_failure(error)
         except PaintError as error:
             self.get_logger().error(f'{self._part_topic}: {error}; the run continues')
-
-    def _flush(self) -> None:
-        if not self.run.complete:
-            self._guarded(self.run.close_old_chunk)
 
     def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
         """Write, unless writing has failed before; the first failure ends the recording."""
@@ -275,13 +266,12 @@ class RunRecorder(ManagedNode):
         self.fail(error)
 
     def _report_progress(self) -> None:
-        for name, publisher in self._progress.items():
-            topic = self._topics.get(name)
-            if topic is not None:
-                report = PoseProgress(reporter=self.get_fully_qualified_name())
-                report.poses_received = topic.messages_before + topic.messages
-                report.header = header('', topic.newest_stamp_ns)
-                publisher.publish(report)
+        reporter = self.get_fully_qualified_name()
+        for name in self._progress.keys() & self._topics.keys():
+            topic = self._topics[name]
+            report = PoseProgress(reporter=reporter, poses_received=topic.messages)
+            report.header = header('', topic.newest_stamp_ns)
+            self._progress[name].publish(report)
 
     # --- ending
 
@@ -307,13 +297,13 @@ class RunRecorder(ManagedNode):
     def summary(self) -> str:
         """What was recorded and what was lost, in a line."""
         topics = self._topics.values()
-        messages = sum(topic.messages for topic in topics)
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
+        messages = self.run.message_count
         return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
 
     def _tasks(self) -> Mapping[str, Task]:
@@ -330,26 +320,24 @@ class RunRecorder(ManagedNode):
                 self._record_failure(RecordingError(gone))
             return Status(ERROR, gone)
         topics = self._topics.values()
-        level, message = OK, 'recording'
-        if self._error is not None:
-            level, message = ERROR, str(self._error)
-        elif self._refused:
-            level, message = ERROR, f'not recorded: {" ".join(sorted(self._refused))}'
-        elif free < LOW_DISK_BYTES:
-            level, message = WARN, 'the disk is almost full'
-        elif any(topic.missed for topic in topics):
-            level, message = WARN, 'messages were missed'
+        counts, unnumbered = Counter(self.run.counts), sum(t.unnumbered for t in topics)
         values = {
             'run': self.run.folder,
-            'messages without a number, whose losses cannot be counted': sum(
-                topic.unnumbered for topic in topics
-            ),
+            'messages without a number, whose losses cannot be counted': unnumbered,
             'bytes': size,
             'disk free bytes': free,
             'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,
-            **{t.name: f'{t.messages} messages, {t.losses}, {t.gaps} gaps' for t in topics},
+            **{t.name: f'{counts[t.name]} messages, {t.losses}, {t.gaps} gaps' for t in topics},
         }
-        return Status(level, message, values)
+        if self._error is not None:
+            return Status(ERROR, str(self._error), values)
+        if self._refused:
+            return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
+        if free < LOW_DISK_BYTES:
+            return Status(WARN, 'the disk is almost full', values)
+        if any(topic.missed for topic in topics):
+            return Status(WARN, 'messages were missed', values)
+        return Status(OK, 'recording', values)
 
 
 def _notes_on(part: Part, model_file: str) -> dict[str, str]:

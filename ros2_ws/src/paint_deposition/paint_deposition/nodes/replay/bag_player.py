@@ -87,22 +87,17 @@ class BagPlayer(PaintNode):
         self.offer('~/resume', self._resume)
         self._stopped = threading.Event()
         self._awaited = self.values['wait_for_subscribers']
-        self._flow_control = FlowControl(
-            self, self._pose_publisher, self.values['window'], self._stopped
-        )
-        with open_bag(self.values['bag']) as bag:
-            self._transforms = ReplayedTransforms(self, bag)
-        self.poses_published = 0
-        self.states_published = 0
+        window = self.values['window']
+        self._flow_control = FlowControl(self, self._pose_publisher, window, self._stopped)
+        self.poses_published = self.states_published = 0
         self._diagnostics = Diagnostics(self, {'replay': self._status})
         self._thread = threading.Thread(target=self._replay, name='replay', daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         self._stop_thread()
-        self.get_logger().info(
-            f'replayed {self.poses_published} poses, {self.states_published} states'
-        )
+        replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
+        self.get_logger().info(replayed)
 
     def destroy_node(self) -> None:
         self._stop_thread()
@@ -117,6 +112,7 @@ class BagPlayer(PaintNode):
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
         with open_bag(values['bag']) as bag:
+            self._transforms = ReplayedTransforms(self, bag)
             self._poses_in_bag = choose_pose_topic(bag, values['pose_topic'])
             self._states_in_bag: BagTopic | None = None
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
@@ -126,8 +122,9 @@ class BagPlayer(PaintNode):
                     # Its log times only serve where the recorder's clock is the robot's.
                     read_trajectory(values['bag'], self._poses_in_bag.name, values['state_topic'])
             elif unused:
+                known = ' '.join(unused)
                 self.get_logger().info(
-                    f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
+                    f'no state_topic: the gun always sprays; the bag has {known}'
                 )
 
     # --- called by the executor
@@ -144,22 +141,16 @@ class BagPlayer(PaintNode):
 
     def _status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
-            return Status(
-                WARN,
-                'another node publishes /clock, too: nodes with use_sim_time see the time jump; '
-                'set publish_clock to false for one of them',
-            )
+            jumps = 'another node publishes /clock, too: nodes with use_sim_time see the time jump'
+            return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
         doing = self._flow_control.doing if self._time.running else 'paused'
-        return Status(
-            WARN if doing.startswith('waiting') else OK,
-            doing,
-            {
-                'bag': self.values['bag'],
-                'poses published': self.poses_published,
-                'states published': self.states_published,
-                'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
-            },
-        )
+        values = {
+            'bag': self.values['bag'],
+            'poses published': self.poses_published,
+            'states published': self.states_published,
+            'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
+        }
+        return Status(WARN if doing.startswith('waiting') else OK, doing, values)
 
     # --- the replay's own thread
 
@@ -185,13 +176,13 @@ class BagPlayer(PaintNode):
                     self._time.stand_at(message.log_time_ns)
                     self._flow_control.wait_for_subscribers(self._awaited)
                     self._awaited = 0  # in further rounds
-                    self._time.start()
+                    self._time.begin()
                 self._wait_for_turn(message.log_time_ns)
                 if self._stopped.is_set():
                     return
                 self._time.reach(message.log_time_ns)
                 self._publish(message)
-        self._time.stop()
+        self._time.end()
         self._publish_clock()
 
     def _wait_for_turn(self, log_time_ns: int) -> None:

@@ -32,7 +32,12 @@ REMEMBERED = 20_000
 
 
 @dataclass
-class _Subscriber:
+class Subscriber:
+    """Poses taken, when the last of them was, and when it last reported.
+
+    `lost` poses never reached it; one that is `unheard` has never reported and is not waited for.
+    """
+
     taken: int
     advanced_s: float
     reported_s: float | None = None
@@ -47,6 +52,9 @@ class PoseWindow:
     published after. Its reports name the newest pose it took by stamp: what was lost before that
     one does not matter any more. All times are monotonic seconds. Safe to use from several
     threads.
+
+    Attributes:
+        subscribers: those that are there, by name.
     """
 
     def __init__(self) -> None:
@@ -54,7 +62,7 @@ class PoseWindow:
         self._published = 0
         self._published_s = 0.0
         self._stamps: deque[int] = deque(maxlen=REMEMBERED)
-        self._subscribers: dict[str, _Subscriber] = {}
+        self.subscribers: dict[str, Subscriber] = {}
 
     def publish(self, stamp_ns: int, now_s: float) -> None:
         """Note that the pose of this stamp was sent."""
@@ -66,9 +74,9 @@ class PoseWindow:
     def present(self, names: Iterable[str], now_s: float) -> None:
         """Note which subscribers are there now: others are no longer waited for."""
         with self._lock:
-            known = self._subscribers
-            self._subscribers = {
-                name: known.get(name) or _Subscriber(self._published, now_s)
+            known = self.subscribers
+            self.subscribers = {
+                name: known.get(name) or Subscriber(self._published, now_s)
                 for name in sorted(names)
             }
 
@@ -78,38 +86,24 @@ class PoseWindow:
             # Of equal stamps the newest pose is meant.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
             taken = 0 if back is None else self._published - back
-            for known, subscriber in self._subscribers.items():
+            for known, subscriber in self.subscribers.items():
                 if name in (None, known):
                     subscriber.reported_s, subscriber.unheard = now_s, False
                     if taken > subscriber.taken:
                         subscriber.taken, subscriber.advanced_s = taken, now_s
 
-    def ahead(self, now_s: float) -> int:
-        """Poses that the slowest subscriber has not taken yet."""
+    def behind(self, now_s: float) -> dict[str, int]:
+        """Poses that subscribers have not taken yet, of those that are waited for."""
         with self._lock:
-            for subscriber in self._subscribers.values():
+            waited_for = {}
+            for name, subscriber in self.subscribers.items():
                 if subscriber.taken < self._published:
                     self._drop_hopeless(subscriber, now_s)
-            return self._published - self._least_taken()
+                if subscriber.taken < self._published and not subscriber.unheard:
+                    waited_for[name] = self._published - subscriber.taken
+            return waited_for
 
-    def slowest(self) -> list[str]:
-        """The subscribers that are furthest behind."""
-        with self._lock:
-            least = self._least_taken()
-            behind = least < self._published
-            return [name for name, s in self._subscribers.items() if behind and s.taken == least]
-
-    def unheard(self) -> list[str]:
-        """Subscribers that are not waited for because they have never reported."""
-        with self._lock:
-            return [name for name, s in self._subscribers.items() if s.unheard]
-
-    def lost(self) -> dict[str, int]:
-        """Poses that never reached a subscriber, by its name."""
-        with self._lock:
-            return {name: s.lost for name, s in self._subscribers.items() if s.lost}
-
-    def _drop_hopeless(self, subscriber: _Subscriber, now_s: float) -> None:
+    def _drop_hopeless(self, subscriber: Subscriber, now_s: float) -> None:
         quiet_since_s = max(self._published_s, subscriber.advanced_s)
         if subscriber.reported_s is None:
             subscriber.unheard |= now_s - quiet_since_s > UNHEARD_AFTER_S
@@ -120,10 +114,6 @@ class PoseWindow:
         ):
             subscriber.lost += self._published - subscriber.taken
             subscriber.taken = self._published
-
-    def _least_taken(self) -> int:
-        heard = (s.taken for s in self._subscribers.values() if not s.unheard)
-        return min(heard, default=self._published)
 
 
 class FlowControl:
@@ -136,10 +126,8 @@ class FlowControl:
     """
 
     def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
-        self._node = node
-        self._publisher = publisher
-        self._limit = window
-        self._stopped = stopped
+        self._node, self._publisher = node, publisher
+        self._limit, self._stopped = window, stopped
         self._window = PoseWindow()
         self._sent = 0
         self._looked_s = -math.inf
@@ -150,7 +138,7 @@ class FlowControl:
     @property
     def poses_ahead(self) -> int:
         """Poses that the slowest reporting subscriber has not taken yet."""
-        return self._window.ahead(time.monotonic())
+        return max(self._window.behind(time.monotonic()).values(), default=0)
 
     def sent(self, pose_stamp_ns: int) -> None:
         """Note a pose that is about to be published."""
@@ -188,8 +176,9 @@ class FlowControl:
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
-        for name, count in self._window.lost().items():
-            self._node.get_logger().warning(f'{name} never got {count} poses')
+        for name, subscriber in self._window.subscribers.items():
+            if subscriber.lost:
+                self._node.get_logger().warning(f'{name} never got {subscriber.lost} poses')
 
     def _wait_until_ahead_is_less_than(self, limit: int) -> None:
         notice_s = time.monotonic()
@@ -197,9 +186,10 @@ class FlowControl:
             now_s = time.monotonic()
             if now_s - self._looked_s > GRAPH_PERIOD_S:
                 self._look_around()
-            if self.poses_ahead < limit:
+            behind = self._window.behind(now_s)
+            if max(behind.values(), default=0) < limit:
                 break
-            unheard = set(self._window.unheard())
+            unheard = {name for name, s in self._window.subscribers.items() if s.unheard}
             for name in unheard - self._unheard:
                 self._node.get_logger().warning(
                     f'{name} has never reported its progress: it is no longer waited for, and '
@@ -208,8 +198,8 @@ class FlowControl:
             self._unheard = unheard
             if now_s - notice_s > NOTICE_PERIOD_S:
                 notice_s = now_s
-                slowest = ' '.join(self._window.slowest())
-                self._notice(f'waiting for {slowest}, {self.poses_ahead} poses behind')
+                late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
+                self._notice(f'waiting for {late}')
             self._stopped.wait(0.001)
         self.doing = 'playing'
 
@@ -225,9 +215,8 @@ class FlowControl:
         """Full names of the nodes that take the poses and can report progress."""
         self._looked_s = time.monotonic()
         takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        reporters = self._node.get_publishers_info_by_topic(
-            self._node.resolve_topic_name(PROGRESS_TOPIC)
-        )
+        progress = self._node.resolve_topic_name(PROGRESS_TOPIC)
+        reporters = self._node.get_publishers_info_by_topic(progress)
         names = frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, reporters))
         self._window.present(names, self._looked_s)
         return names

@@ -10,8 +10,8 @@ import time
 class ReplayClock:
     """Bag time as a function of the steady clock; safe to use from several threads.
 
-    `rate` is bag seconds for one second; 0: time jumps from message to message. `running` is False
-    while paused.
+    It stands until it has begun, and while paused. `rate` is bag seconds for one second; 0: time
+    jumps from message to message. `running` is False while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -19,44 +19,39 @@ class ReplayClock:
         self._changed = threading.Condition()
         self._time_ns: int | None = None
         self._since_s: float | None = None  # when it was _time_ns; None while time stands still
-        self._started = False
+        self._begun = False
         self.running = running
 
     @property
     def time_ns(self) -> int | None:
         """Time in the bag now [ns], None before it is known."""
         with self._changed:
-            return self._now_ns()
+            if self._since_s is None or self._time_ns is None:
+                return self._time_ns
+            passed_s = time.monotonic() - self._since_s
+            return self._time_ns + round(passed_s * self._rate * 1e9)
 
     def stand_at(self, time_ns: int) -> None:
-        """Stand still at this time until `start`."""
+        """Stand still at this time until `begin`."""
         with self._changed:
-            self._time_ns, self._since_s, self._started = time_ns, None, False
+            self._set(begun=False, running=self.running)
+            self._time_ns = time_ns
 
-    def start(self) -> None:
+    def begin(self) -> None:
         """Let time run from where it stands, as soon as it is not paused."""
-        with self._changed:
-            self._started = True
-            self._run_on()
+        self._set(begun=True, running=self.running)
 
-    def stop(self) -> None:
+    def end(self) -> None:
         """Stand still from now on."""
-        with self._changed:
-            self._stand_still()
-            self._started = False
+        self._set(begun=False, running=self.running)
 
     def pause(self) -> None:
         """Stand still until `resume`."""
-        with self._changed:
-            self._stand_still()
-            self.running = False
+        self._set(begun=self._begun, running=False)
 
     def resume(self) -> None:
         """End a `pause`."""
-        with self._changed:
-            self.running = True
-            self._run_on()
-            self._changed.notify_all()
+        self._set(begun=self._begun, running=True)
 
     def reach(self, time_ns: int) -> None:
         """At rate 0: jump to the time of a message."""
@@ -84,15 +79,8 @@ class ReplayClock:
         passed_s = time.monotonic() - self._since_s
         return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
 
-    def _now_ns(self) -> int | None:
-        if self._since_s is None or self._time_ns is None:
-            return self._time_ns
-        passed_s = time.monotonic() - self._since_s
-        return self._time_ns + round(passed_s * self._rate * 1e9)
-
-    def _stand_still(self) -> None:
-        self._time_ns, self._since_s = self._now_ns(), None
-
-    def _run_on(self) -> None:
-        if self._started and self.running and self._rate and self._since_s is None:
-            self._since_s = time.monotonic()
+    def _set(self, begun: bool, running: bool) -> None:
+        with self._changed:
+            self._time_ns, self._begun, self.running = self.time_ns, begun, running
+            self._since_s = time.monotonic() if begun and running and self._rate else None
+            self._changed.notify_all()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Bool
+from std_msgs.msg import Bool, Header
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
@@ -30,6 +30,8 @@ from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 TF_DEPTH = 100
+STATE_FIELDS = AtomizerState.get_fields_and_field_types()
+DOUBLES = [name for name, kind in STATE_FIELDS.items() if kind == 'double']
 
 
 class ReplayMessage(NamedTuple):
@@ -64,33 +66,27 @@ def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage]
     if bag.type_hash(states) == definitions.installed(STATE_TYPE).type_hash:
         return lambda message: message.cdr
     # Recorded with another version of the message: fields of the same name are taken over.
-    return lambda message: serialize_message(_state_of(bag.decode(message)))
+    return lambda message: _state_of(bag.decode(message))
 
 
 def _state_of_bool(message: RawMessage) -> bytes:
     spraying = deserialize_message(message.cdr, Bool).data
-    return serialize_message(
-        AtomizerState(
-            header=header('', message.log_time_ns),
-            spraying=spraying,
-            flow=relative_flow(spraying),
-            shaping_air_l_per_min=math.nan,
-            bell_speed_rpm=math.nan,
-            voltage_kv=math.nan,
-            flow_cm3_per_min=math.nan,
-            programmed_speed_m_per_s=math.nan,
-        )
-    )
+    return _state(header('', message.log_time_ns), spraying, {'flow': relative_flow(spraying)})
 
 
-def _state_of(recorded: Any) -> AtomizerState:
-    state = AtomizerState(header=header(recorded.header.frame_id, stamp_ns(recorded.header)))
-    for name, kind in AtomizerState.get_fields_and_field_types().items():
-        if kind == 'double':
-            setattr(state, name, float(getattr(recorded, name, math.nan)))
-    state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-    state.spraying = bool(recorded.spraying)
-    return state
+def _state_of(recorded: Any) -> bytes:
+    known = {name: float(getattr(recorded, name)) for name in DOUBLES if hasattr(recorded, name)}
+    at = header(recorded.header.frame_id, stamp_ns(recorded.header))
+    brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
+    return _state(at, bool(recorded.spraying), known, brush)
+
+
+def _state(
+    at: Header, spraying: bool, known: Mapping[str, float], brush: int = ONLY_BRUSH
+) -> bytes:
+    """A serialised state; what is not known is NaN."""
+    doubles = dict.fromkeys(DOUBLES, math.nan) | dict(known)
+    return serialize_message(AtomizerState(header=at, spraying=spraying, brush=brush, **doubles))
 
 
 class ReplayedTransforms:
@@ -120,11 +116,9 @@ class ReplayedTransforms:
         self._message = TFMessage
         for static in (False, True):
             durability = DurabilityPolicy.TRANSIENT_LOCAL if static else DurabilityPolicy.VOLATILE
-            self._publishers[static] = node.create_publisher(
-                TFMessage,
-                f'/{STATIC}' if static else '/tf',
-                QoSProfile(depth=TF_DEPTH, durability=durability),
-            )
+            profile = QoSProfile(depth=TF_DEPTH, durability=durability)
+            topic = f'/{STATIC}' if static else '/tf'
+            self._publishers[static] = node.create_publisher(TFMessage, topic, profile)
 
     def publish(self, message: RawMessage) -> None:
         """Publish a message of one of the topics."""

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import importlib
 import math
 from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.time import Time
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
@@ -21,6 +20,7 @@ from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, JointPoses, TfPoses
+from paint_deposition.nodes.runtime.messages import header, message_class
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH, accepting
@@ -90,18 +90,15 @@ class AtomizerSource(PaintNode):
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
         # The joints and the signals that have no publisher yet.
-        self._missing: dict[str, TakeMessage] = {}
+        self._missing = {signal.topic: self._take_signals for signal in self._signals.values()}
         self._motion = self._motion_of_robot()
-        for signal in self._signals.values():
-            self._missing[signal.topic] = self._take_signals
         self._values: dict[str, float] = {}
-        self._published: tuple[bool, float, int, float | None] | None = None
+        self._published = ''
         self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
         self._find_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._find_topics)
-        tasks = {'robot': self._robot_status, 'signals': self._signals_status}
-        self._diagnostics = Diagnostics(self, tasks)
+        Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
 
     def _check(self, values: Mapping[str, Any]) -> None:
         if not values['urdf_file'] and not values['base_link']:
@@ -141,13 +138,9 @@ class AtomizerSource(PaintNode):
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
             self._clock_offset_s = (sent_ns - stamp) * 1e-9
-        x, y, z, qx, qy, qz, qw = (tip @ self._tcp).values
-        pose = PoseStamped()
-        pose.header.frame_id = self._motion.base
-        pose.header.stamp = Time(nanoseconds=stamp).to_msg()
+        pose = PoseStamped(header=header(self._motion.base, stamp))
         p, q = pose.pose.position, pose.pose.orientation
-        p.x, p.y, p.z = x, y, z
-        q.x, q.y, q.z, q.w = qx, qy, qz, qw
+        p.x, p.y, p.z, q.x, q.y, q.z, q.w = (tip @ self._tcp).values
         self._pose_publisher.publish(pose)
         self._poses += 1
 
@@ -158,10 +151,9 @@ class AtomizerSource(PaintNode):
         for topic, take in tuple(self._missing.items()):
             found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
             if found:
-                package, kind, name = found[0].topic_type.split('/')
-                message = getattr(importlib.import_module(f'{package}.{kind}'), name)
+                message = message_class(found[0].topic_type)
                 profile = accepting([info.qos_profile for info in found], QUEUE_DEPTH)
-                self.create_subscription(message, topic, _with_topic(take, topic), profile)
+                self.create_subscription(message, topic, partial(take, topic), profile)
                 del self._missing[topic]
         if not self._missing:
             self._find_timer.cancel()
@@ -175,10 +167,8 @@ class AtomizerSource(PaintNode):
                 continue
             value = signal.value(message)
             if value is None:
-                self._problem = (
-                    f'{topic}: {type(message).__name__} has no number or Bool at '
-                    f'{signal.path or ".data"}'
-                )
+                kind, path = type(message).__name__, signal.path or '.data'
+                self._problem = f'{topic}: {kind} has no number or Bool at {path}'
             elif not stamp and abs(self._clock_offset_s) > MAX_CLOCK_OFFSET_S:
                 self._problem = (
                     f'{topic} has no stamps, and the poses of the robot are sent '
@@ -194,29 +184,25 @@ class AtomizerSource(PaintNode):
         """Publish the state from this time on, if it is known and has changed."""
         if self._signals.keys() - self._values.keys():
             return
-        on = bool(self._signals['trigger'].is_on(self._values['trigger']))
         full = self.values['calibrated_flow']
-        flow = self._values['flow'] / full if 'flow' in self._values else 1.0
-        brush = int(self._values.get('brush', ONLY_BRUSH))
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
-        new = on, flow, brush, speed if 'speed' in self._values else None
-        if new == self._published:
-            return
-        self._published = new
-        state = AtomizerState(spraying=on, flow=flow, brush=brush, programmed_speed_m_per_s=speed)
-        state.header.frame_id = self._motion.base
-        state.header.stamp = Time(nanoseconds=stamp).to_msg()
-        self._state_publisher.publish(state)
+        state = AtomizerState(
+            spraying=bool(self._signals['trigger'].is_on(self._values['trigger'])),
+            flow=self._values.get('flow', full) / full,
+            brush=int(self._values.get('brush', ONLY_BRUSH)),
+            programmed_speed_m_per_s=speed,
+        )
+        if str(state) != self._published:  # NaN does not equal itself
+            self._published = str(state)
+            state.header = header(self._motion.base, stamp)
+            self._state_publisher.publish(state)
 
     # --- health
 
     def _robot_status(self) -> Status:
         found = self._motion.status()
-        values = {
-            'poses': f"of '{self._motion.tip}' in '{self._motion.base}'",
-            'published': self._poses,
-            **found.values,
-        }
+        poses = f"of '{self._motion.tip}' in '{self._motion.base}'"
+        values = {'poses': poses, 'published': self._poses, **found.values}
         return Status(found.level, found.message, values)
 
     def _signals_status(self) -> Status:
@@ -230,11 +216,3 @@ class AtomizerSource(PaintNode):
         if missing:
             return Status(WARN, f'not heard: {" ".join(missing)}', values)
         return Status(OK, 'following the signals' if values else 'no signal is named', values)
-
-
-def _with_topic(take: TakeMessage, topic: str) -> Callable[[Any, Mapping[str, Any]], None]:
-    # rclpy counts the arguments of a callback: two are the message and what is said of it.
-    def on_message(message: Any, info: Mapping[str, Any]) -> None:
-        take(topic, message, info)
-
-    return on_message

@@ -34,9 +34,7 @@ class JointPoses:
 
     def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
         self.base, self.tip = robot.base, robot.tip
-        self._robot = robot
-        self._topic = topic
-        self._take_pose = take_pose
+        self._robot, self._topic, self._take_pose = robot, topic, take_pose
         self._poses = self._incomplete = 0
         self._heard_s = time.monotonic()
 
@@ -55,10 +53,7 @@ class JointPoses:
 
     def status(self) -> Status:
         """Whether joint states come, and have all joints."""
-        values = {
-            'robot': self._robot.path,
-            'joint states without all joints': self._incomplete,
-        }
+        values = {'robot': self._robot.path, 'joint states without all joints': self._incomplete}
         if self._incomplete and not self._poses:
             joints = ' '.join(self._robot.moving)
             return Status(ERROR, f'no joint state has all of {joints}', values)

@@ -20,11 +20,6 @@ MANAGED = fixed(
     ),
 )
 ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
-WAITS = {
-    'unconfigured': 'unconfigured: nothing is read yet',
-    'inactive': 'inactive: ready, and waits to be activated',
-    'finalized': 'finalized: it can only be ended',
-}
 
 
 class ManagedNode(LifecycleNodeMixin, PaintNode):
@@ -38,6 +33,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     PARAMETERS: ParameterTable = MANAGED
     # Whether it is just being configured and activated by itself.
     starts_itself = False
+    _failure: Exception | None = None
 
     def __init__(self, name: str, **kwargs: Any):
         # What was there before it was configured, and before it was activated.
@@ -47,7 +43,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def _begin(self) -> None:
         LifecycleNodeMixin.__init__(self)
-        self._failure: Exception | None = None
         self._health = Diagnostics(self, {'state': self._state_status})
         self.starts_itself = self.values['autostart']
         if not self.starts_itself:
@@ -117,13 +112,15 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _set_up(self) -> None:
         self._load()
         self._configure()
-        self._health.show({**self._tasks(), 'state': self._state_status})
+        self._health.tasks = {**self._tasks(), 'state': self._state_status}
 
     def _clean_up(self) -> None:
         try:
             self._cleanup()
         finally:
-            self._health.show_only('state', 'the node is not configured')
+            # An aggregator takes a status that is no longer sent for that of a node that is gone.
+            for task in self._health.tasks.keys() - {'state'}:
+                self._health.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
     def _outcome(self, done: str, transition: Callable[[], None]) -> TransitionCallbackReturn:
         self._failure = None
@@ -140,7 +137,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _lead_on(self, step: Callable[[], None]) -> None:
-        self._before.append(self._entities())
+        kinds = (getattr(self, f'{kind}s') for kind in ENTITIES)
+        self._before.append({entity for entities in kinds for entity in entities})
         try:
             step()
         except BaseException:
@@ -153,9 +151,6 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         finally:
             self._destroy_new()
 
-    def _entities(self) -> set[Any]:
-        return {entity for kind in ENTITIES for entity in getattr(self, f'{kind}s')}
-
     def _destroy_new(self) -> None:
         before = self._before.pop()
         for kind in ENTITIES:
@@ -166,7 +161,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         label = self._state_machine.current_state[1]
         if self._failure is not None:
             return Status(ERROR, f'{label}: {_in_words(self._failure)}')
-        return Status(OK, WAITS.get(label, label))
+        return Status(OK, label)
 
 
 def _in_words(error: Exception) -> str:

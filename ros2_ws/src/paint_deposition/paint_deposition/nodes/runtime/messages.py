@@ -6,6 +6,7 @@ once, and for each publication only its stamp and colours are rewritten in the b
 
 from __future__ import annotations
 
+import importlib
 import struct
 
 import numpy as np
@@ -26,6 +27,12 @@ SAMPLE_COLOURS = np.array(
 
 def header(frame_id: str, stamp_ns: int) -> Header:
     return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
+
+
+def message_class(type_name: str) -> type:
+    """The class of a type as ROS names it: std_msgs/msg/Bool."""
+    package, kind, name = type_name.split('/')
+    return getattr(importlib.import_module(f'{package}.{kind}'), name)
 
 
 def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marker:

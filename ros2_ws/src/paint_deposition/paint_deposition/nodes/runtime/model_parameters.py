@@ -43,12 +43,9 @@ def read_chosen_model(
     """
     if not values['model_file']:
         return DepositionModel()
-    return read_model(values['model_file'], effect_loader(values, load))
-
-
-def effect_loader(values: Mapping[str, Any], load: LoadEffect = load_effect_file) -> LoadEffect:
-    """What reads the effect files of a model, or refuses them."""
-    return load if values['allow_user_effects'] else _refuse_effect_file
+    return read_model(
+        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
+    )
 
 
 def read_chosen_models(
@@ -63,10 +60,10 @@ def read_chosen_models(
     if not files:
         return (read_chosen_model(values, load),) * len(guns)
     if len(files) != len(guns) or values['model_file']:
+        another = ' and model_file another' if values['model_file'] else ''
         raise PaintError(
-            f'model_files names {len(files)} models for {len(guns)} atomizers'
-            f'{" and model_file another" if values["model_file"] else ""}: give model_file for '
-            'all, or model_files one for each of atomizers'
+            f'model_files names {len(files)} models for {len(guns)} atomizers{another}: give '
+            'model_file for all, or model_files one for each of atomizers'
         )
     models = tuple(read_chosen_model({**values, 'model_file': file}, load) for file in files)
     require_one_finish(dict(zip(guns, models, strict=True)))

@@ -134,12 +134,11 @@ class PaintNode(Node):
         self, parameter_list: list[Parameter[Any]]
     ) -> SetParametersResult:
         """Refuse to change what is fixed with the reason, which rclpy leaves out."""
-        for change in parameter_list:
-            row = self.PARAMETERS.get(change.name)
-            if row and row.fixed_because and self._is_fixed(change.name, row):
-                state, why = row.fixed_while, row.fixed_because
-                reason = f'{change.name} cannot change while the node {state}: {why}'
-                return SetParametersResult(successful=False, reason=reason)
+        for name in (change.name for change in parameter_list):
+            row = self.PARAMETERS.get(name)
+            if row and row.fixed_because and self._is_fixed(name, row):
+                reason = f'{name} cannot change while the node {row.fixed_while}: '
+                return SetParametersResult(successful=False, reason=reason + row.fixed_because)
         return super().set_parameters_atomically(parameter_list)
 
     def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:
@@ -163,10 +162,9 @@ class PaintNode(Node):
         return SetParametersResult(successful=True)
 
     def _apply_changes(self, changes: list[Parameter]) -> None:
-        new = {change.name: change.value for change in changes}
-        self.values |= new
+        self.values |= {change.name: change.value for change in changes}
         if self.configured:
-            self._changed(set(new))
+            self._changed({change.name for change in changes})
 
 
 @dataclass(frozen=True)
@@ -184,45 +182,31 @@ Task = Callable[[], Status]
 class Diagnostics:
     """Publishes the status of every task of a node on /diagnostics.
 
-    `tasks` maps a task's name to the function that gives its `Status` each period. The
-    period runs on the steady clock: a simulated clock that stands still must not silence it.
+    `tasks`, which may change, maps a task's name to the function that gives its `Status` each
+    period of the steady clock: a simulated clock that stands still must not silence it.
     """
 
     def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
         self._node = node
-        self._tasks = dict(tasks)
+        self.tasks = dict(tasks)
         self._publisher = node.create_publisher(
             DiagnosticArray, '/diagnostics', topics.DIAGNOSTICS
         )
-        self._timer = node.create_steady_timer(period_s, self.publish)
-
-    def show(self, tasks: Mapping[str, Task]) -> None:
-        """Report these tasks from now on."""
-        self._tasks = dict(tasks)
-
-    def show_only(self, name: str, why: str) -> None:
-        """Report this task alone, and why the others have nothing to report.
-
-        An aggregator takes a status that is no longer sent for that of a node that is gone.
-        """
-        for other in self._tasks.keys() - {name}:
-            self._tasks[other] = lambda: Status(OK, why)
+        node.create_steady_timer(period_s, self.publish)
 
     def publish(self) -> None:
         message = DiagnosticArray()
         message.header.stamp = self._node.get_clock().now().to_msg()
         full_name = self._node.get_fully_qualified_name()
-        for name, task in self._tasks.items():
-            status = task()
+        for name, status_of in self.tasks.items():
+            status = status_of()
             values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            # With the namespace: an aggregator distinguishes two cells by it.
+            task = f'{full_name.lstrip("/")}: {name}'
             message.status.append(
                 DiagnosticStatus(
-                    level=status.level,
-                    # With the namespace: an aggregator distinguishes two cells by it.
-                    name=f'{full_name.lstrip("/")}: {name}',
-                    message=status.message,
-                    hardware_id=full_name,
-                    values=values,
+                    level=status.level, name=task, message=status.message,
+                    hardware_id=full_name, values=values,
                 )
-            )
+            )  # fmt: skip
         self._publisher.publish(message)

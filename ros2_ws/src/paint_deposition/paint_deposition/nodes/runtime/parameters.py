@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,7 +15,6 @@ from rcl_interfaces.msg import (
     ParameterDescriptor,
     SetParametersResult,
 )
-from rclpy.exceptions import ParameterException
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
@@ -26,6 +25,7 @@ INT64_MAX = 2**63 - 1
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 RESERVED_PREFIX = 'qos_overrides.'
+RUNS = 'runs'
 FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
 FILE_NAME_WORDS = "letters, digits, '-', '_' and '.', the last not in front"
 TYPE_WORDS = {
@@ -46,8 +46,7 @@ class NodeParameter:
     an empty list has none. `description` ends with the unit; where that is `[path]`, a `~` in
     front of the value is the home folder, as in a shell. `bounds` are inclusive, the upper one
     may be infinite. `constraints` is the plain English of what `allows` (value -> bool) checks
-    beyond them. `fixed_because` makes the parameter read-only and says why it cannot change at
-    run time; with `read_to_configure` it can while a managed node is not configured.
+    beyond them. `fixed_because` says why it cannot change in the states of `fixed_while`.
     """
 
     default: bool | int | float | str | list
@@ -58,17 +57,12 @@ class NodeParameter:
     allows: Callable[[Any], bool] | None = None
     element: type | None = None
     fixed_because: str = ''
-    read_to_configure: bool = False
+    fixed_while: str = RUNS
 
     @property
     def is_read_only(self) -> bool:
         """Whether it cannot change in any state of the node."""
-        return bool(self.fixed_because) and not self.read_to_configure
-
-    @property
-    def fixed_while(self) -> str:
-        """The states in which it cannot change."""
-        return 'is configured' if self.read_to_configure else 'runs'
+        return bool(self.fixed_because) and self.fixed_while == RUNS
 
     @property
     def ros_type(self) -> Parameter.Type:
@@ -87,11 +81,11 @@ class NodeParameter:
             additional_constraints='; '.join(filter(None, texts)),
             read_only=self.is_read_only,
         )
+        low, high = self.bounds or (0, 0)
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:
-            least, most = (int(min(bound, INT64_MAX)) for bound in self.bounds)
-            descriptor.integer_range = [IntegerRange(from_value=least, to_value=most)]
+            most = int(min(high, INT64_MAX))
+            descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=most)]
         elif self.bounds:
-            low, high = self.bounds
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         return descriptor
 
@@ -100,22 +94,24 @@ class NodeParameter:
 
         No shell has expanded the `~` of a path in a parameter file or behind `:=`.
         """
-        if value is None and isinstance(self.default, list):
-            return []
-        if self.description.endswith('[path]') and isinstance(value, str):
+        if isinstance(self.default, list) and not isinstance(value, (str, int, float)):
+            return [self._coerced_item(item) for item in value or []]
+        return self._coerced_item(value)
+
+    def _coerced_item(self, value: Any) -> Any:
+        if isinstance(value, str) and self.description.endswith('[path]'):
             return os.path.expanduser(value)
-        if self.description.endswith('[path]') and isinstance(value, Sequence):
-            return [os.path.expanduser(path) for path in value]
-        if self.ros_type == Parameter.Type.DOUBLE and type(value) is int:
-            return float(value)
-        if self.ros_type == Parameter.Type.DOUBLE_ARRAY and isinstance(value, Sequence):
-            return [float(item) if type(item) is int else item for item in value]
-        return value
+        is_double = self.ros_type in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY)
+        return float(value) if is_double and type(value) is int else value
 
     def refusal(self, value: Any) -> str | None:
-        """Why `value` is not acceptable, or None; type and bounds are rclpy's part."""
+        """Why a `value` of its type is not acceptable, or None."""
         if isinstance(value, float) and not math.isfinite(value):
             return f'is {value}: give a finite number'
+        if self.bounds and not self.bounds[0] <= value <= self.bounds[1]:
+            low, high = self.bounds
+            upper = f' and at most {high}' if math.isfinite(high) else ''
+            return f'is {value}: must be at least {low}{upper}'
         if self.choices and value not in self.choices:
             return f'is {value!r}: choose one of {", ".join(self.choices)}'
         if self.allows is not None and not self.allows(value):
@@ -175,17 +171,15 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
     }
 
 
-def fixed(because: str, **rows: NodeParameter) -> ParameterTable:
+def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> ParameterTable:
     """The same rows, none of which can change while the node runs, with the reason."""
-    return {name: replace(row, fixed_because=because) for name, row in rows.items()}
+    reason = {'fixed_because': because, 'fixed_while': fixed_while}
+    return {name: replace(row, **reason) for name, row in rows.items()}
 
 
 def read_to_configure(because: str, **rows: NodeParameter) -> ParameterTable:
     """The same rows, which can change only while a managed node is not configured."""
-    return {
-        name: replace(row, fixed_because=because, read_to_configure=True)
-        for name, row in rows.items()
-    }
+    return fixed(because, 'is configured', **rows)
 
 
 def _is_direction(value: list[float]) -> bool:
@@ -205,7 +199,9 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
         if name not in {*table, *RESERVED_NAMES} and not name.startswith(RESERVED_PREFIX):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
-    node.add_pre_set_parameters_callback(lambda changes: _as_meant(table, changes))
+    node.add_pre_set_parameters_callback(
+        lambda changes: [_as_meant(table.get(change.name), change) for change in changes]
+    )
     node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
     for name, row in table.items():
         _declare(node, name, row, row.coerced(overrides.get(name, row.default)))
@@ -213,25 +209,14 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
 
 
 def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
-    empty_list = isinstance(value, list) and not value
-    if not empty_list and Parameter.Type.from_parameter_value(value) != row.ros_type:
-        expected = TYPE_WORDS[row.ros_type]
-        raise PaintError(f'{node.get_name()}: {name} is {value!r}: give {expected}')
-    try:
-        if empty_list:
-            _declare_empty_list(node, name, row)
-        else:
-            node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
-    except ParameterException:
-        reason = row.refusal(value)
-        if reason is None and row.bounds:
-            low, high = row.bounds
-            upper = f' and at most {high}' if math.isfinite(high) else ''
-            reason = f'is {value}: must be at least {low}{upper}'
-        raise PaintError(f'{node.get_name()}: {name} {reason}') from None
-
-
-def _declare_empty_list(node: Node, name: str, row: NodeParameter) -> None:
+    reason = None
+    if value != [] and Parameter.Type.from_parameter_value(value) != row.ros_type:
+        reason = f'is {value!r}: give {TYPE_WORDS[row.ros_type]}'
+    if reason := reason or row.refusal(value):
+        raise PaintError(f'{node.get_name()}: {name} {reason}')
+    if value != []:
+        node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
+        return
     # rclpy takes an empty list for bytes unless the type is declared first and the value set then.
     writable = row.descriptor()
     writable.read_only = False
@@ -240,20 +225,14 @@ def _declare_empty_list(node: Node, name: str, row: NodeParameter) -> None:
     node.set_descriptor(name, row.descriptor())
 
 
-def _as_meant(table: ParameterTable, changes: list[Parameter]) -> list[Parameter]:
-    """The changes as their rows mean them; the command line takes an empty list for any kind."""
-    return [
-        Parameter(change.name, table[change.name].ros_type, [])
-        if change.name in table and _is_empty_list(change.value)
-        else Parameter(change.name, change.type_, table[change.name].coerced(change.value))
-        if change.name in table and table[change.name].description.endswith('[path]')
-        else change
-        for change in changes
-    ]
-
-
-def _is_empty_list(value: Any) -> bool:
-    return isinstance(value, Sequence) and not isinstance(value, str) and not len(value)
+def _as_meant(row: NodeParameter | None, change: Parameter) -> Parameter:
+    """The change as its row means it; the command line takes an empty list for any kind."""
+    if row is None:
+        return change
+    value = row.coerced(change.value)
+    if value == []:
+        return Parameter(change.name, row.ros_type, [])
+    return Parameter(change.name, value=value)
 
 
 def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:

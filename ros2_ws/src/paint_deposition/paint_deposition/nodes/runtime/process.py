@@ -43,7 +43,6 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
         _on_signals(note)
         if came:
             return 0
-        _init()
         node = _made(make_node)
         exit_code = _spin(node, came)
     except Exception as error:
@@ -54,7 +53,10 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
         _on_signals(signal.SIG_IGN)
     try:
         if node is not None:
-            exit_code = max(exit_code, _closed(node))
+            node.close()
+            node.destroy_node()
+    except Exception as error:
+        exit_code = max(exit_code, _report(error))
     finally:
         rclpy.try_shutdown()
     return exit_code
@@ -65,23 +67,22 @@ def _on_signals(action: Callable[[int, object], None] | signal.Handlers) -> None
     signal.signal(signal.SIGTERM, action)
 
 
-def _init() -> None:
+def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
     try:
         rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
     except RuntimeError as error:
-        reason = str(error).split(', at /')[0]
-        raise PaintError(f'ROS arguments: {" ".join(reason.split())}') from None
-
-
-def _made(make_node: Callable[[], PaintNode]) -> PaintNode:
+        raise PaintError(f'ROS arguments: {_reason(error)}') from None
     try:
         return make_node()
     except RuntimeError as error:
         # Of rclpy's own core: security without keys or without its libraries, a bad name.
         if type(error).__name__ != 'RCLError':
             raise
-        reason = ' '.join(str(error).split(', at /')[0].split())
-        raise PaintError(f'ROS cannot make the node: {reason}') from None
+        raise PaintError(f'ROS cannot make the node: {_reason(error)}') from None
+
+
+def _reason(error: RuntimeError) -> str:
+    return ' '.join(str(error).split(', at /')[0].split())
 
 
 def _spin(node: PaintNode, signals: list[int]) -> int:
@@ -94,15 +95,6 @@ def _spin(node: PaintNode, signals: list[int]) -> int:
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)
     return (node.finished.result() or 0) if node.finished.done() else 0
-
-
-def _closed(node: PaintNode) -> int:
-    try:
-        node.close()
-        node.destroy_node()
-    except Exception as error:
-        return _report(error)
-    return 0
 
 
 def _report(error: Exception) -> int:
