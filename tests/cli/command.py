@@ -57,11 +57,7 @@ def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedPr
     """Run `paint` with these arguments in this process: all but its start and its end."""
     words = [str(argument) for argument in arguments]
     output, errors = io.StringIO(), io.StringIO()
-    with (
-        pytest.MonkeyPatch.context() as place,
-        redirect_stdout(output),
-        redirect_stderr(errors),
-    ):
+    with pytest.MonkeyPatch.context() as place, redirect_stdout(output), redirect_stderr(errors):
         place.chdir(cwd or Path.cwd())
         code = run(words)
     done = subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())

@@ -114,10 +114,7 @@ def test_a_part_that_was_placed_anew_in_a_run_is_not_guessed(panel, tmp_path):
         messages.transforms((1, 'base_link', 'part', [x, *PART_POSE[1:]])).transforms[0]
         for x in (2.1, 2.2)
     ]
-    placed = [
-        ('/part_pose', entries[0][1], told[0]),
-        ('/part_pose', entries[50][1], told[1]),
-    ]
+    placed = [('/part_pose', entries[0][1], told[0]), ('/part_pose', entries[50][1], told[1])]
     path = write_bag(tmp_path / 'run', sorted([*placed, *entries], key=lambda e: e[1]))
     done = paint('simulate', '--mesh', panel, '--trajectory', path, '-o', tmp_path / 'out')
     assert_refused(done, "'part' was placed anew in 'base_link'", 'give --part-pose')

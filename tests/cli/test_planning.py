@@ -189,10 +189,7 @@ def test_plan_in_words_and_replaces_an_older_one(tmp_path):
         (('--mesh', SAMPLES / 'door.stl'), 'neither speed_m_per_s nor target_um'),
         (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), "'--index'"),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
-        (
-            ('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0),
-            'give a direction',
-        ),
+        (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--down', 'nan', 0, 0), 'nan is not finite'),
     ],
 )

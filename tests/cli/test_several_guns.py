@@ -41,9 +41,7 @@ def bags(tmp_path_factory):
     messages = Messages()
     # The second gun opens in the middle of its pass; the first one's state was not recorded.
     half_ns = int(LOWER.stamps_ns[len(LOWER) // 2])
-    states = [
-        ('/robot_2/atomizer/state', half_ns, messages.state(half_ns, True, 1.0)),
-    ]
+    states = [('/robot_2/atomizer/state', half_ns, messages.state(half_ns, True, 1.0))]
     both = write_bag(
         folder / 'both',
         sorted(
@@ -164,10 +162,7 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
     film = pd.simulate(surface, [UPPER, LOWER], model)
     assert np.array_equal(film.film_um, films[0] + films[1])
     write_readings(tmp_path / 'film.csv', surface, film.film_um)
-    guns = [
-        {'pose_topic': '/robot_1/atomizer/pose'},
-        {'trajectory': str(bags['lower'])},
-    ]
+    guns = [{'pose_topic': '/robot_1/atomizer/pose'}, {'trajectory': str(bags['lower'])}]
     entry = {
         'name': 'panel', 'mesh': str(PANEL), 'trajectory': str(bags['both']), 'guns': guns,
         'measurements': 'film.csv',

@@ -27,11 +27,7 @@ from paint_deposition.cli.options import (
 )
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
-from paint_deposition.planning.requests import (
-    GunEnvelope,
-    IndexRequest,
-    PlanRequest,
-)
+from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
 
 
 @click.command('recommend')

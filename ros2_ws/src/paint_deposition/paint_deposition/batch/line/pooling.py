@@ -364,10 +364,7 @@ def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Poo
 
 
 def _cause(
-    posterior: LinePosterior,
-    chosen: tuple[int, ...],
-    probability: float,
-    members: tuple[str, ...],
+    posterior: LinePosterior, chosen: tuple[int, ...], probability: float, members: tuple[str, ...]
 ) -> Cause:
     mean, covariance, _ = posterior.solved(chosen)
     value, sd = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))

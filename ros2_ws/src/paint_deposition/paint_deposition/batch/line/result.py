@@ -172,10 +172,7 @@ class Line:
             'members': list(series.members),
             'centre': series.centre,
             'baseline_parts': series.baseline,
-            'limits': {
-                'shewhart': drawn.shewhart_limit,
-                'ewma': float(drawn.ewma_limit[-1]),
-            },
+            'limits': {'shewhart': drawn.shewhart_limit, 'ewma': float(drawn.ewma_limit[-1])},
             'alarms': {
                 chart: [self.parts[row].name for row in rows]
                 for chart, rows in drawn.alarms.items()

@@ -22,10 +22,7 @@ CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
 
 @written.register
 def _write_simulation(
-    result: Film,
-    folder: Path,
-    made_from: Mapping[str, Any] | None = None,
-    pictures: str = 'png',
+    result: Film, folder: Path, made_from: Mapping[str, Any] | None = None, pictures: str = 'png'
 ) -> list[Path]:
     from paint_deposition.report.pictures.film import write_film_picture
 
