@@ -20,7 +20,7 @@ from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.panel_fit import Reach, short_reaches
+from paint_deposition.inference.fitting.panel_fit import short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -32,16 +32,12 @@ MOST_MODELS = 6
 STARTS = 10
 
 
-def _silent(line: str) -> None:
-    """Progress that nobody follows."""
-
-
 def calibrate(
     campaign: Campaign,
     model: DepositionModel | None = None,
     *,
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Calibration:
     """Fit the pattern, and the amplitudes of the model's effects, to all readings.
 
@@ -60,7 +56,10 @@ def calibrate(
 
 
 def compare(
-    campaign: Campaign, model: DepositionModel | None = None, *, progress: Progress = _silent
+    campaign: Campaign,
+    model: DepositionModel | None = None,
+    *,
+    progress: Progress = lambda line: None,
 ) -> Comparison:
     """Set a model beside the readings and say where it is off.
 
@@ -74,19 +73,21 @@ def compare(
     (model or bell).require_brushes(campaign.brushes)
     require_paint(campaign, model or bell)
     progress('fitting the pattern')
-    reaches: tuple[Reach, ...] = ()
-    if model is None:
-        study, fit = clean_and_fit(campaign, bell, starts=STARTS)
-        model = fit.model
-        reaches = short_reaches(study.campaign, model)
-    else:
+    if model is not None:
         study, _ = clean_and_fit(campaign, model, model.effects)
+        progress('comparing')
+        return compared(study, model)
+    study, fit = clean_and_fit(campaign, bell, starts=STARTS)
     progress('comparing')
-    return replace(compared(study, model), warnings=tuple(map(str, reaches)))
+    reaches = short_reaches(study.campaign, fit.model)
+    return replace(compared(study, fit.model), warnings=tuple(map(str, reaches)))
 
 
 def compare_models(
-    campaign: Campaign, models: Mapping[str, DepositionModel], *, progress: Progress = _silent
+    campaign: Campaign,
+    models: Mapping[str, DepositionModel],
+    *,
+    progress: Progress = lambda line: None,
 ) -> SideBySide:
     """Set several models beside the same readings.
 
@@ -120,7 +121,7 @@ def diagnose(
     posterior: Posterior | None = None,
     own_effects: Iterable[type[Effect]] = (),
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Diagnosis:
     """Find which physical effect a model lacks, if any, and add it.
 
@@ -149,7 +150,7 @@ def refit(
     *,
     posterior: Posterior | None = None,
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Diagnosis:
     """Add an effect to a model, fit both to the readings and weigh them.
 
