@@ -1,4 +1,7 @@
-"""What readings say of a model: calibrate it, compare it, find what it lacks."""
+"""What readings say of a model: calibrate it, compare it, find what it lacks.
+
+A campaign is painted parts with their readings; ``progress`` is called with a line for each step.
+"""
 
 from __future__ import annotations
 
@@ -42,10 +45,8 @@ def calibrate(
     """Fit the pattern, and the amplitudes of the model's effects, to all readings.
 
     Args:
-        campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
         seed: of the starts of the fit.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
@@ -64,9 +65,7 @@ def compare(
     """Set a model beside the readings and say where it is off.
 
     Args:
-        campaign: painted parts with readings.
         model: taken as it is; default: the campaign's, else one fitted to the campaign.
-        progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
     bell = with_brushes_of(campaign, DepositionModel())
@@ -95,7 +94,6 @@ def compare_models(
         campaign: painted parts with readings. Slips among them are found with the first model and
             left out for all.
         models: by name, taken as they are.
-        progress: called with a line for each step.
 
     Raises:
         PaintError: there are fewer than two, or more than a picture can show.
@@ -126,13 +124,11 @@ def diagnose(
     """Find which physical effect a model lacks, if any, and add it.
 
     Args:
-        campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
         posterior: what another job found of the model, as its file or its calibration has it:
             the prior of the fit. Default: that of the campaign's model, if it is that.
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.
-        progress: called with a line for each step.
     """
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
     start, known = _start(campaign, model, posterior)
@@ -155,12 +151,9 @@ def refit(
     """Add an effect to a model, fit both to the readings and weigh them.
 
     Args:
-        campaign: painted parts with readings.
         added: an effect or its id; None fits the model as it is.
         model: to start from; default: the campaign's, else a 50 mm bell.
-        posterior: as for ``diagnose``.
-        seed: of the starts of the fits and of the simulated deviations.
-        progress: called with a line for each step.
+        posterior, seed: as for ``diagnose``.
 
     Raises:
         ModelError: the effect is not known, or the model has it already.

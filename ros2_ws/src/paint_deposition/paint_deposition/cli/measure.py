@@ -60,16 +60,13 @@ def measure_command(
         )
     with Progress('measure') as show:
         show('reading')
-        chosen = (
-            model_for(model_file, trajectory)
-            if trajectory
-            else chosen_model(model_file, brush=brush)
-        )
         surface = pd.read_mesh(**part)
         warnings: tuple[str, ...] = ()
         if trajectory is None:
+            chosen = chosen_model(model_file, brush=brush)
             recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
         else:
+            chosen = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
         posterior = chosen.file.posterior if chosen.file else None

@@ -148,7 +148,7 @@ def _gun_on_part(
             write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
     options.say_all('note', seen.notes)
     options.say_all('warning', [*recorded.warnings, *seen.geometry.warnings])
-    figures = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
+    figures: dict[str, Any] = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
     figures |= {'provenance': origin(model, {'mesh': mesh, 'trajectory': path})}
     lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
     lines += [f'  {output}'] if output else []

@@ -87,8 +87,9 @@ def _date(run: Run) -> float:
     """Seconds since 1970 of the first date in the name of a run."""
     if found := DATE.search(run.name):
         with suppress(ValueError):
-            parts = (int(part or 0) for part in found.groups())
-            return datetime(*parts, tzinfo=timezone.utc).timestamp()
+            year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
+            there = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
+            return there.timestamp()
     raise ManyError(
         f'{run.path}: it is not known when it was painted; put the date into its name, '
         '2026-11-12_0730 say, or record with the time of day'

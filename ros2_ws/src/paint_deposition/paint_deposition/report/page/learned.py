@@ -104,7 +104,7 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
         x = np.linspace(grid.low_m[0], grid.high_m[0], grid.columns)
         y = np.linspace(grid.low_m[1], grid.high_m[1], grid.rows)
         places = [places_m(part.measured_points) for part in parts]
-        dots = [layout.scatter(*p[:, :2].T, 'markers', marker=marker, hoverinfo='skip')
+        dots = [layout.scatter(p[:, 0], p[:, 1], 'markers', marker=marker, hoverinfo='skip')
                 for p in places]  # fmt: skip
         labels = ('right of the centre [m]', 'above it [m]')
         charts.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))

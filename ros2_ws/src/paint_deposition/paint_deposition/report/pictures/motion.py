@@ -23,7 +23,7 @@ PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
 WARNING_COLOUR = '#c0392b'
 SIZE_IN = (11.5, 8.0)
-TEXT_COLUMNS = 70
+TEXT_COLUMNS = 48
 # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
 AXIS_SHARE, AXES_APART = 0.09, 0.04
 # Smaller parts of a picture are marked: they would not be seen.
