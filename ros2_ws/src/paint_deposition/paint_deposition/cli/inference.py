@@ -11,7 +11,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import campaign_model_words
+from paint_deposition.cli.model_choice import model_words
 from paint_deposition.cli.progress import Progress
 from paint_deposition.errors import PaintError
 
@@ -23,6 +23,7 @@ SEED = options.seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
     'always the same'
 )
+FITTED = 'fitted to the campaign, from'
 
 
 def _run(
@@ -36,7 +37,7 @@ def _run(
     pictures: str,
     as_json: bool,
     begins_with: Iterable[str] = ('model', 'posterior'),
-    fitted: str = 'fitted to the campaign, from',
+    fitted: str = FITTED,
     words: str = '',
 ) -> None:
     """Read a campaign and a model, compute, write, and say what came out.
@@ -54,8 +55,8 @@ def _run(
 
     with Progress(command) as show:
         data = pd.read_campaign(campaign, show, part_pose, remark)
-        chosen = model_file or data.model_file
-        start = read_model_file(chosen) if chosen else None
+        chosen = Path(model_file or data.model_file or '')
+        start = read_model_file(chosen) if chosen.name else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
@@ -66,8 +67,10 @@ def _run(
         for name, found in result.geometry.items():
             options.say_all('warning', (f'{name}: {line}' for line in found.warnings))
         options.say_all('warning', result.warnings)
-    told = words or campaign_model_words(data, model_file, start, fitted)
-    options.say_results(files, as_json, lines(result), model=told)
+    told = f'{fitted or FITTED} a 50 mm bell'
+    if start is not None:
+        told = f'{fitted} {model_words(chosen, start)}'.strip()
+    options.say_results(files, as_json, lines(result), words or told)
 
 
 @click.command('calibrate')

@@ -38,7 +38,8 @@ def chosen_model(given: Path | None, brush: int = 0) -> ChosenModel:
     if given is None:
         return ChosenModel(None, None, 'default, a 50 mm bell; --model gives another', brush)
     file = read_model_file(given)
-    return ChosenModel(file, given, _words(given, file) + f', brush {brush}' * bool(brush), brush)
+    words = model_words(given, file) + (f', brush {brush}' if brush else '')
+    return ChosenModel(file, given, words, brush)
 
 
 def model_for(given: Path | None, motion: Path) -> ChosenModel:
@@ -65,7 +66,7 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
             f'{planned.path}; give it with --model, or the film is another one than planned'
         ])  # fmt: skip
         return chosen
-    words = f'that of the plan, {_words(planned.path, planned.file)}'
+    words = f'that of the plan, {model_words(planned.path, planned.file)}'
     return ChosenModel(planned.file, planned.path, words)
 
 
@@ -91,23 +92,7 @@ def models_for(
     return [replace(m, words=name + m.words) for name, m in zip(names, chosen, strict=True)]
 
 
-def campaign_model_words(
-    data: pd.Campaign, given: Path | None, start: ModelFile | None, fitted: str
-) -> str:
-    """The line for a command on a campaign.
-
-    Args:
-        data: the campaign, which may name a model. given: that of --model, or None.
-        start: the one of them that was read.
-        fitted: what happened to it, as 'fitted to the campaign, from'; or '' if it was only used.
-    """
-    path = given or data.model_file
-    if start is None or path is None:
-        return f'{fitted or "fitted to the campaign, from"} a 50 mm bell'
-    return f'{fitted} {_words(Path(path), start)}'.strip()
-
-
-def _words(path: Path, file: ModelFile) -> str:
+def model_words(path: Path, file: ModelFile) -> str:
     """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2 (interpolated), effects: air_drift'."""
     from paint_deposition.files.provenance import model_digest
 
