@@ -140,10 +140,9 @@ def film_of(surface, motion, options) -> tuple[np.ndarray, pd.Trajectory]:
 @pytest.fixture(scope='module')
 def expected(surface, panel, tmp_path_factory):
     """The film of the recorded poses, and what the gauge should show of it."""
-    folder = tmp_path_factory.mktemp('expected')
-    film, _ = film_of(surface, *pose_bag(folder))
+    film, _ = film_of(surface, *pose_bag(tmp_path_factory.mktemp('poses')))
     assert film.max() > 5.0
-    return film, predicted(campaign_of(pose_bag, panel, folder))
+    return film, predicted(campaign_of(pose_bag, panel, tmp_path_factory.mktemp('expected')))
 
 
 @pytest.mark.slow
