@@ -72,11 +72,6 @@ def test_a_film_has_arrays_and_figures(film, panel):
 
 
 @pytest.mark.slow
-def test_a_model_by_itself_is_fitted_where_none_is_named(campaign):
-    assert pd.compare(campaign).model != pd.DepositionModel()
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize('name', ['film', 'comparison', 'recommendation'])
 def test_results_show_and_tell_themselves(name, request, tmp_path):
     result = request.getfixturevalue(name)

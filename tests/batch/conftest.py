@@ -1,12 +1,18 @@
-"""One worker for all commands that need some."""
+"""One worker for all that need some."""
 
 import pytest
 
 
 @pytest.fixture(scope='session')
-def at_worker():
-    """Options by which a command uses a worker that is there already."""
+def worker():
+    """A worker process on this machine, through its client."""
     from paint_deposition.batch.cluster import workers
 
     with workers(count=1) as client:
-        yield '--scheduler', client.scheduler.address
+        yield client
+
+
+@pytest.fixture
+def at_worker(worker):
+    """Options by which a command uses it."""
+    return '--scheduler', worker.scheduler.address

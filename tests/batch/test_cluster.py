@@ -22,23 +22,22 @@ CASES = 60
 
 
 @pytest.mark.slow
-def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path):
+def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path, worker):
     """`dict` is the work: of the columns of a case, or of a number, which is none."""
     cases = [Case('good', {'mean_um': [20.0]}), Case('bad', 3, about={'part': ['door']})]
-    with workers(count=1) as client:
-        for left in (2, 1):
-            finished = ResultCache(tmp_path)
-            assert run(client, dict, cases, {}, finished, lambda what, share: None) == left
-            good, bad = finished.table(['good', 'bad']).to_pylist()
-            assert (good['mean_um'], good['error']) == (20.0, None)
-            assert (bad['part'], bad['mean_um']) == ('door', None)
-            assert bad['error'].startswith('not computed: TypeError: ')
+    for left in (2, 1):
+        finished = ResultCache(tmp_path)
+        assert run(worker, dict, cases, {}, finished, lambda what, share: None) == left
+        good, bad = finished.table(['good', 'bad']).to_pylist()
+        assert (good['mean_um'], good['error']) == (20.0, None)
+        assert (bad['part'], bad['mean_um']) == ('door', None)
+        assert bad['error'].startswith('not computed: TypeError: ')
     assert [path.name for path in tmp_path.iterdir()] == ['good.parquet']
 
 
 @pytest.fixture
 def cluster(tmp_path):
-    """A scheduler and a worker as processes of their own, and the address."""
+    """A scheduler with a worker, as processes of their own, and its address."""
     contact = tmp_path / 'scheduler.json'
     found = {'PYTHONPATH': os.pathsep.join(sys.path)}
     quiet = {'stderr': subprocess.DEVNULL, 'env': os.environ | found}
@@ -51,33 +50,25 @@ def cluster(tmp_path):
     address = json.loads(contact.read_text())['address']
     with Client(address) as client:
         client.wait_for_workers(1)
-    yield {'scheduler': scheduler, 'worker': worker}, address
+    yield scheduler, address
     for process in (worker, scheduler):
         process.kill()
         process.wait()
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ('lost', 'words'),
-    [('scheduler', 'the scheduler is lost'), ('worker', 'no worker has been there for 2 s')],
-)
-def test_what_is_finished_is_kept_when_a_cluster_is_lost(
-    cluster, lost, words, tmp_path, monkeypatch
-):
-    monkeypatch.setattr('paint_deposition.batch.cluster.PATIENCE_S', 2.0)
-    monkeypatch.setattr('paint_deposition.batch.cluster.WORKERS_S', 0.2)
+def test_what_is_finished_is_kept_when_the_scheduler_is_lost(cluster, tmp_path):
     factors = {'first': 0.9, 'last': 1.1, 'steps': CASES}
     told = {'mesh': 'door.stl', 'trajectory': 'door', 'grid': {'speed_factor': factors}}
     job = Job.of(SweepFile.model_validate(told), DOOR)
-    processes, address = cluster
+    scheduler, address = cluster
     finished = ResultCache(tmp_path / 'finished')
 
     def kill(what: str, share: float) -> None:
         if share > 0.0:
-            processes[lost].kill()
+            scheduler.kill()
 
-    refused = pytest.raises(ManyError, match=f'{words}; finished cases are kept')
+    refused = pytest.raises(ManyError, match='the scheduler is lost; finished cases are kept')
     with workers(address) as client, refused:
         run(client, computed, job.cases, job.inputs, finished, kill)
     kept = list(finished.folder.iterdir())

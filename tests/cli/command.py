@@ -10,9 +10,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from booth import LOOKING_ALONG_Y
-from cli.outputs import OUTPUTS
+from cli.outputs import ANY, OUTPUTS
 from paint_deposition.cli.main import run
 from paint_deposition.motion.trajectory import Trajectory
 from scenes import straight_pass
@@ -20,36 +21,11 @@ from scenes import straight_pass
 TRIGGER = ('--state-topic', '/atomizer/state')
 COARSE = ('--max-edge-length-m', 0.05)
 
-# The kind of JSON that each command prints.
-KINDS = {
-    'simulate': 'stats', 'plan': 'plan', 'calibrate': 'calibration', 'compare': 'comparison',
-    'recommend': 'recommendation', 'diagnose': 'diagnosis', 'refit': 'diagnosis',
-    'improve': 'improvement', 'inspect': 'recording', 'recover': 'recovery', 'locate': 'location',
-    'measure': 'measurement', 'sweep': 'sweep', 'line': 'line',
-}  # fmt: skip
-
-
-def kind_of(words: list[str]) -> str:
-    """The kind of JSON that these arguments print."""
-    if words[0] == 'compare' and words.count('--model') > 1:
-        return 'side_by_side'
-    if words[0] == 'plan' and 'auto' in words:
-        return 'plan_of_faces'
-    if words[0] == 'inspect':
-        for kind, marks in {
-            'gun_on_part': ('--mesh',),
-            'program': ('.mod', '.prg'),
-            'pose_table': ('.csv', '.txt', '.tsv'),
-        }.items():
-            if any(word.endswith(marks) for word in words):
-                return kind
-    return KINDS[words[0]]
-
 
 def checked(done: subprocess.CompletedProcess, words: list[str]) -> subprocess.CompletedProcess:
     """The same, its JSON valid if it printed any."""
     if '--json' in words and done.returncode == 0:
-        OUTPUTS[kind_of(words)].model_validate_json(done.stdout)
+        OUTPUTS.get(words[0], ANY).model_validate_json(done.stdout)
     return done
 
 
@@ -57,11 +33,7 @@ def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedPr
     """Run `paint` with these arguments in this process: all but its start and its end."""
     words = [str(argument) for argument in arguments]
     output, errors = io.StringIO(), io.StringIO()
-    with (
-        pytest.MonkeyPatch.context() as place,
-        redirect_stdout(output),
-        redirect_stderr(errors),
-    ):
+    with pytest.MonkeyPatch.context() as place, redirect_stdout(output), redirect_stderr(errors):
         place.chdir(cwd or Path.cwd())
         code = run(words)
     done = subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())
@@ -95,3 +67,13 @@ def level_pass(**changes) -> Trajectory:
 def film_in(folder: Path) -> np.ndarray:
     """The film of a folder of results [um]."""
     return np.genfromtxt(folder / 'film.csv', delimiter=',', names=True)['thickness_um']
+
+
+def sheet(x: np.ndarray, y: np.ndarray, z: np.ndarray, path):
+    """Write a sheet over a grid (I, J) of points that looks to -y."""
+    corner = np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
+    a, b, c, d = corner, corner + x.shape[1], corner + x.shape[1] + 1, corner + 1
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    vertices = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
+    trimesh.Trimesh(vertices, faces, process=False).export(path)
+    return path

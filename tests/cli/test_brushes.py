@@ -75,16 +75,15 @@ def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
     (written,) = read_model(tmp_path / 'plan/model.yaml').brushes
     assert written == read_model(model).brushes[2].model_copy(update={'interpolated': False})
     films = []
-    for motion in ('trajectory', 'passes.mod', 'passes.csv'):
-        for chosen in ((), ('--model', model)):
-            done = paint(
-                'simulate', '--mesh', panel, '--trajectory', tmp_path / 'plan' / motion, '--json',
-                '--max-edge-length-m', 0.05, *chosen, '-o', tmp_path / 'film',
-            )  # fmt: skip
-            assert done.returncode == 0, done.stderr
-            assert 'planned with another model' not in done.stderr
-            films.append(json.loads(done.stdout)['mean_um'])
-    assert films == pytest.approx([films[0]] * 6, rel=2e-3)
+    for motion, *chosen in (('trajectory',), ('passes.mod', '--model', model)):
+        done = paint(
+            'simulate', '--mesh', panel, '--trajectory', tmp_path / 'plan' / motion, '--json',
+            '--max-edge-length-m', 0.05, *chosen, '-o', tmp_path / 'film',
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr
+        assert 'planned with another model' not in done.stderr
+        films.append(json.loads(done.stdout)['mean_um'])
+    assert films[1] == pytest.approx(films[0], rel=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Wrong geometry, fed to the real command, is named by its cause."""
+"""Wrong geometry is named by its cause, by the functions and by the commands."""
 
 import json
 import shutil
@@ -11,12 +11,12 @@ import trimesh
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from booth import SAMPLES, serpentine
-from cli.command import COARSE, TRIGGER, assert_refused, paint
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from cli.command import COARSE, TRIGGER, assert_refused, paint, sheet
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
-
-pytestmark = pytest.mark.slow
 
 
 @pytest.fixture(scope='module')
@@ -24,13 +24,12 @@ def panel(tmp_path_factory):
     """A standing panel of 1.2 m by 0.8 m that looks to -y, bulged by 30 mm, as an STL."""
     x, z = np.meshgrid(np.linspace(-0.6, 0.6, 25), np.linspace(-0.4, 0.4, 17), indexing='ij')
     y = 0.03 * ((x / 0.6) ** 2 + (z / 0.4) ** 2) - 0.03
-    corner = np.arange(x.size).reshape(x.shape)[:-1, :-1].ravel()
-    a, b, c, d = corner, corner + 17, corner + 18, corner + 1
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    path = tmp_path_factory.mktemp('panel') / 'panel.stl'
-    vertices = np.stack([x.ravel(), y.ravel(), z.ravel()], axis=1)
-    trimesh.Trimesh(vertices, faces, process=False).export(path)
-    return path
+    return sheet(x, y, z, tmp_path_factory.mktemp('panel') / 'panel.stl')
+
+
+@pytest.fixture(scope='module')
+def surface(panel):
+    return pd.read_mesh(panel, max_edge_length_m=0.1)
 
 
 def three_passes() -> Trajectory:
@@ -77,28 +76,11 @@ def with_one_pass_above() -> Trajectory:
     return serpentine((1.3, 0.3, 0.0, -0.3), half_width_m=0.9, opens_at_m=0.7, speed_m_per_s=0.4)
 
 
-@pytest.fixture
-def simulate(panel, tmp_path):
-    """Run the command over a motion, its trigger named unless options say otherwise."""
-
-    def run(motion: Trajectory, *options, mesh=panel):
-        bag = write_pose_bag(tmp_path / 'bag', motion)
-        return paint(
-            'simulate', '--mesh', mesh, '--trajectory', bag, '--frame-id', 'base_link', *COARSE,
-            *(options or TRIGGER),
-            '-o', tmp_path / 'out',
-        )  # fmt: skip
-
-    return run
-
-
-def warnings_of(done) -> list[str]:
-    assert done.returncode == 0, done.stderr
-    return [line for line in done.stderr.splitlines() if line.startswith('warning: ')]
-
-
-def test_a_right_geometry_is_one_line_without_a_warning(simulate):
-    done = simulate(three_passes(), *TRIGGER, '--json')
+@pytest.mark.slow
+def test_a_right_geometry_is_one_line_without_a_warning(panel, tmp_path):
+    bag = write_pose_bag(tmp_path / 'bag', three_passes())
+    done = paint('simulate', '--mesh', panel, '--trajectory', bag, '--frame-id', 'base_link',
+                 *COARSE, *TRIGGER, '--json', '-o', tmp_path / 'out')  # fmt: skip
     assert done.stderr == ''
     found = json.loads(done.stdout)['geometry']
     assert found['passes'] == 3
@@ -127,8 +109,8 @@ def test_a_right_geometry_is_one_line_without_a_warning(simulate):
         (with_one_pass_above, ['pass 1 of 4 misses the part', 'trigger']),
     ],
 )  # fmt: skip
-def test_an_odd_geometry_is_warned_of_by_its_cause(simulate, motion, words):
-    (line,) = warnings_of(simulate(motion()))
+def test_an_odd_geometry_is_warned_of_by_its_cause(surface, motion, words):
+    (line,) = pd.look_at(surface, motion()).geometry.warnings
     assert all(word in line for word in words), line
 
 
@@ -145,9 +127,10 @@ def test_an_odd_geometry_is_warned_of_by_its_cause(simulate, motion, words):
         ),
     ],
 )  # fmt: skip
-def test_a_motion_that_paints_nothing_is_refused_by_its_cause(simulate, tmp_path, motion, words):
-    assert_refused(simulate(motion()), 'no paint lands on the part', *words)
-    assert not (tmp_path / 'out').exists()
+def test_a_motion_that_paints_nothing_is_refused_by_its_cause(surface, motion, words):
+    with pytest.raises(RecordingError, match='no paint lands on the part') as refused:
+        pd.simulate(surface, motion())
+    assert all(word in str(refused.value) for word in words), refused.value
 
 
 @pytest.mark.parametrize(
@@ -157,23 +140,24 @@ def test_a_motion_that_paints_nothing_is_refused_by_its_cause(simulate, tmp_path
         ({'later_s': 500.0}, ['never sprays while there are poses', '501 s after', 'one clock']),
     ],
 )
-def test_a_trigger_that_does_not_open_while_there_are_poses_is_refused(simulate, trigger, words):
-    assert_refused(simulate(triggered(**trigger)), *words)
+def test_a_trigger_that_does_not_open_while_there_are_poses_is_refused(surface, trigger, words):
+    with pytest.raises(RecordingError) as refused:
+        pd.look_at(surface, triggered(**trigger))
+    assert all(word in str(refused.value) for word in words), refused.value
 
 
-def test_a_small_mesh_in_millimetres_is_refused(simulate, panel, tmp_path):
+def test_a_small_mesh_in_millimetres_is_refused(panel, tmp_path):
     """A panel of 40 mm is 40 m in metres: below the size that is refused when it is read."""
     small = trimesh.load_mesh(panel, process=False)
     small.apply_scale(1000.0 / 30.0)
     small.apply_translation([60.0, 0.0, 0.0])
     small.export(tmp_path / 'mm.stl')
-    done = simulate(
-        serpentine((0.0,), half_width_m=0.12, opens_at_m=0.1), *TRIGGER,
-        '--max-edge-length-m', 1.0, mesh=tmp_path / 'mm.stl',
-    )  # fmt: skip
-    assert_refused(done, 'the mesh looks like millimetres', '--mesh-scale 0.001')
+    surface = pd.read_mesh(tmp_path / 'mm.stl', max_edge_length_m=1.0)
+    with pytest.raises(RecordingError, match=r'looks like millimetres.*--mesh-scale 0\.001'):
+        pd.simulate(surface, serpentine((0.0,), half_width_m=0.12, opens_at_m=0.1))
 
 
+@pytest.mark.slow
 def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     door, run, picture = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal', tmp_path / 'door.png'
     done = paint('inspect', '--mesh', door, '--trajectory', run, *TRIGGER, '--out', picture)
@@ -201,15 +185,11 @@ def test_inspect_says_what_is_missing():
     ('mesh', 'bag'),
     [('door.stl', 'door_vertical'), ('measured_door/door.stl', 'measured_door/door')],
 )
-def test_the_samples_are_not_warned_of(mesh, bag, tmp_path):
-    recorded = read_trajectory(SAMPLES / bag, None, '/atomizer/state')
-    done = paint(
-        'simulate', '--mesh', SAMPLES / mesh, '--trajectory', SAMPLES / bag, *TRIGGER, *COARSE,
-        '--json', '-o', tmp_path,
-    )  # fmt: skip
-    assert done.stderr == ''
-    passes = json.loads(done.stdout)['geometry']['passes']
-    assert passes == np.sum(np.diff(recorded.trigger_flow) > 0.0)
+def test_the_samples_are_not_warned_of(mesh, bag):
+    recorded = pd.read_recording(SAMPLES / bag, state_topic='/atomizer/state')
+    found = pd.look_at(pd.read_mesh(SAMPLES / mesh, max_edge_length_m=0.1), recorded).geometry
+    assert (recorded.warnings, found.warnings) == ((), ())
+    assert found.passes == np.sum(np.diff(recorded.trigger_flow) > 0.0)
 
 
 @pytest.fixture
@@ -233,6 +213,7 @@ def campaign(panel, tmp_path):
     return written
 
 
+@pytest.mark.slow
 def test_a_campaign_says_how_each_part_was_painted(campaign, tmp_path):
     done = paint('compare', *campaign(three_passes()), '-o', tmp_path / 'out')
     assert done.returncode == 0, done.stderr
@@ -243,17 +224,18 @@ def test_a_campaign_says_how_each_part_was_painted(campaign, tmp_path):
     assert figures['passes'] == 3
 
 
-@pytest.mark.parametrize('command', ['compare', 'diagnose'])
-def test_a_campaign_without_paint_is_refused_by_its_experiment(command, campaign, tmp_path):
-    for motion, words in (
-        (tool_turned('x', 180.0), ['no paint lands', 'tool z is reversed']),
-        (triggered(flow=0.0), ['never sprays', '--state-topic']),
+@pytest.mark.slow
+def test_a_campaign_without_paint_is_refused_by_its_experiment(campaign, tmp_path):
+    for command, motion, words in (
+        ('compare', tool_turned('x', 180.0), ['no paint lands', 'tool z is reversed']),
+        ('diagnose', triggered(flow=0.0), ['never sprays', '--state-topic']),
     ):
         done = paint(command, *campaign(motion), '-o', tmp_path / 'out')
         assert_refused(done, "experiment 'test panel'", *words)
         shutil.rmtree(tmp_path / 'run')
 
 
+@pytest.mark.slow
 def test_a_campaign_with_odd_geometry_is_warned_of_by_its_experiment(campaign, tmp_path):
     done = paint('calibrate', *campaign(shifted(0.3, 0.0, 0.0)), '--json', '-o', tmp_path / 'out')
     assert done.returncode == 0, done.stderr
@@ -262,25 +244,19 @@ def test_a_campaign_with_odd_geometry_is_warned_of_by_its_experiment(campaign, t
     assert found in done.stderr
 
 
-def test_a_mesh_that_is_too_coarse_is_warned_of(simulate, tmp_path):
+def test_a_mesh_that_is_too_coarse_is_warned_of(tmp_path):
     """A panel with a fold of 40 degrees within 60 mm, cut into edges of 24 and of 5 mm."""
-
-    def folded(edge_m: float):
-        z = np.arange(-0.24, 0.2401, edge_m)
-        x = np.array([-0.3, 0.0, 0.3])
-        y = 0.84 * 0.01 * np.logaddexp(0.0, z / 0.01)
-        points = np.stack([np.tile(x, len(z)), np.repeat(y, 3), np.repeat(z, 3)], axis=1)
-        corner = (3 * np.arange(len(z) - 1)[:, None] + [0, 1]).ravel()
-        faces = [[corner, corner + 1, corner + 4], [corner, corner + 4, corner + 3]]
-        path = tmp_path / f'fold{1e3 * edge_m:.0f}.stl'
-        trimesh.Trimesh(points, np.concatenate([np.stack(f, axis=1) for f in faces])).export(path)
-        return path
-
     passes = serpentine((0.15, -0.15), half_width_m=0.6, opens_at_m=0.4)
-    (line,) = warnings_of(simulate(passes, mesh=folded(0.024)))
+
+    def seen(edge_m: float):
+        x, z = np.meshgrid([-0.3, 0.0, 0.3], np.arange(-0.24, 0.2401, edge_m), indexing='ij')
+        y = 0.84 * 0.01 * np.logaddexp(0.0, z / 0.01)
+        path = sheet(x, y, z, tmp_path / f'fold{1e3 * edge_m:.0f}.stl')
+        return pd.look_at(pd.read_mesh(path, max_edge_length_m=0.05), passes).geometry
+
+    (line,) = seen(0.024).warnings
     assert 'coarser than its curvature allows' in line
     assert 'an edge of 2' in line
-    shutil.rmtree(tmp_path / 'bag')
-    done = simulate(passes, *TRIGGER, '--json', mesh=folded(0.0045))
-    assert done.stderr == ''
-    assert 0.0 < json.loads(done.stdout)['geometry']['facet_error'] < 0.01
+    fine = seen(0.0045)
+    assert fine.warnings == ()
+    assert 0.0 < fine.facet_error < 0.01

@@ -8,12 +8,12 @@ import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, installed_paint, paint
+from cli.command import assert_refused, paint
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.motion.part_frame import Rigid, moved
 
 DOOR = ('--mesh', SAMPLES / 'door.stl', '--max-edge-length-m', 0.05)
 PAINTED = (*DOOR, '--trajectory', SAMPLES / 'door_horizontal')
@@ -22,7 +22,7 @@ PAINTED = (*DOOR, '--trajectory', SAMPLES / 'door_horizontal')
 @pytest.fixture(scope='module')
 def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp('measured')
-    done = installed_paint('measure', *PAINTED, '--points', 30, '-o', folder)
+    done = paint('measure', *PAINTED, '--points', 30, '-o', folder)
     assert done.returncode == 0, done.stderr
     return folder, done
 
@@ -30,27 +30,6 @@ def measured(tmp_path_factory):
 def rows_of(path) -> list[dict]:
     with path.open(newline='') as file:
         return list(csv.DictReader(file))
-
-
-def filled(folder, path, noise_um: float = 0.0):
-    """The table as the shop floor gives it back: with the film that was expected, and noise."""
-    rows, noise = rows_of(folder / 'points.csv'), np.random.default_rng(2)
-    for row in rows:
-        row['thickness_um'] = f'{float(row["expected_um"]) + noise_um * noise.normal():.1f}'
-    with path.open('w', newline='') as file:
-        writer = csv.DictWriter(file, list(rows[0]))
-        writer.writeheader()
-        writer.writerows(rows)
-    return path
-
-
-def campaign(tmp_path):
-    path = tmp_path / 'campaign.yaml'
-    path.write_text(
-        f'experiments:\n  - {{name: door, mesh: {SAMPLES / "door.stl"}, '
-        f'trajectory: {SAMPLES / "door_horizontal"}, measurements: readings.csv}}\n'
-    )
-    return path
 
 
 @pytest.mark.slow
@@ -73,36 +52,28 @@ def test_points_are_written_for_people_and_robots(measured):
 @pytest.mark.slow
 def test_the_filled_table_is_gauge_readings_and_the_empty_one_is_refused(measured, tmp_path):
     folder, _ = measured
-    path = campaign(tmp_path)
-    (tmp_path / 'readings.csv').write_text((folder / 'points.csv').read_text())
+    surface, path = pd.read_mesh(SAMPLES / 'door.stl'), tmp_path / 'readings.csv'
+    path.write_text((folder / 'points.csv').read_text())
     with pytest.raises(ReadingsError, match='no readings below the header'):
-        read_campaign(path)
-    filled(folder, tmp_path / 'readings.csv', 0.7)
-    data = read_campaign(path)
-    (door,) = data.experiments
-    assert len(door.readings) == 38
-    assert len(door) == 30
-    assert door.off_surface_m.max() < 1e-3
+        pd.read_readings(path, surface=surface)
+    rows = rows_of(path)
+    with path.open('w', newline='') as file:
+        writer = csv.DictWriter(file, list(rows[0]))
+        writer.writeheader()
+        writer.writerows(row | {'thickness_um': row['expected_um']} for row in rows)
+    readings = pd.read_readings(path, surface=surface)
+    assert (len(readings), len(set(readings.point))) == (38, 30)
+    assert surface.locate(readings.positions_m).distance_m.max() < 1e-3
 
 
 @pytest.mark.slow
 def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
     pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
-    table = tmp_path / 'moved.csv'
     # The same motion, given in the robot's frame: the part is turned by half a turn there.
-    motion, part = read_trajectory(SAMPLES / 'door_horizontal'), Rigid.of(pose)
-    lines = ['time_s,x_m,y_m,z_m,qx,qy,qz,qw']
-    for stamp, *one in zip(
-        motion.stamps_ns[::25], motion.positions_m[::25], motion.quaternions_xyzw[::25],
-        strict=True,
-    ):  # fmt: skip
-        position, quaternion = part.applied(*one)
-        values = [(stamp - motion.stamps_ns[0]) * 1e-9, *position, *quaternion]
-        lines.append(','.join(f'{value:.9f}' for value in values))
-    table.write_text('\n'.join(lines))
+    motion = moved(read_trajectory(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
     done = paint(
-        'measure', *DOOR, '--trajectory', table, '--part-pose', *pose, '--points', 12,
-        '--repeats', 0, '--max-pose-gap-s', 1, '--json', '-o', tmp_path / 'out',
+        'measure', *DOOR, '--trajectory', write_pose_bag(tmp_path / 'run', motion), '--part-pose',
+        *pose, '--points', 12, '--repeats', 0, '--json', '-o', tmp_path / 'out',
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     figures = json.loads(done.stdout)

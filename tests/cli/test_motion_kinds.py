@@ -7,15 +7,12 @@ import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 from cli.command import assert_refused, paint
 from files.recorded import Messages, write_bag
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.motion.programmed import PROGRAMMED, Move
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import JOINTS, sweep, tip_poses, urdf
@@ -49,7 +46,7 @@ def pose_bag(folder):
         'trigger_stamps_ns': STAMPS[[OPENS, CLOSES]], 'trigger_flow': np.array([1.0, 0.0])
     }  # fmt: skip
     poses = Trajectory(STAMPS, POSITIONS, QUATERNIONS, 'base_link', **trigger)
-    return write_pose_bag(folder / 'poses', poses), ('--trigger', '/atomizer/state')
+    return write_pose_bag(folder / 'poses', poses), {'state_topic': '/atomizer/state'}
 
 
 def with_signal(messages):
@@ -70,7 +67,8 @@ def joint_bag(folder):
     ]
     (folder / 'arm.urdf').write_text(urdf())
     bag = write_bag(folder / 'joints', entries, 'mcap', messages)
-    return bag, ('--urdf', folder / 'arm.urdf', '--tip', 'tool0', '--trigger', '/cell/gun')
+    urdf_file = str(folder / 'arm.urdf')
+    return bag, {'urdf': urdf_file, 'tip_link': 'tool0', 'state_topic': '/cell/gun'}
 
 
 def tf_bag(folder):
@@ -81,7 +79,7 @@ def tf_bag(folder):
         for stamp, place, turn in zip(STAMPS.tolist(), POSITIONS, QUATERNIONS, strict=True)
     ]
     bag = write_bag(folder / 'tf', entries, 'sqlite3', messages)
-    return bag, ('--tf', 'base_link', 'bell', '--trigger', '/cell/gun')
+    return bag, {'tf': ['base_link', 'bell'], 'state_topic': '/cell/gun'}
 
 
 def table(folder):
@@ -90,7 +88,7 @@ def table(folder):
     text = '\n'.join(';'.join(f'{value:.8f}'.replace('.', ',') for value in row) for row in rows)
     path = folder / 'robot.csv'
     path.write_text(f't [ms];X [mm];Y [mm];Z [mm];RX [rad];RY [rad];RZ [rad];gun\n{text}\n')
-    return path, ()
+    return path, {}
 
 
 def moves():
@@ -106,7 +104,7 @@ def moves():
 def module(folder):
     path = folder / 'passes.mod'
     path.write_text(module_text(moves()))
-    return path, ()
+    return path, {}
 
 
 def passes(folder):
@@ -118,7 +116,7 @@ def passes(folder):
     text = '\n'.join(','.join(f'{value:.9g}' for value in row) for row in rows)
     path = folder / 'passes.csv'
     path.write_text(f'{heading}\n{text}\n')
-    return path, ()
+    return path, {}
 
 
 # The kind, and what its film may differ from that of the poses, as a share of the peak: angles
@@ -129,75 +127,61 @@ KINDS = {
 }  # fmt: skip
 
 
-def film_of(panel, motion, options, out):
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', motion, *options,
-        '--part-pose', *PART_POSE, '--max-edge-length-m', 0.04, '-o', out,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    rows = np.genfromtxt(out / 'film.csv', delimiter=',', names=True)
-    return rows['thickness_um'], json.loads((out / 'stats.json').read_text())
+@pytest.fixture(scope='module')
+def surface(panel):
+    return pd.read_mesh(panel, max_edge_length_m=0.04)
+
+
+def film_of(surface, motion, options) -> tuple[np.ndarray, pd.Trajectory]:
+    recorded = pd.read_recording(motion, part_pose=PART_POSE, **options)
+    return pd.simulate(surface, recorded).film_um, recorded
 
 
 @pytest.fixture(scope='module')
-def expected(panel, tmp_path_factory):
-    """Film, figures, and what the gauge should show, of the recorded poses."""
-    folder = tmp_path_factory.mktemp('expected')
-    campaign_of('module', panel, folder)
-    motion, options = pose_bag(folder)
-    at = ('--at', folder / 'readings.csv')
-    film, figures = film_of(panel, motion, (*options, *at), folder / 'out')
+def expected(surface, panel, tmp_path_factory):
+    """The film of the recorded poses, and what the gauge should show of it."""
+    film, _ = film_of(surface, *pose_bag(tmp_path_factory.mktemp('poses')))
     assert film.max() > 5.0
-    rows = np.genfromtxt(folder / 'out' / 'predicted.csv', delimiter=',', names=True)
-    return film, figures, rows['predicted_um']
+    return film, predicted(campaign_of(pose_bag, panel, tmp_path_factory.mktemp('expected')))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize('kind', KINDS)
-def test_the_film_is_that_of_the_recorded_poses(kind, panel, expected, tmp_path):
+def test_film_and_campaign_are_those_of_the_recorded_poses(
+    kind, panel, surface, expected, tmp_path
+):
     write, share = KINDS[kind]
-    film, figures = film_of(panel, *write(tmp_path), tmp_path / 'out')
-    assert np.abs(film - expected[0]).max() < share * expected[0].max() + 1.1e-3  # as printed
-    time_s = expected[1]['spraying_time_s']
-    assert figures['spraying_time_s'] == pytest.approx(time_s, rel=share)
-    assert (PROGRAMMED in figures['notes']) == (kind in ('module', 'passes'))
+    film, recorded = film_of(surface, *write(tmp_path))
+    assert np.abs(film - expected[0]).max() < share * expected[0].max()
+    assert (PROGRAMMED in recorded.notes) == (kind in ('module', 'passes'))
+    again = tmp_path / 'campaign'
+    again.mkdir()
+    gauge_um = predicted(campaign_of(write, panel, again))
+    assert np.abs(gauge_um - expected[1]).max() < share * gauge_um.max() + 1e-3
 
 
-def campaign_of(kind, panel, folder):
+def campaign_of(write, panel, folder):
     """A campaign with readings of 10 µm on the panel, painted by that kind of motion."""
-    motion, _ = KINDS[kind][0](folder)
+    motion, options = write(folder)
     lines = [f'{x:.2f},{y},0,10' for x in np.linspace(-0.2, 0.2, 9) for y in (-0.1, 0.1)]
     (folder / 'readings.csv').write_text('\n'.join(['x_m,y_m,z_m,thickness_um', *lines]))
     entry = {
         'name': 'panel', 'mesh': str(panel), 'trajectory': motion.name,
         'measurements': 'readings.csv', 'part_pose': [float(value) for value in PART_POSE],
+        **options,
     }  # fmt: skip
-    entry |= {
-        'joints': {'urdf': 'arm.urdf', 'tip_link': 'tool0', 'state_topic': '/cell/gun'},
-        'tf': {'tf': ['base_link', 'bell'], 'state_topic': '/cell/gun'},
-    }.get(kind, {})
     (folder / 'campaign.yaml').write_text(json.dumps({'experiments': [entry]}))
     return folder / 'campaign.yaml'
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('kind', KINDS)
-def test_campaigns_take_every_kind(kind, panel, expected, tmp_path):
-    said = []
-    read = read_campaign(
-        campaign_of(kind, panel, tmp_path), remark=lambda *line: said.append(line)
-    )
-    (experiment,) = read.experiments
-    predicted = Forward(Campaign((experiment,))).predict_um(DepositionModel())
-    assert predicted.max() > 5.0
-    share = KINDS[kind][1]
-    assert np.abs(predicted - expected[2]).max() < share * predicted.max() + 1e-3
-    assert (('note', 'panel', PROGRAMMED) in said) == (kind in ('module', 'passes'))
+def predicted(campaign) -> np.ndarray:
+    """(P,) what the gauge should show [um]."""
+    return Forward(pd.read_campaign(campaign)).predict_um(pd.DepositionModel())
 
 
 def test_a_real_module_is_taken_as_motion(shared_data):
     """Ten moves over three metres at 0.1 m/s, without a gun."""
-    read = read_recording(shared_data / 'rapid' / 'ECL_Grey_T_ROB1.mod')
+    read = pd.read_recording(shared_data / 'rapid' / 'ECL_Grey_T_ROB1.mod')
     assert read.duration_s == pytest.approx(3.03 / 0.1, rel=0.02)
     assert read.notes.count(PROGRAMMED) == 1
 

@@ -6,11 +6,13 @@ import shutil
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.planned_model import planned_model
 from paint_deposition.files.provenance import model_digest, origin
+from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.motion.programmed import PROGRAMMED
 
 PANEL = SAMPLES / 'panel.stl'
@@ -82,37 +84,33 @@ def test_the_film_is_the_planned_one(motion, exact, plan, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('motion', ['trajectory', 'passes.mod'])
-def test_a_plan_in_the_robots_frame_lays_the_same_film(motion, plan, placed, tmp_path):
+def test_a_plan_in_the_robots_frame_lays_the_same_film(plan, placed):
     """The bag tells the pose of the part itself; the module has it in its work object."""
-    expected, _ = simulated(plan / motion, tmp_path / 'expected')
-    given = ('--part-pose', *PART_POSE)
-    film, done = simulated(placed / motion, tmp_path / 'given', *given)
-    assert film['mean_um'] == pytest.approx(expected['mean_um'], rel=1e-4)
-    assert film['min_um'] == pytest.approx(expected['min_um'], rel=1e-3)
-    assert 'warning' not in done.stderr
-    if motion == 'trajectory':
-        film, done = simulated(placed / motion, tmp_path / 'told')
-        assert film['mean_um'] == pytest.approx(expected['mean_um'], rel=1e-4)
-        assert "note: static transforms: poses brought from 'base_link' to 'part'" in done.stderr
+    expected = pd.read_recording(plan / 'trajectory')
+    told = pd.read_recording(placed / 'trajectory')
+    given = pd.read_recording(placed / 'trajectory', part_pose=PART_POSE)
+    assert np.allclose(told.positions_m, expected.positions_m, atol=1e-5)
+    assert np.allclose(given.positions_m, expected.positions_m, atol=1e-5)
+    assert "static transforms: poses brought from 'base_link' to 'part'" in told.notes[0]
+    table = np.genfromtxt(placed / 'passes.csv', delimiter=',', names=True)
+    first = np.array([table[0][name] for name in ('x_m', 'y_m', 'z_m')])
+    bag = read_trajectory(placed / 'trajectory')
+    assert bag.frame_id == 'base_link'
+    assert np.allclose(first, bag.positions_m[0], atol=1e-5)
+    module, same = (
+        pd.read_recording(folder / 'passes.mod', part_pose=pose)
+        for folder, pose in ((placed, PART_POSE), (plan, None))
+    )
+    assert np.allclose(module.positions_m, same.positions_m, atol=1e-5)
 
 
 @pytest.mark.slow
-def test_a_model_that_is_given_wins_and_is_named(plan, model_file, tmp_path):
-    bag = plan / 'trajectory'
-    _, done = simulated(bag, tmp_path / 'same', '--model', model_file)
-    assert done.stdout.startswith(f'model: {model_file} (')
-    assert 'another model' not in done.stderr
+def test_a_model_that_is_given_wins_and_is_named(plan, tmp_path):
     (tmp_path / 'other.yaml').write_text('name: bell 7\neffects: []\n')
+    bag = plan / 'trajectory'
     _, done = simulated(bag, tmp_path / 'other', '--model', tmp_path / 'other.yaml')
     assert done.stdout.startswith(f"model: {tmp_path / 'other.yaml'} 'bell 7' (")
     assert f'note: {bag} was planned with another model' in done.stderr
-
-
-@pytest.mark.slow
-def test_a_motion_without_a_model_says_which_is_used(tmp_path):
-    _, done = simulated(SAMPLES / 'panel_577', tmp_path / 'out')
-    assert done.stdout.startswith('model: default, a 50 mm bell')
 
 
 @pytest.mark.slow
@@ -146,14 +144,3 @@ def test_recordings_and_plain_tables_are_no_plans(tmp_path):
     assert planned_model(tmp_path / 'run.csv') is None
     assert planned_model(SAMPLES / 'panel_577') is None
     assert planned_model(tmp_path / 'nowhere.mod') is None
-
-
-@pytest.mark.slow
-def test_the_table_is_in_the_frame_of_the_bag(placed):
-    from paint_deposition.files.recordings.bags import read_trajectory
-
-    rows = np.genfromtxt(placed / 'passes.csv', delimiter=',', names=True)
-    bag = read_trajectory(placed / 'trajectory')
-    assert bag.frame_id == 'base_link'
-    first = np.array([rows[0][name] for name in ('x_m', 'y_m', 'z_m')])
-    assert np.allclose(first, bag.positions_m[0], atol=1e-5)

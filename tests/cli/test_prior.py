@@ -50,16 +50,6 @@ def test_the_calibration_is_the_prior_of_the_next_job(folder: Path, tmp_path: Pa
     assert 'The pattern moved' in (tmp_path / 'report.html').read_text()
     later = read_model_file(tmp_path / 'model.yaml').posterior
     assert set(known.readings) < set(later.readings)
-    # Two jobs tell more of a width that one panel hardly shows.
-    without = tmp_path / 'without'
-    start = yaml.safe_load((folder / 'calibration/model.yaml').read_text())
-    del start['posterior']
-    (folder / 'start.yaml').write_text(yaml.safe_dump(start))
-    text, figures = refitted(folder, 'door.yaml', 'start.yaml', without)
-    assert figures['pattern_shift'] is None
-    assert 'pattern moved' not in text
-    alone = read_model_file(without / 'model.yaml').posterior
-    assert later.matrix.diagonal().sum() < alone.matrix.diagonal().sum()
 
 
 def test_the_readings_behind_a_calibration_do_not_count_twice(folder: Path, tmp_path: Path):

@@ -8,8 +8,6 @@ from cli.command import paint
 from paint_deposition.cli.results_folder import MARKER, results_in
 from paint_deposition.errors import PaintError
 
-RECOMMEND = ('recommend', '--speed', 0.3)
-
 
 def write(folder, *names: str) -> None:
     """Results of a command, each with its own name as content."""
@@ -72,17 +70,10 @@ def test_a_marker_names_nothing_outside_its_folder(tmp_path):
     assert (tmp_path / 'mine.txt').exists()
 
 
-def test_two_commands_into_one_folder_do_not_mix(tmp_path):
-    write(tmp_path / 'out', 'film.csv', 'film.png')
-    done = paint(*RECOMMEND, '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    assert names_in(tmp_path / 'out') == ['recommendation.json', 'uniformity.png']
-    assert names_in(tmp_path) == ['out']
-
-
-def test_the_working_directory_may_be_the_folder(tmp_path):
+def test_the_working_directory_may_be_the_folder_of_two_commands(tmp_path):
     inode = os.stat(tmp_path).st_ino
+    write(tmp_path, 'film.csv', 'film.png')
     for _ in range(2):
-        assert paint(*RECOMMEND, cwd=tmp_path).returncode == 0
+        assert paint('recommend', '--speed', 0.3, cwd=tmp_path).returncode == 0
     assert names_in(tmp_path) == ['recommendation.json', 'uniformity.png']
     assert os.stat(tmp_path).st_ino == inode

@@ -8,7 +8,7 @@ import yaml
 
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, film_in, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -41,9 +41,7 @@ def bags(tmp_path_factory):
     messages = Messages()
     # The second gun opens in the middle of its pass; the first one's state was not recorded.
     half_ns = int(LOWER.stamps_ns[len(LOWER) // 2])
-    states = [
-        ('/robot_2/atomizer/state', half_ns, messages.state(half_ns, True, 1.0)),
-    ]
+    states = [('/robot_2/atomizer/state', half_ns, messages.state(half_ns, True, 1.0))]
     both = write_bag(
         folder / 'both',
         sorted(
@@ -123,9 +121,8 @@ def test_a_file_and_a_model_for_each_gun(bags, surface, tmp_path):
         '--max-edge-length-m', 0.05,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
-    film = np.genfromtxt(tmp_path / 'out/film.csv', delimiter=',', names=True)['thickness_um']
     expected = pd.simulate(surface, [UPPER, LOWER], [DepositionModel(), THIN]).film_um
-    assert film == pytest.approx(expected, rel=1e-7)
+    assert film_in(tmp_path / 'out') == pytest.approx(expected, rel=1e-7)
     assert f'model: upper: {bell}' in done.stdout
     assert f'lower: {bags["thin"]}' in done.stdout
     assert '% of the paint' in done.stdout
@@ -164,10 +161,7 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
     film = pd.simulate(surface, [UPPER, LOWER], model)
     assert np.array_equal(film.film_um, films[0] + films[1])
     write_readings(tmp_path / 'film.csv', surface, film.film_um)
-    guns = [
-        {'pose_topic': '/robot_1/atomizer/pose'},
-        {'trajectory': str(bags['lower'])},
-    ]
+    guns = [{'pose_topic': '/robot_1/atomizer/pose'}, {'trajectory': str(bags['lower'])}]
     entry = {
         'name': 'panel', 'mesh': str(PANEL), 'trajectory': str(bags['both']), 'guns': guns,
         'measurements': 'film.csv',
@@ -188,17 +182,12 @@ def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, t
     write_readings(tmp_path / 'film.csv', surface, film)
     guns = [{'trajectory': str(bags['upper'])}, {'trajectory': str(bags['lower']), 'brush': 2}]
     entry = {'mesh': str(PANEL), 'measurements': 'film.csv', 'guns': guns, 'brush': 1}
-    campaign = tmp_path / 'campaign.yaml'
-    campaign.write_text(yaml.safe_dump({'experiments': [entry]}))
+    path = tmp_path / 'campaign.yaml'
+    path.write_text(yaml.safe_dump({'experiments': [entry]}))
     both = DepositionModel.of_brushes(
         Brush(number=number, planar=model.planar) for number, model in ((1, bell), (2, THIN))
     )
-    model = _model(tmp_path / 'both.yaml', both)
-    done = paint('compare', campaign, '--model', model, '--json', '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)['misfits'][0]
-    assert found['rmse_um'] < 1e-4
+    assert pd.compare(read_campaign(path), both).points.rmse_um < 1e-4
     # One pattern for both guns is not enough.
-    plain = _model(tmp_path / 'plain.yaml', bell)
-    done = paint('compare', campaign, '--model', plain, '-o', tmp_path / 'plain')
-    assert_refused(done, 'brushes 1, 2 are used and the model has the pattern of one')
+    with pytest.raises(ModelError, match='brushes 1, 2 are used and the model has the pattern of'):
+        pd.compare(read_campaign(path), bell)

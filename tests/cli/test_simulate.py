@@ -1,21 +1,24 @@
 """`paint simulate` over real files, as a user runs it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
+import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import COARSE, TRIGGER, assert_refused, installed_paint, level_pass, paint
+from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.gauge_gain import GaugeGain
+from paint_deposition.errors import RecordingError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from reference import reference_film_um
 
@@ -27,7 +30,7 @@ FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
 def painted_door(tmp_path_factory):
     """The sample door, painted along the sample recording, and what the command printed."""
     folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
-    done = installed_paint(
+    done = paint(
         'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
         '--target-um', 18, '--tolerance-um', 4,
     )  # fmt: skip
@@ -58,16 +61,14 @@ def test_the_door_is_painted(painted_door):
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
     recorded = read_trajectory(DOOR_BAG, None, '/atomizer/state')
-    assert figures['poses']['received'] == len(recorded)
-    assert figures['poses']['rejected'] == 0
+    assert (figures['poses']['received'], figures['poses']['rejected']) == (len(recorded), 0)
     changes = recorded.trigger_stamps_ns[1:]
     on_s = np.sum(changes[1::2] - changes[0::2]) * 1e-9
     assert figures['spraying_time_s'] == pytest.approx(on_s, rel=1e-9)
     emitted = DepositionModel().planar.K1_cm3_per_s * on_s
     assert figures['emitted_volume_cm3'] == pytest.approx(emitted, rel=1e-9)
-    assert figures['capture_fraction'] == pytest.approx(
-        figures['painted_volume_cm3'] / emitted, rel=1e-9
-    )
+    share = figures['painted_volume_cm3'] / emitted
+    assert figures['capture_fraction'] == pytest.approx(share, rel=1e-9)
     assert figures['down'] == [0.0, 0.0, -1.0]
     assert figures['mesh_file'] == str(DOOR)
 
@@ -104,34 +105,18 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
     assert np.abs(predicted - expected).max() < 1e-4
 
 
-@pytest.mark.slow
-def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel, one_pass, tmp_path):
-    readings = tmp_path / 'readings.csv'
-    readings.write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0.1,0,0.1,9\n')
-    (tmp_path / 'gauge.yaml').write_text('effects: [{id: gauge_gain, gain: 0.1}]\n')
-    results = []
-    for model in ((), ('--model', tmp_path / 'gauge.yaml')):
-        out = tmp_path / f'out{len(results)}'
-        done = paint(
-            'simulate', '--mesh', panel, '--trajectory', one_pass, '--at', readings, *COARSE,
-            *model, '-o', out,
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        predicted = np.genfromtxt(out / 'predicted.csv', delimiter=',', names=True)
-        results.append((predicted['predicted_um'], (out / 'film.csv').read_text()))
-    assert np.allclose(results[1][0], 1.1 * results[0][0], atol=2e-4)
-    assert results[1][1] == results[0][1]
-
-
-def test_a_mesh_in_millimetres_is_named_and_can_be_scaled(panel, one_pass, tmp_path):
-    big = trimesh.load_mesh(panel, process=False)
-    big.apply_scale(1000.0)
-    big.export(tmp_path / 'mm.stl')
-    arguments = ('simulate', '--mesh', tmp_path / 'mm.stl', '--trajectory', one_pass, *COARSE)
-    assert_refused(paint(*arguments, '-o', tmp_path / 'out'), 'mm.stl', '--mesh-scale 0.001')
-    assert not (tmp_path / 'out').exists()
-    scaled = paint(*arguments, '--mesh-scale', 0.001, '--json', '-o', tmp_path / 'out')
-    assert json.loads(scaled.stdout)['area_m2'] == pytest.approx(0.96)
+def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
+    surface = pd.read_mesh(panel, max_edge_length_m=0.1)
+    places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1]])
+    labels, unknown = np.array(['a', 'b']), np.full(2, np.nan)
+    readings = pd.Readings(places, np.full(2, 9.0), labels, labels, unknown)
+    gauge = DepositionModel().with_effect(GaugeGain(gain=0.1))
+    plain, read = (
+        pd.simulate(surface, level_pass(), model, readings=readings)
+        for model in (DepositionModel(), gauge)
+    )
+    assert np.allclose(read.predicted_um, 1.1 * plain.predicted_um)
+    assert np.array_equal(read.film_um, plain.film_um)
 
 
 def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
@@ -162,36 +147,20 @@ def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
     assert_refused(done, '/gun', '/atomizer/state')
 
 
-def test_poses_without_numbers_are_refused(panel, tmp_path):
-    log = level_pass()
-    broken = Trajectory(
-        log.stamps_ns, np.full_like(log.positions_m, np.nan), log.quaternions_xyzw, 'part'
-    )
-    bag = write_bag(tmp_path / 'nan', pose_entries(broken))
-    assert_refused(
-        refused(tmp_path, '--mesh', panel, '--trajectory', bag), str(bag), '150 not finite'
-    )
-
-
-@pytest.mark.slow
-def test_some_bad_poses_are_dropped_and_counted(panel, one_pass, tmp_path):
+def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
     entries = pose_entries(level_pass())
     messages = Messages()
     for row in (10, 60, 110):
         topic, stamp, _ = entries[row]
         nowhere = messages.pose(stamp + 1_000_000, [np.nan, 0, 0], LOOKING_ALONG_Y, '')
         entries.insert(row + 1, (topic, stamp + 1_000_000, nowhere))
-    bag = write_bag(tmp_path / 'some', entries)
-    films = []
-    for trajectory in (one_pass, bag):
-        done = paint(
-            'simulate', '--mesh', panel, '--trajectory', trajectory, *COARSE, '--json',
-            '-o', tmp_path / 'out',
-        )  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        films.append(json.loads(done.stdout))
-    assert films[1]['poses']['not_finite'] == 3
-    assert films[1]['mean_um'] == films[0]['mean_um']
+    surface = pd.read_mesh(panel, max_edge_length_m=0.1)
+    film = pd.simulate(surface, pd.read_recording(write_bag(tmp_path / 'some', entries)))
+    assert film.counts.not_finite == 3
+    assert np.array_equal(film.film_um, pd.simulate(surface, level_pass()).film_um)
+    positions = np.full_like(level_pass().positions_m, np.nan)
+    with pytest.raises(RecordingError, match='150 not finite'):
+        pd.simulate(surface, replace(level_pass(), positions_m=positions))
 
 
 @pytest.mark.parametrize(

@@ -8,12 +8,12 @@ import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.image import imread
 
-from booth import door, painted, panel, serpentine
-from paint_deposition.film.colour_scales import BARE_RGB
+from booth import door, panel, serpentine
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.report.pictures.film import film_picture, write_film_picture
+from paint_deposition.report.pictures.chart import save_picture
+from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import BELOW, HIGH, WITHIN
 
@@ -43,29 +43,6 @@ def test_the_view_is_the_guns(outward, down, right, labels):
     assert np.allclose(axes @ axes.T, np.eye(3))
     assert np.linalg.det(axes) == pytest.approx(1.0)
     assert view.up @ down <= 1e-9
-
-
-def draw(tmp_path, film_um, path, **options):
-    surface = door()
-    statistics = film_statistics(film_um, surface.vertex_areas_m2, 10.0, **options)
-    file = write_film_picture(
-        tmp_path / 'film.png', surface, film_um, path, statistics, 'Door', ''
-    )
-    assert [f.name for f in tmp_path.iterdir()] == ['film.png']
-    return (255 * imread(file)[:, :, :3]).round().astype(int)
-
-
-@pytest.mark.slow
-def test_the_film_is_coloured_and_bare_metal_is_grey(tmp_path):
-    log = serpentine((0.5,))
-    film = painted(door(), log).film_um
-    picture = draw(tmp_path, film, spray_path(log)[0], target_um=20.0, target_tolerance_um=3.0)
-    height, width, _ = picture.shape
-    assert min(height, width) > 600
-    colourful = np.ptp(picture, axis=2) > 60
-    assert 0.02 < colourful.mean() < 0.6
-    grey = (np.ptp(picture, axis=2) < 4) & (np.abs(picture[:, :, 0] - BARE_RGB[0]) < 60)
-    assert grey.mean() > 0.1
 
 
 def figure_of(surface, film_um, path=None, **target):
@@ -141,12 +118,8 @@ def test_the_bands_take_the_share_of_the_picture_that_the_figures_tell():
 @pytest.mark.slow
 @pytest.mark.parametrize(('suffix', 'begins'), [('svg', b'<?xml'), ('pdf', b'%PDF')])
 def test_the_suffix_is_the_format(tmp_path, suffix, begins):
-    film = painted(door(), serpentine((0.5,))).film_um
-    statistics = film_statistics(film, door().vertex_areas_m2, 10.0)
-    file = write_film_picture(
-        tmp_path / f'film.{suffix}', door(), film, SprayPath.empty(), statistics, 'Door', ''
-    )
-    assert file.read_bytes().startswith(begins)
+    picture = figure_of(panel(), np.zeros(len(panel().vertices_m)))
+    assert save_picture(picture, tmp_path / f'film.{suffix}').read_bytes().startswith(begins)
 
 
 @pytest.mark.parametrize(('height_m', 'whole'), [(0.9, True), (50.0, False)])

@@ -1,9 +1,9 @@
-"""Learned laws are shown: curves beside the nearest law of the library, all others as maps."""
+"""Learned laws are shown: curves with their closed forms, all others as maps."""
 
 import numpy as np
 import pytest
 
-from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
@@ -14,7 +14,6 @@ from paint_deposition.report.page.learned import (
     footprint_figure,
     learned_figure,
     map_figure,
-    nearest_law,
 )
 from small_campaign import small_campaign
 
@@ -33,43 +32,6 @@ def squeezed(distance_m: np.ndarray) -> np.ndarray:
     return 0.4 * np.exp(-((distance_m / 0.03) ** 2))
 
 
-def turned_away(angle_deg: np.ndarray) -> np.ndarray:
-    return 0.5 - 0.5 * np.cos(np.radians(angle_deg))
-
-
-@pytest.mark.parametrize(
-    ('law', 'expected'),
-    [
-        (like('edge_distance_m', 0.0, 0.25, squeezed), 'edge_build'),
-        (like('incidence_deg', 0.0, 60.0, turned_away), 'incidence_attraction'),
-        (like('standoff_ratio', 0.8, 1.3, lambda r: 0.5 * (1.0 - r)), 'standoff_efficiency'),
-        (
-            like('height_fraction', 0.0, 1.0, lambda h: 2.0 * (1.0 - h) ** 1.3, 'addition'),
-            'fog_gradient',
-        ),
-        (
-            like('curvature_per_m', -4.0, 4.0, lambda k: -0.2 * np.maximum(k, 0.0)),
-            'faraday_shielding',
-        ),
-    ],
-    ids=lambda value: value if isinstance(value, str) else '',
-)
-def test_the_nearest_law_is_found_up_to_a_constant(law, expected):
-    values = np.linspace(law.low, law.high, 101)
-    effect, curve = nearest_law(law, EFFECTS, values)
-    assert effect.id == expected
-    learned = law.curve(values) + (1.0 if law.kind == 'factor' else 0.0)
-    assert np.std(curve - learned) < 0.4 * np.std(learned)
-    moved = law.model_copy(update={'learned': tuple(np.array(law.learned) + 0.1)})
-    assert nearest_law(moved, EFFECTS, values)[0].id == expected
-
-
-@pytest.mark.parametrize('covariate', ['time_s', 'stroke_end_m', 'edge_distance_m'])
-def test_a_curve_that_no_effect_has_stands_alone(covariate):
-    law = like(covariate, 0.0, 1.0, lambda value: 0.2 * np.sin(15.0 * value))
-    assert nearest_law(law, EFFECTS, np.linspace(0.0, 1.0, 101)) is None
-
-
 @pytest.fixture(scope='module')
 def study(tmp_path_factory):
     return Study.of(small_campaign(tmp_path_factory.mktemp('campaign')))
@@ -80,18 +42,16 @@ def shown(study: Study, *effects) -> ReportData:
 
 
 @pytest.mark.slow
-def test_a_curve_is_drawn_beside_the_nearest_law_and_with_its_band_if_it_is_known(study):
+def test_a_curve_is_drawn_with_its_closed_form_and_with_its_band_if_it_is_known(study):
     law = like('edge_distance_m', 0.0, 0.25, squeezed)
     plain = learned_figure(shown(study, law))
-    (chart,) = plain['charts']
-    assert chart['title'].endswith('dashed: law of edge build')
-    curve, nearest = chart['data']
+    curve = plain['charts'][0]['data'][0]
     known = law.model_copy(update={'sd': (0.02,) * (KNOTS - 1) + (0.5,)})
     figure = learned_figure(shown(study, known))
     (chart,) = figure['charts']
-    band = chart['data'][0]
-    assert chart['data'][1]['y'] == pytest.approx(curve['y'])
-    assert chart['data'][2]['y'] == pytest.approx(nearest['y'])
+    band, again, *forms = chart['data']
+    assert again['y'] == pytest.approx(curve['y'])
+    assert ('dots: ' in chart['title']) == bool(forms)
     low, high = np.split(band['y'], 2)
     assert high[-1] - low[0] == pytest.approx(2.0 * 1.96 * 0.02)
     # Far from the edge it is so wide that its lower end would take all film away.

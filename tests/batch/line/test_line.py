@@ -14,7 +14,7 @@ STEP_AT, MINUTES = 7, 90.0
 
 @pytest.mark.slow
 def test_a_line_of_twelve_parts_with_a_step(tmp_path, at_worker):
-    job = painted_job(3, None, None, 12, 500_000)
+    job = painted_job(3, None, None, 12, 200_000)
     folder, output = tmp_path / 'line', tmp_path / 'out'
     hidden = Hidden(step_at=STEP_AT, step=0.85)
     names = write_line(job, folder, 12, hidden, minutes=MINUTES)

@@ -26,7 +26,7 @@ def line(tidy, tmp_path):
 
 
 @pytest.mark.slow
-def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
+def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path, at_worker):
     folder, names = line
     cut, twice, gauge, label, good = names
     (recording,) = (folder / cut).glob('*.mcap')
@@ -37,7 +37,7 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path):
     (folder / f'{label}.csv').rename(folder / f'{label}.CSV')
     (folder / 'unknown_door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
     (folder / 'empty').mkdir()
-    done = paint('line', folder, '-o', tmp_path / 'out', '--workers', 1, '--json')
+    done = paint('line', folder, '-o', tmp_path / 'out', *at_worker, '--json')
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert [error['run'] for error in told['errors']] == [cut, twice]

@@ -11,7 +11,7 @@ import yaml
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, installed_paint, paint
+from cli.command import assert_refused, paint
 from paint_deposition.batch.cases import ResultCache
 from paint_deposition.batch.cluster import run, workers
 from paint_deposition.batch.sweep.case import computed, varied_motion
@@ -75,7 +75,7 @@ def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
 @pytest.mark.slow
 def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_worker):
     output = tmp_path / 'out'
-    told = json.loads(installed_paint('sweep', sweep_file, '-o', output, '--json').stdout)
+    told = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
@@ -127,18 +127,11 @@ def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_work
     assert 'warning: case 1: ' in done.stderr
     assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
     assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
-    told['cases'] = told['cases'][:1] * 2
+    told['cases'] = told['cases'][:1]
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out')
     done.stderr = done.stderr.splitlines()[-1]  # after the notes
-    assert_refused(done, 'none of 2 cases has a result; case 1: ')
-
-
-def test_a_scheduler_that_does_not_answer_is_named(sweep_file, tmp_path, monkeypatch):
-    monkeypatch.setattr('paint_deposition.batch.cluster.CONNECT_S', 1)
-    address = 'tcp://127.0.0.1:9'
-    done = paint('sweep', sweep_file, '-o', tmp_path / 'out', '--scheduler', address)
-    assert_refused(done, address, 'dask scheduler')
+    assert_refused(done, 'none of 1 cases has a result; case 1: ')
 
 
 OWN = """
@@ -156,7 +149,7 @@ class Own(Effect):
 
 
 @pytest.mark.slow
-def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
+def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, worker):
     """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
     file.write_text(OWN)
@@ -170,8 +163,7 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path):
     alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
     file.unlink()
     finished = ResultCache(tmp_path / 'finished')
-    with workers(count=1) as client:
-        run(client, computed, job.cases, job.inputs, finished, lambda what, share: None)
+    run(worker, computed, job.cases, job.inputs, finished, lambda what, share: None)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']

@@ -57,9 +57,8 @@ def film_um(experiment, model: DepositionModel) -> np.ndarray:
     ('covariate', 'shape', 'kind'),
     [
         *((covariate, 'rising', 'factor') for covariate in CURVES),
-        *(('standoff_ratio', shape, 'factor') for shape in SHAPES),
-        *(('time_s', shape, 'factor') for shape in SHAPES),
-        *(('edge_distance_m', shape, 'addition') for shape in SHAPES),
+        *(('standoff_ratio', shape, 'factor') for shape in SHAPES if shape != 'rising'),
+        ('edge_distance_m', 'levelling off', 'addition'),
     ],
 )
 def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(

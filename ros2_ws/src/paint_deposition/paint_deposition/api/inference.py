@@ -1,4 +1,7 @@
-"""What readings say of a model: calibrate it, compare it, find what it lacks."""
+"""What readings say of a model: calibrate it, compare it, find what it lacks.
+
+A campaign is painted parts with their readings; ``progress`` is called with a line for each step.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.panel_fit import Reach, short_reaches
+from paint_deposition.inference.fitting.panel_fit import short_reaches
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -32,24 +35,18 @@ MOST_MODELS = 6
 STARTS = 10
 
 
-def _silent(line: str) -> None:
-    """Progress that nobody follows."""
-
-
 def calibrate(
     campaign: Campaign,
     model: DepositionModel | None = None,
     *,
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Calibration:
     """Fit the pattern, and the amplitudes of the model's effects, to all readings.
 
     Args:
-        campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
         seed: of the starts of the fit.
-        progress: called with a line for each step.
 
     Raises:
         ReadingsError: the readings cannot be what they are said to be, or determine nothing.
@@ -60,33 +57,36 @@ def calibrate(
 
 
 def compare(
-    campaign: Campaign, model: DepositionModel | None = None, *, progress: Progress = _silent
+    campaign: Campaign,
+    model: DepositionModel | None = None,
+    *,
+    progress: Progress = lambda line: None,
 ) -> Comparison:
     """Set a model beside the readings and say where it is off.
 
     Args:
-        campaign: painted parts with readings.
         model: taken as it is; default: the campaign's, else one fitted to the campaign.
-        progress: called with a line for each step.
     """
     model = model or _model_of(campaign)
     bell = with_brushes_of(campaign, DepositionModel())
     (model or bell).require_brushes(campaign.brushes)
     require_paint(campaign, model or bell)
     progress('fitting the pattern')
-    reaches: tuple[Reach, ...] = ()
-    if model is None:
-        study, fit = clean_and_fit(campaign, bell, starts=STARTS)
-        model = fit.model
-        reaches = short_reaches(study.campaign, model)
-    else:
+    if model is not None:
         study, _ = clean_and_fit(campaign, model, model.effects)
+        progress('comparing')
+        return compared(study, model)
+    study, fit = clean_and_fit(campaign, bell, starts=STARTS)
     progress('comparing')
-    return replace(compared(study, model), warnings=tuple(map(str, reaches)))
+    reaches = short_reaches(study.campaign, fit.model)
+    return replace(compared(study, fit.model), warnings=tuple(map(str, reaches)))
 
 
 def compare_models(
-    campaign: Campaign, models: Mapping[str, DepositionModel], *, progress: Progress = _silent
+    campaign: Campaign,
+    models: Mapping[str, DepositionModel],
+    *,
+    progress: Progress = lambda line: None,
 ) -> SideBySide:
     """Set several models beside the same readings.
 
@@ -94,7 +94,6 @@ def compare_models(
         campaign: painted parts with readings. Slips among them are found with the first model and
             left out for all.
         models: by name, taken as they are.
-        progress: called with a line for each step.
 
     Raises:
         PaintError: there are fewer than two, or more than a picture can show.
@@ -120,18 +119,16 @@ def diagnose(
     posterior: Posterior | None = None,
     own_effects: Iterable[type[Effect]] = (),
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Diagnosis:
     """Find which physical effect a model lacks, if any, and add it.
 
     Args:
-        campaign: painted parts with readings.
         model: to start from; default: the campaign's, else a 50 mm bell.
         posterior: what another job found of the model, as its file or its calibration has it:
             the prior of the fit. Default: that of the campaign's model, if it is that.
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.
-        progress: called with a line for each step.
     """
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
     start, known = _start(campaign, model, posterior)
@@ -149,17 +146,14 @@ def refit(
     *,
     posterior: Posterior | None = None,
     seed: int = 0,
-    progress: Progress = _silent,
+    progress: Progress = lambda line: None,
 ) -> Diagnosis:
     """Add an effect to a model, fit both to the readings and weigh them.
 
     Args:
-        campaign: painted parts with readings.
         added: an effect or its id; None fits the model as it is.
         model: to start from; default: the campaign's, else a 50 mm bell.
-        posterior: as for ``diagnose``.
-        seed: of the starts of the fits and of the simulated deviations.
-        progress: called with a line for each step.
+        posterior, seed: as for ``diagnose``.
 
     Raises:
         ModelError: the effect is not known, or the model has it already.

@@ -34,10 +34,9 @@ Progress = Callable[[str, float], None]
 
 @dataclass(frozen=True)
 class GunOnPart:
-    """A part and the motion of the gun over it.
+    """A part, its outward side turned to the gun, and the motion of the gun over it.
 
     Attributes:
-        surface: the part, its outward side turned to the gun.
         trajectory: the motion as recorded; path: the same cut into sub-steps; counts: its poses.
         geometry: how the gun ran over the part, and what is odd.
     """
@@ -182,17 +181,23 @@ def simulate(
         ReadingsError: readings that are not on the part.
     """
     motions = [trajectory] if isinstance(trajectory, Trajectory) else list(trajectory)
-    models = _one_for_each(model, len(motions))
+    if isinstance(model, Sequence):
+        models = list(model)
+    else:
+        models = [model or DepositionModel()] * len(motions)
+    if len(models) != len(motions):
+        raise ModelError(
+            f'{len(models)} models for {len(motions)} guns: give one for all, or one for each of '
+            'them'
+        )
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         require_one_finish(dict(zip(names, models, strict=True)))
     given = models
-    pairs = [
-        with_interpolated_brushes(motion, its) for motion, its in zip(motions, models, strict=True)
-    ]
-    motions, models = [motion for motion, _ in pairs], [its for _, its in pairs]
-    for motion, its_model in pairs:
-        require_brushes(motion, its_model)
+    pairs = list(map(with_interpolated_brushes, motions, models))
+    for pair in pairs:
+        require_brushes(*pair)
+    motions, models = map(list, zip(*pairs, strict=True))
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     common = _painted(surface.points(), seen, models, surface, 'single', progress)
@@ -224,18 +229,6 @@ def simulate(
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
         predicted_um = at_points.gauge_um[: len(part)]
     return Film(surface, guns, film_um, statistics, readings, predicted_um, common.used)
-
-
-def _one_for_each(
-    model: DepositionModel | Sequence[DepositionModel] | None, guns: int
-) -> list[DepositionModel]:
-    if model is None or isinstance(model, DepositionModel):
-        return [model or DepositionModel()] * guns
-    if len(model) != guns:
-        raise ModelError(
-            f'{len(model)} models for {guns} guns: give one for all, or one for each of them'
-        )
-    return list(model)
 
 
 def _painted(

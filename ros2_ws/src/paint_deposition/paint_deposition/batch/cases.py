@@ -15,8 +15,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 import paint_deposition
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.user_effects import effect_of
@@ -90,11 +88,6 @@ def digest_of(*values: Any) -> str:
     return hashlib.sha256(json_text({'values': values}).encode()).hexdigest()[:32]
 
 
-def content_digest(value: Any) -> str:
-    """The same for an input as it is in memory, such as a surface or a motion."""
-    return hashlib.sha256(_pickled(_ByValue, value)).hexdigest()[:32]
-
-
 @cache
 def code_digest() -> str:
     """The same for the package's version and all its sources."""
@@ -108,7 +101,9 @@ def code_digest() -> str:
 
 def packed(value: Any) -> bytes:
     """Bytes that ``pickle.loads`` opens in another process; a user's own effects are run there."""
-    return _pickled(_Packer, value)
+    content = io.BytesIO()
+    _Packer(content, protocol=5).dump(value)
+    return content.getvalue()
 
 
 class _Packer(pickle.Pickler):
@@ -116,18 +111,3 @@ class _Packer(pickle.Pickler):
         if isinstance(value, type) and issubclass(value, Effect) and value.file is not None:
             return effect_of, (value.file, value.file_content)
         return NotImplemented
-
-
-class _ByValue(_Packer):
-    """Of arrays their values count, not how they lie in memory."""
-
-    def reducer_override(self, value: Any) -> Any:
-        if isinstance(value, np.ndarray) and not value.dtype.hasobject:
-            return np.ndarray, (value.dtype.str, value.shape, value.tobytes())
-        return super().reducer_override(value)
-
-
-def _pickled(pickler: type[_Packer], value: Any) -> bytes:
-    content = io.BytesIO()
-    pickler(content, protocol=5).dump(value)
-    return content.getvalue()

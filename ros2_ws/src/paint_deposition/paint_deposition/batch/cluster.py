@@ -8,10 +8,9 @@ from __future__ import annotations
 import logging
 import os
 import pickle
-import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import CancelledError
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
@@ -29,9 +28,6 @@ ONE_THREAD = dict.fromkeys(
 CONNECT_S = 30
 # Inputs that a worker keeps open.
 OPENED = 8
-# How often results are looked for, and workers; and for how long there may be none.
-RESULTS_S, WORKERS_S, PATIENCE_S = 0.02, 3.0, 60.0
-RESUME = 'finished cases are kept, run the same command again'
 
 
 def compute(
@@ -43,16 +39,13 @@ def compute(
     results: ResultCache,
     progress: Callable[..., None],
 ) -> tuple[int, str]:
-    """Start workers if a case is left, compute it, and stop them; arguments as below.
-
-    Returns:
-        How many cases were computed, and the workers in words.
-    """
+    """Start workers if a case is left, and ``run``: the number computed, the workers in words."""
     if all(results.has(case.digest) for case in cases):
         return 0, 'none: every case had been finished'
     progress('starting the workers')
     with workers(scheduler, count) as client:
-        described = _in_words(client)  # before any of them may end
+        info = client.scheduler_info(n_workers=-1)
+        described = f'{len(info["workers"])} worker processes at {info["address"]}'
         return run(client, work, cases, inputs, results, progress), described
 
 
@@ -98,27 +91,18 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             ) from None
         # A lost connection becomes an error of one line in ``run``.
         with silence_logging_cmgr(logging.CRITICAL), client:
-            own, theirs = paint_deposition.__version__, client.run(_version)
-            if set(theirs.values()) != {own}:  # films are the same only by the same code
+            own, theirs = _version(), set(client.run(_version).values())
+            if theirs != {own}:  # films are the same only by the same code
                 raise ManyError(
                     f'the workers at {scheduler} have paint_deposition '
-                    f'{", ".join(sorted(set(theirs.values()))) or "nowhere: there is none"}, this '
-                    f'is {own}; start `dask worker {scheduler} --nthreads 1` with the same version'
+                    f'{", ".join(sorted(theirs)) or "nowhere: there is none"}, this is {own}; '
+                    f'start `dask worker {scheduler} --nthreads 1` with the same version'
                 )
             yield client
 
 
 def _version() -> str:
     return paint_deposition.__version__
-
-
-def _in_words(client: Client) -> str:
-    """'4 worker processes of 3.9 GiB at tcp://127.0.0.1:40001'."""
-    info = client.scheduler_info(n_workers=-1)
-    memory = [worker['memory_limit'] for worker in info['workers'].values()]
-    each = f'{min(memory) / 2**30:.1f} GiB' if all(memory) else 'unlimited memory'
-    plural = '' if len(memory) == 1 else 'es'
-    return f'{len(memory)} worker process{plural} of {each} at {info["address"]}'
 
 
 def run(
@@ -145,8 +129,10 @@ def run(
         progress: called with what is being done and the share of it that is done.
 
     Raises:
-        ManyError: the scheduler, or all workers, are lost.
+        ManyError: the scheduler is lost. Where all workers are, it waits for new ones.
     """
+    from distributed import as_completed
+
     left = {case.digest: case for case in cases if not results.has(case.digest)}
     # As bytes: Dask neither walks through the arrays nor copies them for each worker.
     sent = {
@@ -162,7 +148,7 @@ def run(
     }  # fmt: skip
     done = len(cases) - len(left)
     progress(f'{done} of {len(cases)} cases', done / max(len(cases), 1))
-    for future in _as_done(client, list(futures)):
+    for future in as_completed(list(futures)):
         case = futures.pop(future)
         columns, failure = _result(future)
         if failure is None:
@@ -186,31 +172,6 @@ def _unpacked(work: Callable[..., Columns], given: bytes, *inputs: bytes) -> Col
     return work(pickle.loads(given), *map(_opened, inputs))
 
 
-def _as_done(client: Client, futures: Sequence[Future]) -> Iterator[Future]:
-    """The futures in the order in which they are done.
-
-    Raises:
-        ManyError: there has been no worker for a while.
-    """
-    from distributed import as_completed
-
-    coming = as_completed(futures)
-    looked_s = there_s = time.monotonic()
-    while not coming.is_empty():
-        if coming.has_ready():
-            yield next(coming)
-            continue
-        time.sleep(RESULTS_S)
-        now_s = time.monotonic()
-        if now_s > looked_s + WORKERS_S:
-            looked_s = now_s
-            with suppress(OSError):  # the scheduler is lost: the futures will say so
-                if client.scheduler_info(n_workers=-1)['workers']:
-                    there_s = now_s
-            if now_s > there_s + PATIENCE_S:
-                raise ManyError(f'no worker has been there for {PATIENCE_S:.0f} s; {RESUME}')
-
-
 def _result(future: Future) -> tuple[Columns, str | None]:
     """The columns of a case, or why there are none.
 
@@ -222,7 +183,9 @@ def _result(future: Future) -> tuple[Columns, str | None]:
     try:
         return future.result(), None
     except CancelledError:
-        raise ManyError(f'the scheduler is lost; {RESUME}') from None
+        raise ManyError(
+            'the scheduler is lost; finished cases are kept, run the same command again'
+        ) from None
     except KilledWorker as error:
         return {}, (
             f'not computed: {error.allowed_failures + 1} workers ended while they computed it; '

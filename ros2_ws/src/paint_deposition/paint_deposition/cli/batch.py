@@ -3,23 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from paint_deposition.cli.options import (
-    FILE,
-    FOLDER,
-    JSON,
-    PICTURES,
-    file_lines,
-    output_option,
-    say_all,
-)
+from paint_deposition.cli import options
 from paint_deposition.cli.progress import Progress
-from paint_deposition.cli.results_folder import results_in
 from paint_deposition.errors import ManyError
 from paint_deposition.files.parquet import MANY, require_libraries
 
@@ -29,9 +19,7 @@ if TYPE_CHECKING:
     from paint_deposition.batch.cases import Case, ResultCache
 
 MOST_WARNINGS = 5
-# Of finished cases, in the folder of the results.
-FINISHED = 'finished'
-WORKERS = (
+workers_options = options.grouped((
     click.option(
         '--scheduler', metavar='ADDRESS',
         help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
@@ -41,55 +29,50 @@ WORKERS = (
         '--workers', 'count', type=click.IntRange(min=1),
         help='Processes on this machine, of one thread each; default: one a core.',
     ),
-    PICTURES,
-    JSON,
-)  # fmt: skip
-
-
-def with_workers(command: Callable) -> Callable:
-    """Give a command the options ``WORKERS``."""
-    return reduce(lambda taken, option: option(taken), reversed(WORKERS), command)
+), 'where')  # fmt: skip
 
 
 @click.command('sweep')
-@click.argument('sweep', type=FILE)
-@output_option('cases.parquet, sweep.json and sweep.png')
-@with_workers
-def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, **where: Any) -> None:
+@click.argument('sweep', type=options.FILE)
+@options.output_option('cases.parquet, sweep.json and sweep.png')
+@workers_options
+@options.PICTURES
+@options.JSON
+def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, where: dict) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
-    Each case is what `simulate` computes. Finished cases are kept in
-    the folder `finished` of the output: a run that was cut off computes the rest only, and so does
-    a sweep with more cases.
+    Each case is what `simulate` computes. Finished cases are kept in the folder `finished` of the
+    output: a run that was cut off computes the rest only, and so does a sweep with more cases.
     """
     require_libraries('paint sweep', MANY)
     from paint_deposition.batch.sweep.case import computed
     from paint_deposition.batch.sweep.job import Job
-    from paint_deposition.batch.sweep.result import Sweep, write_sweep
+    from paint_deposition.batch.sweep.result import Sweep
     from paint_deposition.batch.sweep.sweep_file import read_sweep
 
     with Progress('sweep') as show:
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
-        say_all('note', job.notes)
+        options.say_all('note', job.notes)
         finished, done, workers = _computed(computed, job.cases, job.inputs, output, show, **where)
         show('writing and drawing')
         found = Sweep.of(job, finished, done, workers)
         if len(found.errors) == len(job.cases):
             number, error = found.errors[0]
             raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
-        with results_in(output) as folder:
-            files = [output / file.name for file in write_sweep(found, folder, pictures)]
+        files = options.write_results(found, output, pictures=pictures)
     odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
     _say_warnings(odd, output / 'cases.parquet')
-    _say_results(output / 'sweep.json', as_json, [*found.lines, *file_lines(files)])
+    options.say_results(files, as_json, found.lines)
 
 
 @click.command('line')
-@click.argument('folder', type=FOLDER)
-@output_option('points.parquet, parts.parquet, line.json and line.png')
-@with_workers
-def line_command(folder: Path, output: Path, pictures: str, as_json: bool, **where: Any) -> None:
+@click.argument('folder', type=options.FOLDER)
+@options.output_option('points.parquet, parts.parquet, line.json and line.png')
+@workers_options
+@options.PICTURES
+@options.JSON
+def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where: dict) -> None:
     """Simulate and compare all runs in FOLDER, and show what they share and what changes.
 
     FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
@@ -97,7 +80,6 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, **whe
     folder `finished` of the output: the next time only new runs are computed.
     """
     require_libraries('paint line', MANY)
-    from paint_deposition.batch.line.output import write_line
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
@@ -112,14 +94,13 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, **whe
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
-        with results_in(output) as results:
-            files = [output / file.name for file in write_line(found, results, pictures)]
+        files = options.write_results(found, output, pictures=pictures)
     _say_warnings([*found.errors, *found.remarks], output / 'line.json')
     if strays:
         more = f' and {len(strays) - MOST_WARNINGS} more' if len(strays) > MOST_WARNINGS else ''
         named = ', '.join(strays[:MOST_WARNINGS])
-        say_all('warning', [f'no recording has the name of {named}{more}; left out'])
-    _say_results(output / 'line.json', as_json, [*found.lines, *file_lines(files)])
+        options.say_all('warning', [f'no recording has the name of {named}{more}; left out'])
+    options.say_results(files, as_json, found.lines)
 
 
 def _computed(
@@ -137,19 +118,14 @@ def _computed(
 
     if scheduler is not None and count is not None:
         raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
-    finished = ResultCache(output / FINISHED)
+    finished = ResultCache(output / 'finished')
     done, workers = compute(scheduler, count, work, cases, inputs, finished, show)
-    say_all('note', [f'workers: {workers}'])
+    options.say_all('note', [f'workers: {workers}'])
     return finished, done, workers
 
 
 def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
-    """Print some of many warnings on stderr, each reason once, and where the others are.
-
-    Args:
-        warnings: name of a case or part, and what is odd about it.
-        file: that has them all.
-    """
+    """Print some of many warnings (name, reason), each reason once, and the file of all."""
     named: dict[str, list[str]] = {}
     for name, reason in warnings:
         named.setdefault(reason, []).append(name)
@@ -157,13 +133,6 @@ def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
         f'{first}{f" and {len(others)} more" if others else ""}: {reason}'
         for reason, (first, *others) in named.items()
     ]
-    say_all('warning', lines[:MOST_WARNINGS])
+    options.say_all('warning', lines[:MOST_WARNINGS])
     if len(lines) > MOST_WARNINGS:
-        say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
-
-
-def _say_results(figures: Path, as_json: bool, lines: Iterable[str]) -> None:
-    if as_json:
-        click.echo(figures.read_text(encoding='utf-8'), nl=False)
-    else:
-        click.echo('\n'.join(lines))
+        options.say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])

@@ -9,43 +9,32 @@ from typing import Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import model_for
-from paint_deposition.cli.options import (
-    FILE,
-    JSON,
-    MODEL,
-    PICTURES,
-    file_lines,
-    motion_options,
-    output_option,
-    part_options,
-    say_all,
-    say_results,
-    seed_option,
-    write_results,
-)
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import ImproveRequest
 
 
 @click.command('improve')
-@part_options(0.02)
+@options.part_options(0.02)
 @click.option(
-    '--trajectory', required=True, type=FILE,
+    '--trajectory', required=True, type=options.FILE,
     help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',
 )  # fmt: skip
-@MODEL
+@options.MODEL
 @click.option(
-    '--rival', 'rivals', type=FILE, multiple=True,
+    '--rival', 'rivals', type=options.FILE, multiple=True,
     help='Another model that explains the readings as well; the film is made even for all.',
 )  # fmt: skip
-@output_option('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
+@options.output_option(
+    'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
+)
 @options_of(ImproveRequest)
-@seed_option('the models drawn from what the model file knows')
-@motion_options
-@PICTURES
-@JSON
+@options.seed_option('the models drawn from what the model file knows')
+@options.motion_options
+@options.PICTURES
+@options.JSON
 def improve_command(
     request: ImproveRequest,
     part: dict[str, Any],
@@ -84,14 +73,13 @@ def improve_command(
             'part_pose': motion.get('part_pose'),
         }
         show('writing and drawing')
-        files = write_results(
+        files = options.write_results(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    say_all('note', [*result.surface.notes, *recorded.notes])
-    say_all('warning', [*recorded.warnings, *result.warnings])
-    lines = [*_lines(result), *file_lines(files)]
-    say_results(files, as_json, lines, model=chosen.words)
+    options.say_all('note', [*result.surface.notes, *recorded.notes])
+    options.say_all('warning', [*recorded.warnings, *result.warnings])
+    options.say_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.Improvement) -> Iterator[str]:

@@ -2,80 +2,97 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 import paint_deposition as pd
-from paint_deposition.cli.model_choice import campaign_model_words
-from paint_deposition.cli.options import (
-    CAMPAIGN,
-    FILE,
-    JSON,
-    PART_POSE,
-    PICTURES,
-    file_lines,
-    geometry_lines,
-    model_option,
-    output_option,
-    read_inputs,
-    say_all,
-    say_geometry,
-    say_results,
-    seed_option,
-    write_results,
-)
+from paint_deposition.cli import options
+from paint_deposition.cli.model_choice import model_words
 from paint_deposition.cli.progress import Progress
 from paint_deposition.errors import PaintError
 
-OUTPUT = output_option('the results')
-MODEL = model_option("Model to start from; default: the campaign's, else that of a 50 mm bell.")
-SEED = seed_option(
+OUTPUT = options.output_option('the results')
+MODEL = options.model_option(
+    "Model to start from; default: the campaign's, else that of a 50 mm bell."
+)
+SEED = options.seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
     'always the same'
 )
+FITTED = 'fitted to the campaign, from'
 
 
-@click.command('calibrate')
-@CAMPAIGN
-@MODEL
-@output_option('model.yaml, calibration.json and pictures')
-@seed_option('the starts of the fit')
-@PART_POSE
-@PICTURES
-@JSON
-def calibrate_command(
+def _run(
+    command: str,
+    verb: Callable[..., Any],
+    lines: Callable[[Any], Iterable[str]],
     campaign: Path,
     model_file: Path | None,
     output: Path,
-    seed: int,
     part_pose: list[float] | None,
     pictures: str,
     as_json: bool,
+    begins_with: Iterable[str] = ('model', 'posterior'),
+    fitted: str = FITTED,
+    words: str = '',
 ) -> None:
+    """Read a campaign and a model, compute, write, and say what came out.
+
+    Args:
+        command: its name.
+        verb: what computes the result, which ``lines`` puts into words.
+        begins_with: what of the model's file the verb takes.
+        fitted: what happens to the model, for the line on it; words: that line, if it is another.
+    """
+    from paint_deposition.files.model_file import read_model_file
+
+    def remark(kind: str, experiment: str, line: str) -> None:
+        options.say_all(kind, [f'{experiment}: {line}'])
+
+    with Progress(command) as show:
+        data = pd.read_campaign(campaign, show, part_pose, remark)
+        chosen = Path(model_file or data.model_file or '')
+        start = read_model_file(chosen) if chosen.name else None
+        known = {name: getattr(start, name, None) for name in begins_with}
+        result = verb(data, progress=show, **known)
+        show('writing')
+        more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
+        files = options.write_results(result, output, pictures=pictures, **more)
+    options.say_all('note', data.understood)
+    if not isinstance(result, pd.SideBySide):
+        for name, found in result.geometry.items():
+            options.say_all('warning', (f'{name}: {line}' for line in found.warnings))
+        options.say_all('warning', result.warnings)
+    told = f'{fitted or FITTED} a 50 mm bell'
+    if start is not None:
+        told = f'{fitted} {model_words(chosen, start)}'.strip()
+    options.say_results(files, as_json, lines(result), words or told)
+
+
+@click.command('calibrate')
+@options.CAMPAIGN
+@MODEL
+@options.output_option('model.yaml, calibration.json and pictures')
+@options.seed_option('the starts of the fit')
+@options.PART_POSE
+@options.PICTURES
+@options.JSON
+def calibrate_command(seed: int, **given: Any) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 
     Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
     effects of the model to start from are fitted as well; its projection is kept.
     """
-    with Progress('calibrate') as show:
-        data, start = read_inputs(campaign, model_file, show, part_pose)
-        result = pd.calibrate(data, start.model if start else None, seed=seed, progress=show)
-        show('writing')
-        files = write_results(result, output, start=start, pictures=pictures)
-    say_geometry(result)
-    if not as_json:
-        say_all('note', data.understood)
-        say_all('warning', result.warnings)
-    lines = [*_calibration_lines(result), *file_lines(files)]
-    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
-    say_results(files, as_json, lines, model=words)
+    verb = partial(pd.calibrate, seed=seed)
+    _run('calibrate', verb, _calibration_lines, begins_with=['model'], **given)
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
-    yield from geometry_lines(result)
+    yield from options.geometry_lines(result)
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
@@ -93,50 +110,30 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
 
 
 @click.command('compare')
-@CAMPAIGN
+@options.CAMPAIGN
 @click.option(
-    '--model', 'model_files', type=FILE, multiple=True,
+    '--model', 'model_files', type=options.FILE, multiple=True,
     help="Model to judge as it is; default: the campaign's, else one fitted to it. Repeated, the "
     'models are set side by side.',
 )  # fmt: skip
 @OUTPUT
-@PART_POSE
-@PICTURES
-@JSON
-def compare_command(
-    campaign: Path,
-    model_files: tuple[Path, ...],
-    output: Path,
-    part_pose: list[float] | None,
-    pictures: str,
-    as_json: bool,
-) -> None:
+@options.PART_POSE
+@options.PICTURES
+@options.JSON
+def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
 
-    Writes comparison.json, residuals.csv, the residual as coloured meshes, comparison.png and
-    report.html. With several models there is a table of residuals for each, and no meshes.
+    Writes comparison.json, residuals.csv, comparison.png and report.html. With several models
+    there is a table of residuals for each.
     """
-    several = len(model_files) > 1
-    model_file = model_files[0] if len(model_files) == 1 else None
-    with Progress('compare') as show:
-        data, start = read_inputs(campaign, model_file, show, part_pose)
-        result: pd.Comparison | pd.SideBySide
-        if several:
-            models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
-            result = pd.compare_models(data, models, progress=show)
-        else:
-            result = pd.compare(data, start.model if start else None, progress=show)
-        show('writing the report')
-        files = write_results(result, output, pictures=pictures)
-    say_all('note', data.understood)
-    if isinstance(result, pd.SideBySide):
-        lines, words = _side_by_side_lines(result, output), ', '.join(map(str, model_files))
+    if len(model_files) > 1:
+        models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
+        words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
+        given |= {'model_file': None, 'begins_with': [], 'words': words}
+        _run('compare', verb, _side_by_side_lines, **given)
     else:
-        say_geometry(result)
-        say_all('warning', result.warnings)
-        lines = _comparison_lines(result, output)
-        words = campaign_model_words(data, model_file, start, fitted='')
-    say_results(files, as_json, lines, model=words)
+        given |= {'model_file': next(iter(model_files), None), 'begins_with': ['model']}
+        _run('compare', pd.compare, _comparison_lines, fitted='', **given)
 
 
 def _names(files: tuple[Path, ...]) -> list[str]:
@@ -149,7 +146,7 @@ def _names(files: tuple[Path, ...]) -> list[str]:
     return names
 
 
-def _side_by_side_lines(beside: pd.SideBySide, output: Path) -> Iterator[str]:
+def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
     width = max(len(name) for name in beside.by_name)
     parts = [e.name for e in next(iter(beside.by_name.values())).study.campaign.experiments]
     yield f'{"RMSE [µm]":{width}}  {"all":>10}' + ''.join(f'  {part:>10}' for part in parts)
@@ -158,11 +155,10 @@ def _side_by_side_lines(beside: pd.SideBySide, output: Path) -> Iterator[str]:
         cells = [comparison.points.rmse_um, *errors]
         yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in cells)
     yield f'nearest to the readings: {beside.best}'
-    yield f'report: {output / "report.html"}'
 
 
-def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
-    yield from geometry_lines(comparison)
+def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
+    yield from options.geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -177,39 +173,35 @@ def _comparison_lines(comparison: pd.Comparison, output: Path) -> Iterator[str]:
         yield 'no region of significant misfit'
     for note in comparison.study.notes:
         yield f'note: {note}'
-    yield f'report: {output / "report.html"}'
 
 
 @click.command('diagnose')
-@CAMPAIGN
+@options.CAMPAIGN
 @MODEL
 @OUTPUT
 @click.option(
-    '--effect-file', 'effect_files', multiple=True, type=FILE,
+    '--effect-file', 'effect_files', multiple=True, type=options.FILE,
     help='Python file with an effect of your own to consider as well; may be repeated.',
 )  # fmt: skip
 @SEED
-@PART_POSE
-@PICTURES
-@JSON
-def diagnose_command(effect_files: tuple[Path, ...], **given: Any) -> None:
+@options.PART_POSE
+@options.PICTURES
+@options.JSON
+def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
 
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
-    residuals.csv, the residual as coloured meshes, comparison.png and report.html.
+    residuals.csv, comparison.png and report.html.
     """
     from paint_deposition.effects.user_effects import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
 
-    def diagnosed(data: pd.Campaign, *start: Any, **options: Any) -> pd.Diagnosis:
-        return pd.diagnose(data, *start, own_effects=own, **options)
-
-    _diagnose(Progress('diagnose'), diagnosed, **given)
+    _run('diagnose', partial(pd.diagnose, own_effects=own, seed=seed), _diagnosis_lines, **given)
 
 
 @click.command('refit')
-@CAMPAIGN
+@options.CAMPAIGN
 @click.option(
     '--add', 'effect', required=True,
     help="Effect to add: an id, a Python file with one of your own, or a law to learn over a "
@@ -224,10 +216,10 @@ def diagnose_command(effect_files: tuple[Path, ...], **given: Any) -> None:
 @MODEL
 @OUTPUT
 @SEED
-@PART_POSE
-@PICTURES
-@JSON
-def refit_command(effect: str, effect_file: Path | None, **given: Any) -> None:
+@options.PART_POSE
+@options.PICTURES
+@options.JSON
+def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any) -> None:
     """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
 
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
@@ -236,24 +228,24 @@ def refit_command(effect: str, effect_file: Path | None, **given: Any) -> None:
     from paint_deposition.effects.catalogue import effect_class
     from paint_deposition.effects.user_effects import load_effect_file
 
-    if effect == 'none':
-        added = None
-    else:
+    added = None
+    if effect != 'none':
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
-    _require_place_for(effect_file, effect, added)
+    if effect_file is not None:
+        _require_place_for(effect_file, effect, added)
 
-    def refitted(data: pd.Campaign, *start: Any, **options: Any) -> pd.Diagnosis:
-        return pd.refit(data, added, *start, **options)
+    def lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
+        yield from _diagnosis_lines(diagnosis)
+        if effect_file is not None:
+            yield _write_as_effect(diagnosis, effect_file)
 
-    _diagnose(Progress('refit'), refitted, effect_file=effect_file, **given)
+    _run('refit', partial(pd.refit, added=added, seed=seed), lines, **given)
 
 
-def _require_place_for(effect_file: Path | None, effect: str, added: Any) -> None:
+def _require_place_for(effect_file: Path, effect: str, added: Any) -> None:
     """Refuse what cannot become an effect file, before anything is computed."""
     from paint_deposition.effects.learned.curves import LearnedCurve
 
-    if effect_file is None:
-        return
     if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
         raise click.UsageError(
             f'--as-effect is for a law learned over one covariate, and --add is {effect}; give '
@@ -282,37 +274,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     return f'effect file: {forms[0].formula}; in a model {{{effect_entry(forms[0], effect_file)}}}'
 
 
-def _diagnose(
-    progress: Progress,
-    diagnosed: Callable[..., pd.Diagnosis],
-    campaign: Path,
-    model_file: Path | None,
-    output: Path,
-    seed: int,
-    part_pose: list[float] | None,
-    pictures: str,
-    as_json: bool,
-    effect_file: Path | None = None,
-) -> None:
-    with progress as show:
-        data, start = read_inputs(campaign, model_file, show, part_pose)
-        model, posterior = (start.model, start.posterior) if start else (None, None)
-        diagnosis = diagnosed(data, model, posterior=posterior, seed=seed, progress=show)
-        show('comparing before and after')
-        _ = diagnosis.comparisons
-        show('writing the report')
-        files = write_results(diagnosis, output, start=start, pictures=pictures)
-    say_all('note', data.understood)
-    say_geometry(diagnosis)
-    say_all('warning', diagnosis.warnings)
-    words = campaign_model_words(data, model_file, start, 'fitted to the campaign, from')
-    lines = [*_diagnosis_lines(diagnosis, output)]
-    if effect_file:
-        lines.append(_write_as_effect(diagnosis, effect_file))
-    say_results(files, as_json, lines, model=words)
-
-
-def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
+def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.effects.learned.law import LearnedLaw
     from paint_deposition.report.words import (
@@ -359,6 +321,4 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis, output: Path) -> Iterator[str]:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in (*diagnosis.study.notes, *diagnosis.left_over):
         yield f'note: {note}'
-    yield from geometry_lines(diagnosis)
-    yield f'model: {output / "model.yaml"}'
-    yield f'report: {output / "report.html"}'
+    yield from options.geometry_lines(diagnosis)

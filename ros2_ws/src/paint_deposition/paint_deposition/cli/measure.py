@@ -9,22 +9,8 @@ from typing import Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import chosen_model, model_for
-from paint_deposition.cli.options import (
-    BRUSH,
-    FILE,
-    JSON,
-    MAX_POSE_GAP,
-    MODEL,
-    PICTURES,
-    file_lines,
-    motion_options,
-    output_option,
-    part_options,
-    say_all,
-    say_results,
-    write_results,
-)
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
@@ -34,21 +20,21 @@ HARDLY = 0.15
 
 
 @click.command('measure')
-@part_options(0.01)
+@options.part_options(0.01)
 @click.option(
-    '--trajectory', type=FILE,
+    '--trajectory', type=options.FILE,
     help='How it is painted: what `simulate` takes; default: passes as `plan` would lay them, '
     'with --target-um or --speed.',
 )  # fmt: skip
-@MODEL
-@BRUSH
+@options.MODEL
+@options.BRUSH
 @options_of(MeasureRequest)
 @options_of(FilmBuild, into='passes')
-@output_option('points.csv, poses.csv, points.png and measure.json')
-@motion_options
-@MAX_POSE_GAP
-@PICTURES
-@JSON
+@options.output_option('points.csv, poses.csv, points.png and measure.json')
+@options.motion_options
+@options.MAX_POSE_GAP
+@options.PICTURES
+@options.JSON
 def measure_command(
     request: MeasureRequest,
     passes: FilmBuild,
@@ -74,16 +60,13 @@ def measure_command(
         )
     with Progress('measure') as show:
         show('reading')
-        chosen = (
-            model_for(model_file, trajectory)
-            if trajectory
-            else chosen_model(model_file, brush=brush)
-        )
         surface = pd.read_mesh(**part)
         warnings: tuple[str, ...] = ()
         if trajectory is None:
+            chosen = chosen_model(model_file, brush=brush)
             recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
         else:
+            chosen = model_for(model_file, trajectory)
             recorded = pd.read_recording(trajectory, **motion)
             warnings = recorded.warnings
         posterior = chosen.file.posterior if chosen.file else None
@@ -97,13 +80,13 @@ def measure_command(
             'model_file': str(chosen.path or ''),
         }
         show('writing and drawing')
-        files = write_results(
+        files = options.write_results(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    say_all('note', result.surface.notes)
-    say_all('warning', warnings)
-    say_results(files, as_json, [*_lines(result), *file_lines(files)], model=chosen.words)
+    options.say_all('note', result.surface.notes)
+    options.say_all('warning', warnings)
+    options.say_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.ChosenReadings) -> Iterator[str]:

@@ -14,19 +14,10 @@ from paint_deposition.errors import ModelError
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
 
-DIGITS = 12
-
 
 @dataclass(frozen=True)
 class ChosenModel:
-    """A model and where it came from.
-
-    Attributes:
-        file: the model, None for the default.
-        path: its file, None for the default.
-        words: the line for the user.
-        brush: the one that was chosen; 0 is none.
-    """
+    """A model, where it came from (None: the default), and the line for the user."""
 
     file: ModelFile | None
     path: Path | None
@@ -47,7 +38,7 @@ def chosen_model(given: Path | None, brush: int = 0) -> ChosenModel:
     if given is None:
         return ChosenModel(None, None, 'default, a 50 mm bell; --model gives another', brush)
     file = read_model_file(given)
-    words = f'{_words(given, file)}, brush {brush}' if brush else _words(given, file)
+    words = model_words(given, file) + (f', brush {brush}' if brush else '')
     return ChosenModel(file, given, words, brush)
 
 
@@ -70,14 +61,13 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
             say_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
         return chosen
     if planned.file is None:
-        warning = (
+        say_all('warning', [
             f'{motion} was planned with a model ({planned.digest[:12]}) that is not in '
             f'{planned.path}; give it with --model, or the film is another one than planned'
-        )
-        say_all('warning', [warning])
+        ])  # fmt: skip
         return chosen
-    words = _words(planned.path, planned.file)
-    return ChosenModel(planned.file, planned.path, f'that of the plan, {words}')
+    words = f'that of the plan, {model_words(planned.path, planned.file)}'
+    return ChosenModel(planned.file, planned.path, words)
 
 
 def models_for(
@@ -98,36 +88,17 @@ def models_for(
     files = [*given] if len(given) == len(guns) else [*given, None][:1] * len(guns)
     each = motions if len(motions) == len(guns) else [motions[0]] * len(guns)
     chosen = [model_for(*pair) for pair in zip(files, each, strict=True)]
-    if len(given) < 2:
-        return chosen
-    return [
-        replace(one, words=f'{gun}: {one.words}') for gun, one in zip(guns, chosen, strict=True)
-    ]
+    names = [f'{gun}: ' if len(given) > 1 else '' for gun in guns]
+    return [replace(m, words=name + m.words) for name, m in zip(names, chosen, strict=True)]
 
 
-def campaign_model_words(
-    data: pd.Campaign, given: Path | None, start: ModelFile | None, fitted: str
-) -> str:
-    """The line for a command on a campaign.
-
-    Args:
-        data: the campaign, which may name a model. given: that of --model, or None.
-        start: the one of them that was read.
-        fitted: what happened to it, as 'fitted to the campaign, from'; or '' if it was only used.
-    """
-    path = given or data.model_file
-    if start is None or path is None:
-        return f'{fitted or "fitted to the campaign, from"} a 50 mm bell'
-    return f'{fitted} {_words(Path(path), start)}'.strip()
-
-
-def _words(path: Path, file: ModelFile) -> str:
+def model_words(path: Path, file: ModelFile) -> str:
     """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2 (interpolated), effects: air_drift'."""
     from paint_deposition.files.provenance import model_digest
 
     called = f" '{file.name}'" if file.name else ''
     effects = ', '.join(effect.id for effect in file.model.effects) or 'none'
-    digest = model_digest(file.model)[:DIGITS]
+    digest = model_digest(file.model)[:12]
     brushes = ', '.join(
         f'{brush.number} (interpolated)' if brush.interpolated else str(brush.number)
         for brush in file.model.brushes

@@ -16,8 +16,6 @@ from paint_deposition.cli.results_folder import results_in
 if TYPE_CHECKING:
     import numpy as np
 
-    from paint_deposition.files.model_file import ModelFile
-
 
 class Finite:
     """Of a type of numbers those that are finite: `nan` and `inf` are numbers to Python."""
@@ -56,8 +54,6 @@ def model_option(text: str) -> Callable:
 
 
 MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
-
-
 BRUSH = click.option(
     '--brush', default=0, type=click.IntRange(min=0), show_default='the only one',
     help='Number of the brush to work with, of a model with several.',
@@ -71,10 +67,8 @@ def output_option(what: str, default: str | None = None) -> Callable:
         'into it are removed; other files in it are kept, unless a result has their name. Nothing '
         'is changed before all results are complete.'
     )
-    required = default is None
-    return click.option(
-        '-o', '--output', type=FOLDER, required=required, default=default, help=text
-    )
+    needed = default is None
+    return click.option('-o', '--output', type=FOLDER, required=needed, default=default, help=text)
 
 
 def seed_option(of: str) -> Callable:
@@ -82,9 +76,7 @@ def seed_option(of: str) -> Callable:
     return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
 
 
-def _vector(
-    ctx: click.Context, param: click.Parameter, given: tuple[float, float, float] | None
-) -> np.ndarray | None:
+def _vector(ctx: click.Context, param: click.Parameter, given: tuple | None) -> np.ndarray | None:
     if given is None:
         return None
     import numpy as np
@@ -94,18 +86,14 @@ def _vector(
     return np.array(given)
 
 
-def _pose(
-    ctx: click.Context, param: click.Parameter, given: tuple[float, ...] | None
-) -> list[float] | None:
+def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> list[float] | None:
     if given is None:
         return None
     from paint_deposition.motion.part_frame import is_pose
 
     if not is_pose(given):
-        norm = math.hypot(*given[3:])
-        raise click.BadParameter(
-            f'the quaternion qx qy qz qw has the norm {norm:.4g}, not 1', ctx, param
-        )
+        words = f'the quaternion qx qy qz qw has the norm {math.hypot(*given[3:]):.4g}, not 1'
+        raise click.BadParameter(words, ctx, param)
     return list(given)
 
 
@@ -164,7 +152,7 @@ MOTION = (
 )  # fmt: skip
 
 
-def _grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Callable]:
+def grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Callable]:
     """Give a command these options; it takes what was given as one argument."""
 
     def with_options(function: Callable) -> Callable:
@@ -181,7 +169,7 @@ def _grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Cal
     return with_group
 
 
-motion_options = _grouped(MOTION, 'motion')
+motion_options = grouped(MOTION, 'motion')
 
 
 def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
@@ -207,40 +195,13 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
             help='Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.',
         ),
     )  # fmt: skip
-    return _grouped(options, 'part')
-
-
-def read_inputs(
-    campaign: Path,
-    model_file: Path | None,
-    progress: Callable[[str], None],
-    part_pose: list[float] | None = None,
-) -> tuple[pd.Campaign, ModelFile | None]:
-    """Read a campaign and the model to start from: the one given, or else the campaign's, if any.
-
-    Notes and warnings on the experiments go to stderr. ``part_pose`` is that of experiments
-    without one of their own.
-    """
-    from paint_deposition.files.model_file import read_model_file
-
-    def remark(kind: str, experiment: str, line: str) -> None:
-        say_all(kind, [f'{experiment}: {line}'])
-
-    data = pd.read_campaign(campaign, progress, part_pose, remark)
-    chosen = model_file or data.model_file
-    return data, read_model_file(chosen) if chosen else None
+    return grouped(options, 'part')
 
 
 def say_all(label: str, lines: Iterable[str]) -> None:
     """Print each line behind its label on stderr: notes, warnings."""
     for line in lines:
         click.echo(f'{label}: {line}', err=True)
-
-
-def say_geometry(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> None:
-    """Print what was odd in how the gun ran over the parts of a campaign, on stderr."""
-    for name, found in result.geometry.items():
-        say_all('warning', (f'{name}: {line}' for line in found.warnings))
 
 
 def geometry_lines(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> Iterator[str]:
@@ -254,18 +215,14 @@ def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
         return [output / file.name for file in pd.write(result, folder, **more)]
 
 
-def say_results(files: list[Path], as_json: bool, lines: Iterable[str], *, model: str) -> None:
-    """Print the file of figures as it was written, or else what it comes to in these lines.
-
-    The first line says which model was used.
-    """
+def say_results(files: list[Path], as_json: bool, lines: Iterable[str], model: str = '') -> None:
+    """Print the file of figures as written, or else the model, these lines and the files."""
+    head = [f'model: {model}'] if model else []
     if as_json:
         figures = next(file for file in files if file.suffix == '.json')
         click.echo(figures.read_text(encoding='utf-8'), nl=False)
     else:
-        click.echo(f'model: {model}')
-        for line in lines:
-            click.echo(line)
+        click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in files)]))
 
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
@@ -273,8 +230,3 @@ def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
     from paint_deposition.film.paint_used import paint_sentence
 
     return (line for line in [paint_sentence(result)] if line)
-
-
-def file_lines(files: Iterable[Path]) -> Iterator[str]:
-    """The files of a folder of results."""
-    return (f'  {file}' for file in files)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Collection
+from collections.abc import Callable
 from functools import reduce, wraps
 from pathlib import Path
 from types import NoneType
@@ -18,9 +18,7 @@ from paint_deposition.cli.options import FILE, FiniteNumber, FiniteRange
 from paint_deposition.request import reason
 
 
-def options_of(
-    kind: type[BaseModel], into: str = 'request', leave_out: Collection[str] = ()
-) -> Callable[[Callable], Callable]:
+def options_of(kind: type[BaseModel], into: str = 'request') -> Callable[[Callable], Callable]:
     """Give a command an option for each field of a request; it takes the request as one argument.
 
     An option is called as its field, or by ``option`` in the field's ``json_schema_extra``; its
@@ -30,9 +28,8 @@ def options_of(
         kind: the model. Fields may be numbers, words, choices, flags, paths, and tuples or lists
             of a fixed length; one whose default is None may be left out.
         into: name of the argument of the command that takes the request.
-        leave_out: fields that are no options and keep their defaults.
     """
-    names = [name for name in kind.model_fields if name not in leave_out]
+    names = list(kind.model_fields)
 
     def with_options(command: Callable) -> Callable:
         @wraps(command)
@@ -103,16 +100,12 @@ def _type(
         return {'type': FILE}
     if annotation not in (float, int):
         return {'type': annotation}
+    ends = {Gt: ('min', 'gt'), Ge: ('min', 'ge'), Lt: ('max', 'lt'), Le: ('max', 'le')}
     bounds: dict[str, Any] = {}
     for one in metadata:
-        if isinstance(one, Gt):
-            bounds |= {'min': shown(one.gt), 'min_open': True}
-        elif isinstance(one, Ge):
-            bounds['min'] = shown(one.ge)
-        elif isinstance(one, Lt):
-            bounds |= {'max': shown(one.lt), 'max_open': True}
-        elif isinstance(one, Le):
-            bounds['max'] = shown(one.le)
+        if type(one) in ends:
+            end, key = ends[type(one)]
+            bounds |= {end: shown(getattr(one, key)), f'{end}_open': key in ('gt', 'lt')}
     if annotation is int:
         return {'type': click.IntRange(**bounds) if bounds else int}
     return {'type': FiniteRange(**bounds) if bounds else FiniteNumber()}

@@ -9,38 +9,22 @@ from typing import Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import chosen_model
-from paint_deposition.cli.options import (
-    BRUSH,
-    JSON,
-    MODEL,
-    PART_POSE,
-    PICTURES,
-    FiniteRange,
-    file_lines,
-    output_option,
-    paint_lines,
-    part_options,
-    say_all,
-    say_results,
-    write_results,
-)
 from paint_deposition.cli.options_of import options_of
 from paint_deposition.cli.progress import Progress
-from paint_deposition.planning.requests import (
-    GunEnvelope,
-    IndexRequest,
-    PlanRequest,
-)
+from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
 
 
 @click.command('recommend')
-@MODEL
-@BRUSH
+@options.MODEL
+@options.BRUSH
 @options_of(IndexRequest)
-@output_option('recommendation.json and uniformity.png; default: the working directory', '.')
-@PICTURES
-@JSON
+@options.output_option(
+    'recommendation.json and uniformity.png; default: the working directory', '.'
+)
+@options.PICTURES
+@options.JSON
 def recommend_command(
     request: IndexRequest,
     model_file: Path | None,
@@ -52,12 +36,11 @@ def recommend_command(
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
     chosen = chosen_model(model_file, brush=brush)
     answer = pd.recommend(chosen.model, **dict(request))
-    files = write_results(
+    files = options.write_results(
         answer, output, pictures=pictures, model=chosen.model,
         made_from={'model_file': str(model_file or '')},
     )  # fmt: skip
-    lines = [*_recommendation_lines(answer), *file_lines(files)]
-    say_results(files, as_json, lines, model=chosen.words)
+    options.say_results(files, as_json, _recommendation_lines(answer), model=chosen.words)
 
 
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
@@ -77,11 +60,11 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@part_options(0.02)
-@MODEL
-@BRUSH
+@options.part_options(0.02)
+@options.MODEL
+@options.BRUSH
 @options_of(PlanRequest)
-@PART_POSE
+@options.PART_POSE
 @click.option(
     '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
 )
@@ -91,13 +74,13 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     'with its flange or a bumper, and blend their seams.',
 )  # fmt: skip
 @click.option(
-    '--face-angle-deg', default=40.0, show_default=True, type=FiniteRange(5.0, 75.0),
+    '--face-angle-deg', default=40.0, show_default=True, type=options.FiniteRange(5.0, 75.0),
     help='A face turns away from its mean by no more.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
-@output_option('the bag, passes.csv, passes.mod, plan.json and the film')
-@PICTURES
-@JSON
+@options.output_option('the bag, passes.csv, passes.mod, plan.json and the film')
+@options.PICTURES
+@options.JSON
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
@@ -139,13 +122,13 @@ def plan_command(
             'frame_id': frame_id,
             'part_pose': part_pose,
         }
-        files = write_results(
+        files = options.write_results(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
             pictures=pictures,
         )  # fmt: skip
-    say_all('note', surface.notes)
-    say_all('warning', map(str, touched))
-    say_results(files, as_json, [*_plan_lines(result), *file_lines(files)], model=chosen.words)
+    options.say_all('note', surface.notes)
+    options.say_all('warning', map(str, touched))
+    options.say_results(files, as_json, _plan_lines(result), model=chosen.words)
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
@@ -156,7 +139,7 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
-    yield from paint_lines(result)
+    yield from options.paint_lines(result)
     if isinstance(result, pd.PartPlan):
         gun = result.envelope
         if not result.contacts:

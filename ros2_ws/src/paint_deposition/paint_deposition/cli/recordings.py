@@ -9,16 +9,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import model_for
-from paint_deposition.cli.options import (
-    FILE,
-    JSON,
-    MAX_POSE_GAP,
-    model_option,
-    motion_options,
-    part_options,
-    say_all,
-)
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.provenance import origin
@@ -28,17 +20,19 @@ if TYPE_CHECKING:
 
 
 @click.command('inspect')
-@click.argument('recording', type=FILE, required=False)
-@part_options(0.02, required=False)
-@click.option('--trajectory', type=FILE, help='The motion to set beside the part; or RECORDING.')
+@click.argument('recording', type=options.FILE, required=False)
+@options.part_options(0.02, required=False)
 @click.option(
-    '--out', '--output', '-o', 'output', type=FILE,
+    '--trajectory', type=options.FILE, help='The motion to set beside the part; or RECORDING.'
+)
+@click.option(
+    '--out', '--output', '-o', 'output', type=options.FILE,
     help='Picture to draw, PNG: part, passes and tool axes from three sides.',
 )  # fmt: skip
-@model_option('Model that says where the spray goes; default: a 50 mm bell.')
-@motion_options
-@MAX_POSE_GAP
-@JSON
+@options.model_option('Model that says where the spray goes; default: a 50 mm bell.')
+@options.motion_options
+@options.MAX_POSE_GAP
+@options.JSON
 def inspect_command(
     recording: Path | None,
     part: dict[str, Any],
@@ -46,7 +40,7 @@ def inspect_command(
     max_pose_gap_s: float,
     motion: dict[str, Any],
     as_json: bool,
-    **options: Any,
+    **drawn: Any,
 ) -> None:
     """Show what RECORDING holds, or how the gun ran over a part.
 
@@ -61,36 +55,34 @@ def inspect_command(
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
     if part['path'] is not None:
-        _show_gun_on_part(part, path, motion, max_pose_gap_s, as_json, **options)
+        figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, **drawn)
     else:
         gun_signal = motion.pop('gun_signal')
-        if any(options[name] for name in ('output', 'model_file')) or any(motion.values()):
+        if any(drawn[name] for name in ('output', 'model_file')) or any(motion.values()):
             raise click.UsageError('--out, --model and how the motion is read need --mesh')
-        _show_contents(path, gun_signal, max_pose_gap_s, as_json)
+        figures, lines = _contents(path, gun_signal, max_pose_gap_s)
+        figures |= {'provenance': origin(files={'recording': path})}
+    click.echo(json_text(figures) if as_json else lines)
 
 
-def _show_contents(
-    path: Path, gun_signal: str | None, max_pose_gap_s: float, as_json: bool
-) -> None:
-    """Print what a RAPID module, a table of poses or a bag holds."""
+def _contents(
+    path: Path, gun_signal: str | None, max_pose_gap_s: float
+) -> tuple[dict[str, Any], str]:
+    """What a RAPID module, a table of poses or a bag holds: figures, and the same in words."""
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
     from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 
-    figures: dict[str, Any]
     if is_rapid(path):
         program = read_program(path, gun_signal=gun_signal)
-        figures, lines = asdict(program), program_as_text(program)
-    elif is_pose_table(path):
+        return asdict(program), program_as_text(program)
+    if is_pose_table(path):
         MotionSource(gun_signal=gun_signal).refuse_other(path, 'a table of poses')
-        figures, lines = _table_contents(read_pose_table(path, PoseLayout()))
-    else:
-        MotionSource(gun_signal=gun_signal).refuse_other(path, 'a bag')
-        summary = summarise(path, max_pose_gap_s)
-        figures, lines = asdict(summary), _bag_contents(summary)
-    provenance = {'provenance': origin(files={'recording': path})}
-    click.echo(json_text(figures | provenance) if as_json else lines)
+        return _table_contents(read_pose_table(path, PoseLayout()))
+    MotionSource(gun_signal=gun_signal).refuse_other(path, 'a bag')
+    summary = summarise(path, max_pose_gap_s)
+    return asdict(summary), _bag_contents(summary)
 
 
 def _table_contents(poses: pd.Trajectory) -> tuple[dict, str]:
@@ -132,17 +124,15 @@ def _bag_contents(summary: BagSummary) -> str:
     return '\n'.join(lines)
 
 
-def _show_gun_on_part(
+def _gun_on_part(
     part: dict[str, Any],
     path: Path,
     motion: dict[str, Any],
     max_pose_gap_s: float,
-    as_json: bool,
-    *,
     output: Path | None,
     model_file: Path | None,
-) -> None:
-    """Print how the gun ran over a part and what is odd, and draw it if a picture is wanted."""
+) -> tuple[dict[str, Any], str]:
+    """How the gun ran over a part, drawn if a picture is wanted; what is odd goes to stderr."""
     mesh = part['path']
     with Progress('inspect') as show:
         show('reading')
@@ -156,26 +146,22 @@ def _show_gun_on_part(
             show('drawing')
             title = f'{path.name} over {mesh.name}'
             write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
-    say_all('note', seen.notes)
-    say_all('warning', [*recorded.warnings, *seen.geometry.warnings])
-    if as_json:
-        files = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
-        made_from = origin(model, {'mesh': mesh, 'trajectory': path})
-        click.echo(json_text(seen.to_dict() | files | {'provenance': made_from}))
-        return
-    click.echo(seen.geometry.sentence)
-    click.echo(seen.geometry.facet_sentence)
-    if output is not None:
-        click.echo(f'  {output}')
+    options.say_all('note', seen.notes)
+    options.say_all('warning', [*recorded.warnings, *seen.geometry.warnings])
+    figures: dict[str, Any] = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
+    figures |= {'provenance': origin(model, {'mesh': mesh, 'trajectory': path})}
+    lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
+    lines += [f'  {output}'] if output else []
+    return seen.to_dict() | figures, '\n'.join(lines)
 
 
 @click.command('recover')
-@click.argument('run', type=FILE)
+@click.argument('run', type=options.FILE)
 @click.option(
-    '-o', '--output', type=FILE,
+    '-o', '--output', type=options.FILE,
     help='Folder to make; default: RUN with _recovered behind its name.',
 )  # fmt: skip
-@JSON
+@options.JSON
 def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
     """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.
 
@@ -192,25 +178,17 @@ def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
         total=size, unit='B', unit_scale=True, desc='recover', delay=SHOW_PROGRESS_AFTER_S,
         disable=None,
     ) as bar:  # fmt: skip
-        recovery = recover(run, output, on_bytes=bar.update)
-    if as_json:
-        figures = {
-            'folder': str(recovery.folder),
-            'messages': recovery.message_count,
-            'topics': recovery.counts,
-            'damaged_chunks': recovery.damaged_chunks,
-            'breaks': recovery.breaks,
-            'skipped_topics': recovery.skipped_topics,
-            'provenance': origin(files={'recording': run}),
-        }
-        click.echo(json_text(figures))
-        return
-    for line in recovery.breaks:
-        click.echo(line)
-    if recovery.damaged_chunks:
-        click.echo(f'{recovery.damaged_chunks} damaged chunks left out')
-    if recovery.skipped_topics:
-        click.echo(f'left out, not CDR or without a schema: {" ".join(recovery.skipped_topics)}')
-    for topic, count in recovery.counts.items():
-        click.echo(f'{count:10d}  {topic}')
-    click.echo(f'{recovery.message_count} messages recovered: {recovery.folder}')
+        found = recover(run, output, on_bytes=bar.update)
+    figures = {
+        'folder': str(found.folder), 'messages': found.message_count, 'topics': found.counts,
+        'damaged_chunks': found.damaged_chunks, 'breaks': found.breaks,
+        'skipped_topics': found.skipped_topics, 'provenance': origin(files={'recording': run}),
+    }  # fmt: skip
+    lines = [*found.breaks]
+    if found.damaged_chunks:
+        lines.append(f'{found.damaged_chunks} damaged chunks left out')
+    if found.skipped_topics:
+        lines.append(f'left out, not CDR or without a schema: {" ".join(found.skipped_topics)}')
+    lines += [f'{count:10d}  {topic}' for topic, count in found.counts.items()]
+    lines.append(f'{found.message_count} messages recovered: {found.folder}')
+    click.echo(json_text(figures) if as_json else '\n'.join(lines))

@@ -10,29 +10,15 @@ from typing import Any
 import click
 
 import paint_deposition as pd
+from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import models_for
-from paint_deposition.cli.options import (
-    FILE,
-    JSON,
-    MAX_POSE_GAP,
-    NOT_NEGATIVE,
-    PICTURES,
-    file_lines,
-    motion_options,
-    output_option,
-    paint_lines,
-    part_options,
-    say_all,
-    say_results,
-    write_results,
-)
 from paint_deposition.cli.progress import Progress
 
 
 @click.command('simulate')
-@part_options(0.01)
+@options.part_options(0.01)
 @click.option(
-    '--trajectory', 'trajectories', required=True, multiple=True, type=FILE,
+    '--trajectory', 'trajectories', required=True, multiple=True, type=options.FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
     'or a RAPID module, .mod or .prg, taken as programmed. Give one for each of several guns.',
 )  # fmt: skip
@@ -42,27 +28,27 @@ from paint_deposition.cli.progress import Progress
     'NAME/atomizer/state; once for each gun.',
 )  # fmt: skip
 @click.option(
-    '--model', 'model_files', type=FILE, multiple=True,
+    '--model', 'model_files', type=options.FILE, multiple=True,
     help='Deposition model, YAML, one for all guns or one for each; default: a 50 mm bell.',
 )  # fmt: skip
-@output_option('film.ply, film.csv, stats.json and film.png')
+@options.output_option('film.ply, film.csv, stats.json and film.png')
 @click.option(
-    '--at', 'readings_file', type=FILE,
+    '--at', 'readings_file', type=options.FILE,
     help='Gauge readings, CSV or a workbook: also write predicted.csv, their columns and '
     'predicted_um, what the gauge should show at exactly those points: the film with effects on '
     'the gauge.',
 )  # fmt: skip
 @click.option(
-    '--points', 'points_file', type=FILE,
+    '--points', 'points_file', type=options.FILE,
     help='Measuring points, label and x, y, z, of readings that name their point only.',
 )  # fmt: skip
-@motion_options
-@MAX_POSE_GAP
-@click.option('--target-um', default=0.0, type=NOT_NEGATIVE, help='Film wanted.')
-@click.option('--tolerance-um', default=0.0, type=NOT_NEGATIVE,
+@options.motion_options
+@options.MAX_POSE_GAP
+@click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Film wanted.')
+@click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
               help='Accepted difference from the target, either way.')  # fmt: skip
-@PICTURES
-@JSON
+@options.PICTURES
+@options.JSON
 def simulate_command(
     part: dict[str, Any],
     trajectories: tuple[Path, ...],
@@ -107,13 +93,13 @@ def simulate_command(
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
-        files = write_results(film, output, made_from=made_from, pictures=pictures)
-    say_all('note', film.notes)
-    say_all('note', [readings.understood] if readings else [])
-    say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
-    say_all('warning', film.warnings)
+        files = options.write_results(film, output, made_from=made_from, pictures=pictures)
+    options.say_all('note', film.notes)
+    options.say_all('note', [readings.understood] if readings else [])
+    options.say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
+    options.say_all('warning', film.warnings)
     words = '; '.join(dict.fromkeys(model.words for model in chosen))
-    say_results(files, as_json, [*_lines(film), *file_lines(files)], model=words)
+    options.say_results(files, as_json, _lines(film), model=words)
 
 
 def _lines(film: pd.Film) -> Iterator[str]:
@@ -141,7 +127,7 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
-    yield from paint_lines(film)
+    yield from options.paint_lines(film)
     coarsest = max(film.guns, key=lambda gun: gun.geometry.facet_error)
     yield coarsest.geometry.facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:

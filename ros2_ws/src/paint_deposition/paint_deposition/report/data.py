@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,29 +18,16 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.residuals import root_mean_square
-from paint_deposition.part.points import SurfacePoints
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
 from paint_deposition.report.writers.fitted_model import history_as_list
 
 
-@dataclass(frozen=True)
-class Change:
-    """By how much a prediction differs from another at the measured points.
-
-    Attributes:
-        least_um, most_um: the most negative and the most positive difference, or 0 [um].
-        rms_um: root mean square [um].
-    """
+class Change(NamedTuple):
+    """Most negative, most positive (or 0) and RMS difference of two predictions [um]."""
 
     least_um: float
     most_um: float
     rms_um: float
-
-    @staticmethod
-    def of(difference_um: np.ndarray) -> 'Change':
-        """Sum up differences (P,) [um]."""
-        least, most = float(difference_um.min()), float(difference_um.max())
-        return Change(min(least, 0.0), max(most, 0.0), root_mean_square(difference_um))
 
 
 @dataclass(frozen=True)
@@ -153,9 +140,10 @@ class ReportData:
         pattern can imitate counts as no change.
         """
         steps = self.diagnosis.history if self.diagnosis else ()
+        off = {s.added: s.fit.predicted_um - b.fit.predicted_um for b, s in pairwise(steps)}
         return {
-            step.added: Change.of(step.fit.predicted_um - before.fit.predicted_um)
-            for before, step in pairwise(steps)
+            added: Change(min(um.min(), 0.0), max(um.max(), 0.0), root_mean_square(um))
+            for added, um in off.items()
         }
 
     def effect_class(self, effect_id: str) -> type[Effect] | None:
@@ -186,17 +174,16 @@ class ReportData:
     @cached_property
     def painted(self) -> list[list[FilmIntegrator]]:
         """The surface painted: for each experiment, with each model."""
-        return [
-            [_painted(experiment, points, model) for model in self.models]
-            for experiment in self.experiments
-            for points in [experiment.surface.points()]
-        ]
-
-
-def _painted(
-    experiment: Experiment, points: SurfacePoints, model: DepositionModel
-) -> FilmIntegrator:
-    model = model.without(experiment.switched_off)
-    integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
-    integrator.add(experiment.path)
-    return integrator
+        films = []
+        for experiment in self.experiments:
+            surface = experiment.surface
+            points = surface.points()
+            films.append([
+                FilmIntegrator(
+                    points, model.without(experiment.switched_off), 'double', surface.occluder
+                )
+                for model in self.models
+            ])  # fmt: skip
+            for film in films[-1]:
+                film.add(experiment.path)
+        return films

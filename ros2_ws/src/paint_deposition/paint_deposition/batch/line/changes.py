@@ -83,11 +83,6 @@ class Series:
         return charts(self.standard, self.run_length)
 
 
-def baseline_of(count: int) -> int:
-    """How many first parts give the centre."""
-    return int(np.clip(count // 3, min(FEWEST // 2, count), MOST_BASELINE))
-
-
 def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
     """The level, the misfit, then every amplitude that one part shows; oldest part first."""
     noise = pooled.posterior.scales.noise
@@ -104,7 +99,8 @@ def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
         if np.isfinite(amounts[:, k]).all() and np.median(amounts_sd[:, k]) < VAGUE
     ]  # fmt: skip
     groups = _grouped(known, amounts / np.where(amounts_sd > 0.0, amounts_sd, 1.0), pooled.chosen)
-    base, spending = baseline_of(len(parts)), RUN_LENGTH * CHARTS * SHARES
+    spending = RUN_LENGTH * CHARTS * SHARES
+    base = int(np.clip(len(parts) // 3, min(FEWEST // 2, len(parts)), MOST_BASELINE))
     found = [
         Series('level', '%', ('level',), 100.0 * level, 100.0 * level_sd, base, spending),
         Series('misfit', 'standard deviations', ('misfit',), misfit, np.ones(len(parts)), base,
@@ -198,9 +194,8 @@ class Change:
             others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
             what = f'{self.series}{others}'
         way = 'rose' if self.after > self.before else 'fell'
-        size = (
-            f'{abs(self.after - self.before):.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
-        )
+        moved = abs(self.after - self.before)
+        size = f'{moved:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
         ends = date(self.earliest_s), date(self.latest_s)
         within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
         charts = 'another chart' if len(self.also) == 1 else f'{len(self.also)} other charts'
@@ -213,8 +208,7 @@ class Change:
         """All figures by name, with dates."""
         named = {key: getattr(self, key) for key in self.__dataclass_fields__}
         dates = {name: date(named.pop(f'{name}_s')) for name in ('time', 'earliest', 'latest')}
-        lists = {'members': list(self.members), 'also': list(self.also)}
-        return named | dates | lists | {'sentence': self.sentence}
+        return named | dates | {'sentence': self.sentence}
 
 
 def date(time_s: float) -> str:

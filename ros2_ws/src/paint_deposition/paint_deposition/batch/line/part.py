@@ -54,8 +54,7 @@ def computed(given: Mapping[str, Any]) -> Columns:
         rows = _rows(run, given['file'], Path(given['folder']), given['model'])
     except PaintError as error:
         rows = [{'part': run.name, 'error': str(error)}]
-    names = dict.fromkeys(name for row in rows for name in row)
-    return {name: [row.get(name) for row in rows] for name in names}
+    return {name: [row[name] for row in rows] for name in rows[0]}
 
 
 def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> list[dict[str, Any]]:
@@ -86,9 +85,8 @@ def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> lis
 
 def _date(run: Run) -> float:
     """Seconds since 1970 of the first date in the name of a run."""
-    found = DATE.search(run.name)
-    with suppress(ValueError):
-        if found:
+    if found := DATE.search(run.name):
+        with suppress(ValueError):
             year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
             there = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
             return there.timestamp()

@@ -257,9 +257,7 @@ class Weighed:
 
     def evidence(self, chosen: Sequence[int]) -> float:
         """Logarithm of the probability of the readings with these amplitudes."""
-        return float(
-            logsumexp([one.solved(chosen)[2] for one in self.posteriors] + self.log_share)
-        )
+        return float(logsumexp(self._log_joint(chosen)))
 
     def likeliest(self, chosen: Sequence[int]) -> LinePosterior:
         """The posterior with the likeliest misfit."""
@@ -302,7 +300,7 @@ class Cause:
 
     def to_dict(self) -> dict[str, Any]:
         """All figures by name."""
-        return asdict(self) | {'members': list(self.members)}
+        return asdict(self)
 
 
 @dataclass(frozen=True)
@@ -364,10 +362,7 @@ def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Poo
 
 
 def _cause(
-    posterior: LinePosterior,
-    chosen: tuple[int, ...],
-    probability: float,
-    members: tuple[str, ...],
+    posterior: LinePosterior, chosen: tuple[int, ...], probability: float, members: tuple[str, ...]
 ) -> Cause:
     mean, covariance, _ = posterior.solved(chosen)
     value, sd = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
@@ -43,14 +44,11 @@ class LineFile(MotionSource, extra='forbid'):
 
 @dataclass(frozen=True)
 class Run:
-    """One run of the line.
+    """One run of the line, named for its recording.
 
     Attributes:
-        name: of its folder or file.
-        path: its recording.
-        readings: a file of gauge readings on the part, or None.
-        problem: why it cannot be used, '' if it can.
-        remark: why its readings are not used, '' if they are.
+        path: its recording. readings: on the part, or None.
+        problem: why it cannot be used; remark: why its readings are not used; '' if they are.
     """
 
     name: str
@@ -58,11 +56,6 @@ class Run:
     readings: Path | None = None
     problem: str = ''
     remark: str = ''
-
-    @property
-    def files(self) -> list[Path]:
-        """The recording, and the readings if there are any."""
-        return [self.path, *([self.readings] if self.readings else [])]
 
 
 def read_line(folder: Path) -> LineFile:
@@ -96,17 +89,17 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     Raises:
         ManyError: there is no run.
     """
-    recordings: dict[str, list[Path]] = {}
-    readings: dict[str, list[Path]] = {}
+    recordings: dict[str, list[Path]] = defaultdict(list)
+    readings: dict[str, list[Path]] = defaultdict(list)
     for path in sorted(set(folder.iterdir()) - set(shared)):
         if path.name.startswith('.'):
             continue
         if path.is_dir() and _is_bag(path):
-            recordings.setdefault(path.name, []).append(path)
+            recordings[path.name].append(path)
         elif path.suffix.lower() in BAGS:
-            recordings.setdefault(path.stem, []).append(path)
+            recordings[path.stem].append(path)
         elif path.suffix.lower() in TABLES:
-            readings.setdefault(path.stem, []).append(path)
+            readings[path.stem].append(path)
     runs = [_run(name, paths, readings.pop(name, [])) for name, paths in recordings.items()]
     if not runs:
         raise ManyError(
@@ -125,17 +118,15 @@ def _is_bag(folder: Path) -> bool:
 
 def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
     """The run of a name; what cannot be told apart is not guessed."""
+    problem = remark = ''
     if len(recordings) > 1:
-        problem = f'two recordings have its name, {_names(recordings)}; rename one'
-        return Run(name, recordings[0], problem=problem)
+        names = ' and '.join(path.name for path in recordings)
+        problem = f'two recordings have its name, {names}; rename one'
     if len(readings) > 1:
-        remark = f'two files of readings have its name, {_names(readings)}; keep one'
-        return Run(name, recordings[0], remark=remark)
-    return Run(name, recordings[0], readings[0] if readings else None)
-
-
-def _names(paths: list[Path]) -> str:
-    return ' and '.join(path.name for path in paths)
+        names = ' and '.join(path.name for path in readings)
+        remark = f'two files of readings have its name, {names}; keep one'
+    given = readings[0] if len(readings) == 1 else None
+    return Run(name, recordings[0], given, problem, remark)
 
 
 def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, list[str]]:
@@ -156,14 +147,11 @@ def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, lis
     shared += map(sha256, files.values())
     given = {'file': file, 'folder': str(folder), 'model': model}
     runs, strays = runs_in(folder, files.values())
-    cases = [
-        Case(
-            digest_of(*shared, run.name, run.problem, run.remark, *map(_digest, run.files)),
-            given | {'run': run},
-            about={'part': [run.name]},
-        )
-        for run in runs
-    ]
+    cases = []
+    for run in runs:
+        own_files = [_digest(path) for path in (run.path, run.readings) if path]
+        digest = digest_of(*shared, run.name, run.problem, run.remark, *own_files)
+        cases.append(Case(digest, given | {'run': run}, about={'part': [run.name]}))
     return cases, file, model, strays
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from paint_deposition.batch.cases import Case, code_digest, content_digest, digest_of
+from paint_deposition.batch.cases import Case, code_digest, digest_of
 from paint_deposition.batch.sweep.sweep_file import SweepFile
 from paint_deposition.batch.sweep.variations import (
     DRAW,
@@ -27,7 +27,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.files.provenance import model_digest
+from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.inference.fitting.posterior import drawn
 
 NOTHING = 'nothing'
@@ -92,19 +92,15 @@ class Job:
             self._read[key] = read()
         return self._read[key]
 
-    def _input(self, key: Any, what: str, path: Path, read: Callable[[], Any]) -> str:
-        """The name of an input that is read once from a file."""
-
-        def named() -> str:
-            value = read()
-            name = f'{what}-{content_digest(value)}'
-            self.inputs[name] = value
+    def _input(self, what: str, path: Path, how: Any, read: Callable[[], Any]) -> str:
+        """The name of an input, by its file's content and how it is read; it is read once."""
+        name = f'{what}-{digest_of(self._once(path, lambda: sha256(path)), how)}'
+        if name not in self.inputs:
+            value = self.inputs[name] = read()
             self.files[f'{what} {path.name}'] = path
             self.notes |= dict.fromkeys(getattr(value, 'notes', ()))
             self.notes |= dict.fromkeys(getattr(value, 'warnings', ()))
-            return name
-
-        return self._once((what, path, key), named)
+        return name
 
     def _model_file(self, path: Path) -> ModelFile:
         self.files[f'model {path.name}'] = path
@@ -138,37 +134,35 @@ class Job:
         motion = self._named('trajectory', values)
         if mesh is None:
             raise ManyError('no mesh is given; give mesh')
-        surface = self._input(
-            None, 'mesh', mesh,
-            lambda: read_mesh(mesh, file.mesh_scale, file.max_edge_length_m, None, file.body),
-        )  # fmt: skip
+        how = (file.mesh_scale, file.max_edge_length_m, None, file.body)
+        surface = self._input('mesh', mesh, how, lambda: read_mesh(mesh, *how))
         recorded = NOTHING if motion is None else self._motion(motion, values)
         if not file.readings:
             return surface, recorded, NOTHING
         path, part = self.folder / file.readings, self.inputs[surface]
         places = self._input(
-            surface, 'readings', path, lambda: read_readings(path, None, surface=part)
+            'readings', path, surface, lambda: read_readings(path, None, surface=part)
         )
         return surface, recorded, places
 
     def _motion(self, path: Path, values: Values) -> str:
         given = self.file.model_dump(include=set(MotionSource.model_fields))
-        given |= {'urdf': given['urdf'] and str(self.folder / given['urdf'])}
+        arm = given['urdf'] = given['urdf'] and str(self.folder / given['urdf'])
         if 'part_pose' in values:
             given['part_pose'] = values['part_pose']
-        source = MotionSource.model_validate(given)
-        return self._input(str(given), 'trajectory', path, lambda: read_motion(path, source))
+        source, how = MotionSource.model_validate(given), [given, arm and sha256(Path(arm))]
+        return self._input('trajectory', path, how, lambda: read_motion(path, source))
 
     def _options(self, values: Values, planned: bool) -> dict[str, Any]:
         file = self.file
-        wrong = [name for name in (OF_MOTION if planned else OF_PASSES) if name in values]
-        if wrong:
-            remedy = 'give a trajectory' if planned else 'leave trajectory out, or vary '
-            remedy += '' if planned else ', '.join(OF_MOTION)
-            raise ManyError(
-                f'{wrong[0]} varies {"a recorded motion" if planned else "planned passes"}; '
-                f'{remedy}'
-            )
+        for name in OF_MOTION if planned else OF_PASSES:
+            if name in values and planned:
+                raise ManyError(f'{name} varies a recorded motion; give a trajectory')
+            if name in values:
+                raise ManyError(
+                    f'{name} varies planned passes; leave trajectory out, or vary '
+                    f'{", ".join(OF_MOTION)}'
+                )
         passes = file.passes.model_dump() | {n: values[n] for n in OF_PASSES if n in values}
         if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
             raise ManyError(

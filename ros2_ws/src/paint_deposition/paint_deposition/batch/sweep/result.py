@@ -20,6 +20,7 @@ from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK
+from paint_deposition.report.writers.write import written
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -74,6 +75,14 @@ class Sweep:
         values = self.table[name].to_pylist()
         return np.array([np.nan if value is None else value for value in values], dtype=float)
 
+    def _spread(self, name: str) -> list[float]:
+        return np.nanquantile(self.column(name), (0.05, 0.5, 0.95)).tolist()
+
+    @property
+    def drawn(self) -> dict[str, str]:
+        """The figures that some case has, with their labels."""
+        return {n: label for n, label in DRAWN.items() if n in self.table.column_names}
+
     @property
     def varied(self) -> tuple[str, ...]:
         """Names of what varied."""
@@ -111,29 +120,27 @@ class Sweep:
     def lines(self) -> Iterator[str]:
         """What to say of it."""
         yield self.sentence
-        for name, label in DRAWN.items():
-            if name in self.table.column_names:
-                values = self.column(name)
-                low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95))
-                yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
+        for name, label in self.drawn.items():
+            low, middle, high = self._spread(name)
+            yield f'{label}: {middle:.4g}, 90 % of the cases {low:.4g} to {high:.4g}'
         if self.best is not None:
-            texts = [
-                f'{name} {f"{value:.6g}" if isinstance(value, float) else value}'
-                for name, value in self.job.values[self.best].items()
-            ]
+            values = self.job.values[self.best].items()
+            texts = [f'{n} {f"{v:.6g}" if isinstance(v, float) else v}' for n, v in values]
             shown = ', '.join(texts) or UNCHANGED
             yield f'best by {LABEL}: case {self.best + 1}, {shown}'
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``sweep.json``."""
-        names = [name for name in DRAWN if name in self.table.column_names]
         best = self.best
         return {
             'cases': len(self.job.cases),
             'computed': self.computed,
             'workers': self.workers,
             'varied': list(self.varied),
-            'figures': {name: _spread(self.column(name)) for name in names},
+            'figures': {
+                name: dict(zip(('low_5', 'median', 'high_95'), self._spread(name), strict=True))
+                for name in self.drawn
+            },
             'judged_by': JUDGED if best is not None else None,
             'best': None if best is None else {'case': best + 1, 'values': self.job.values[best]},
             'errors': [{'case': number, 'error': error} for number, error in self.errors],
@@ -142,8 +149,9 @@ class Sweep:
         }
 
 
-def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
-    """Write tables, figures and the picture; returns the paths."""
+@written.register
+def _write(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
+    """Tables, figures and the picture."""
     names = sweep.table.column_names
     lists = [PREDICTED] if PREDICTED in names else []
     files = [write_parquet(folder / 'cases.parquet', sweep.table.drop_columns(lists))]
@@ -151,10 +159,9 @@ def write_sweep(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]
         files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
-    drawn = [(name, label) for name, label in DRAWN.items() if name in names]
     over = {name: _drawn_over(sweep, name) for name in sweep.varied if name != 'part_pose'}
-    if drawn and over:
-        results = {label: sweep.column(name) for name, label in drawn}
+    if sweep.drawn and over:
+        results = {label: sweep.column(name) for name, label in sweep.drawn.items()}
         picture = folder / f'sweep.{pictures}'
         files.append(_write_picture(picture, over, results, sweep.sentence))
     return files
@@ -164,20 +171,14 @@ def _points(sweep: Sweep) -> pa.Table:
     """A row for each case and reading, with where it lies."""
     import pyarrow as pa
 
-    found: dict[str, list[Any]] = {
-        name: [] for name in ('case', 'point', 'x_m', 'y_m', 'z_m', PREDICTED)
-    }
-    for case, predicted in enumerate(sweep.table[PREDICTED].to_pylist()):
-        if predicted is None:
-            continue
-        readings = sweep.job.inputs[sweep.job.cases[case].inputs[2]]
-        rows = len(predicted)
-        found['case'] += [case + 1] * rows
-        found['point'] += readings.point.tolist()
-        for axis, column in zip('xyz', readings.positions_m.T, strict=True):
-            found[f'{axis}_m'] += column.tolist()
-        found[PREDICTED] += predicted
-    return pa.table(found)
+    rows = []
+    for number, predicted in enumerate(sweep.table[PREDICTED].to_pylist(), start=1):
+        readings = sweep.job.inputs[sweep.job.cases[number - 1].inputs[2]]
+        for k, value in enumerate(predicted or ()):
+            place = dict(zip(('x_m', 'y_m', 'z_m'), readings.positions_m[k].tolist(), strict=True))
+            point = str(readings.point[k])
+            rows.append({'case': number, 'point': point, **place, PREDICTED: value})
+    return pa.Table.from_pylist(rows)
 
 
 def _column(values: Sequence[Any]) -> pa.Array:
@@ -186,9 +187,7 @@ def _column(values: Sequence[Any]) -> pa.Array:
 
     if any(isinstance(value, list) for value in values):
         return pa.array([None if value is None else json.dumps(value) for value in values])
-    if any(isinstance(value, float) for value in values):
-        return pa.array([None if value is None else float(value) for value in values])
-    return pa.array(values)
+    return pa.array(values, pa.float64() if any(isinstance(v, float) for v in values) else None)
 
 
 def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
@@ -204,11 +203,6 @@ def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
         for value in given
     ]
     return np.array(words)
-
-
-def _spread(values: np.ndarray) -> dict[str, float]:
-    low, middle, high = np.nanquantile(values, (0.05, 0.5, 0.95)).tolist()
-    return {'median': middle, 'low_5': low, 'high_95': high}
 
 
 def _write_picture(

@@ -1,29 +1,19 @@
-"""Flat charts of the report: parity, covariates, history, the unexplained."""
+"""Flat charts of the report: parity, covariates, the unexplained."""
 
 from collections.abc import Iterable, Iterator
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.layout import (
-    axis,
-    base_layout,
-    chart,
-    figure,
-    scatter,
-    zero_axis,
-)
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED, TWO_SIDED_95
-from paint_deposition.report.words import covariate_label, minus, p_words, step_words
+from paint_deposition.report.page import layout
+from paint_deposition.report.style import ACCENT, BEFORE, MUTED, TWO_SIDED_95
+from paint_deposition.report.words import covariate_label, minus, p_words
 
 MOST_COVARIATES = 8
 BINS = 6
 # Conditions that differ by less than this share say nothing of the model.
 LEAST_SPREAD = 0.01
-# Characters in a line below a bar.
-LABEL = 24
 AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
@@ -36,21 +26,23 @@ def parity_figure(data: ReportData) -> dict[str, Any]:
     spread = TWO_SIDED_95 * data.study.noise_floor_um
     bound = {'line': {'width': 0}, 'hoverinfo': 'skip'}
     traces = [
-        scatter(ends, ends + spread, 'lines', **bound),
-        scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
+        layout.scatter(ends, ends + spread, 'lines', **bound),
+        layout.scatter(ends, ends - spread, 'lines', **bound, fill='tonexty',
                 fillcolor='rgba(154,165,177,0.25)'),
-        scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
+        layout.scatter(ends, ends, 'lines', hoverinfo='skip', line={'color': MUTED, 'width': 1}),
     ]  # fmt: skip
     for name, values, colour in _of_each_model(data, predicted):
         hover = 'measured %{x:.2f} µm, ' + name + ' %{y:.2f} µm<extra></extra>'
         marker = {'size': 5.5, 'color': colour, 'opacity': 0.9}
-        traces.append(scatter(measured, values, 'markers', marker=marker, hovertemplate=hover))
-    layout = base_layout(
-        xaxis=axis('measured [µm]', range=[0, top], constrain='domain'),
-        yaxis=axis('predicted [µm]', range=[0, top], scaleanchor='x', constrain='domain'),
+        traces.append(
+            layout.scatter(measured, values, 'markers', marker=marker, hovertemplate=hover)
+        )
+    arranged = layout.base_layout(
+        xaxis=layout.axis('measured [µm]', range=[0, top], constrain='domain'),
+        yaxis=layout.axis('predicted [µm]', range=[0, top], scaleanchor='x', constrain='domain'),
     )
     legend = [('95 % gauge and texture', BEFORE, 'band'), *_legend(data)]
-    return figure('parity', [chart('', traces, layout, 400)], legend)
+    return layout.figure('parity', [layout.chart('', traces, arranged, 400)], legend)
 
 
 def _legend(data: ReportData) -> list[tuple[str, str, str]]:
@@ -81,22 +73,22 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
             data, data.residuals_um, residual_means
         ):
             traces += [
-                scatter(values[name], residual, 'markers',
+                layout.scatter(values[name], residual, 'markers',
                         marker={'size': 4, 'color': colour, 'opacity': 0.6},
                         hovertemplate=f'{AT_VALUE}<extra>{label}</extra>'),
-                scatter(x_mean, mean, 'lines', line={'color': colour, 'width': 2.5},
+                layout.scatter(x_mean, mean, 'lines', line={'color': colour, 'width': 2.5},
                         hoverinfo='skip'),
             ]  # fmt: skip
-        layout = base_layout(
-            xaxis=axis(covariate_label(name), nticks=5),
-            yaxis=zero_axis('residual [µm]', range=[-reach, reach]),
+        arranged = layout.base_layout(
+            xaxis=layout.axis(covariate_label(name), nticks=5),
+            yaxis=layout.zero_axis('residual [µm]', range=[-reach, reach]),
         )
         text = f'ρ {dependence.correlation:+.2f}'
         if data.improved and name in later:
             text += f' → {later[name]:+.2f}'
         text += f', {p_words(dependence.p_value)}'
-        charts.append(chart(minus(text), traces, layout, 220))
-    return figure('covariates', charts, _legend(data))
+        charts.append(layout.chart(minus(text), traces, arranged, 220))
+    return layout.figure('covariates', charts, _legend(data))
 
 
 def _conditions(data: ReportData) -> dict[str, np.ndarray]:
@@ -114,43 +106,6 @@ def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.n
     return means[0], means[1:]
 
 
-def history_figure(data: ReportData) -> dict[str, Any] | None:
-    """Errors of each model fitted to this campaign against the gauge's noise."""
-    if data.diagnosis is None or len(data.diagnosis.history) < 2:
-        return None
-    steps = data.diagnosis.history
-    names = ['<br>'.join(wrap(step_words(s), LABEL)) for s in data.history[-len(steps) :]]
-    left_out = f'{data.diagnosis.left_out} left out'
-    bars = [
-        ('fitted points', [s.rmse_um for s in steps], BEFORE, 'black'),
-        (left_out, [s.holdout_rmse_um for s in steps], ACCENT, 'white'),
-    ]
-    traces = [
-        {'type': 'bar', 'x': names, 'y': values, 'marker': {'color': colour},
-         'texttemplate': '%{y:.2f}', 'textposition': 'inside',
-         'insidetextanchor': 'start', 'textangle': 0, 'insidetextfont': {'color': text},
-         'hovertemplate': name + ': %{y:.2f} µm<extra></extra>'}
-        for name, values, colour, text in bars
-    ]  # fmt: skip
-    floor = data.diagnosis.noise_floor_um
-    top = 1.15 * max(*(max(values) for _, values, _, _ in bars), floor)
-    layout = base_layout(
-        margin={'l': 48, 'r': 64, 't': 8, 'b': 48}, barmode='group',
-        bargap=0.45, bargroupgap=0.06,
-        xaxis=axis('', ticks='', tickangle=0, tickfont={'size': 12, 'color': INK}),
-        yaxis=axis('RMSE [µm]', range=[0, top]),
-        shapes=[{'type': 'line', 'xref': 'paper', 'x0': 0, 'x1': 1, 'y0': floor, 'y1': floor,
-                 'line': {'color': INK, 'width': 1.5, 'dash': 'dash'}}],
-        annotations=[{
-            'xref': 'paper', 'x': 1.01, 'y': floor, 'xanchor': 'left', 'yanchor': 'middle',
-            'showarrow': False, 'text': f'gauge and<br>texture<br>{floor:.2f} µm',
-            'font': {'size': 11, 'color': INK}, 'align': 'left',
-        }],
-    )  # fmt: skip
-    legend = [(name, colour, 'band') for name, _, colour, _ in bars]
-    return figure('history', [chart('', traces, layout, 400)], legend)
-
-
 def unknown_figure(data: ReportData) -> dict[str, Any] | None:
     """Mean residual along the covariate where the unexplained shows."""
     unknown = data.diagnosis.unknown if data.diagnosis else None
@@ -160,13 +115,14 @@ def unknown_figure(data: ReportData) -> dict[str, Any] | None:
     x = np.add(covariate, 1.0 if unknown.covariate == 'spray_pass' else 0.0)
     hover = f'{AT_VALUE}<extra></extra>'
     traces = [
-        scatter(_conditions(data)[unknown.covariate], data.residuals_um[-1], 'markers',
+        layout.scatter(_conditions(data)[unknown.covariate], data.residuals_um[-1], 'markers',
                 hovertemplate=hover, marker={'size': 5, 'color': BEFORE}),
-        scatter(x, np.asarray(y), 'lines', hovertemplate=hover,
+        layout.scatter(x, np.asarray(y), 'lines', hovertemplate=hover,
                 line={'color': ACCENT, 'width': 2.5}),
     ]  # fmt: skip
-    layout = base_layout(
-        xaxis=axis(covariate_label(unknown.covariate)), yaxis=zero_axis('residual [µm]')
+    arranged = layout.base_layout(
+        xaxis=layout.axis(covariate_label(unknown.covariate)),
+        yaxis=layout.zero_axis('residual [µm]'),
     )
     legend = [('residual of each point', BEFORE, 'dot'), ('smoothed', ACCENT, 'bold')]
-    return figure('unknown', [chart('', traces, layout, 320)], legend)
+    return layout.figure('unknown', [layout.chart('', traces, arranged, 320)], legend)

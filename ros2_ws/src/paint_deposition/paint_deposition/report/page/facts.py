@@ -3,17 +3,9 @@
 from itertools import pairwise
 
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
+from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
-from paint_deposition.report.words import (
-    capital,
-    effect_name,
-    is_learned,
-    joined,
-    micrometres,
-    percent_words,
-    separation_words,
-)
 
 # What in the cell is worth a look where an effect is more than physics.
 CHECKS = {
@@ -33,23 +25,24 @@ CHECKS = {
 
 
 def explained(rows: list[dict]) -> str:
-    return ' '.join(f'{capital(row["name"])}: {row["meaning"]}' for row in rows)
+    return ' '.join(f'{words.capital(row["name"])}: {row["meaning"]}' for row in rows)
 
 
 def with_confounded(row: dict) -> str:
     if not row['others']:
         return row['name']
-    return f'{row["name"]} (or {joined(row["others"], "or")})'
+    return f'{row["name"]} (or {words.joined(row["others"], "or")})'
 
 
 def sure(rows: list[dict]) -> str:
     """How probable each of the effects is; a learned law names none."""
     found = []
     for row in rows:
-        if is_learned(row['id']):
+        if words.is_learned(row['id']):
             continue
-        names = joined([row['name'], *row['others']], 'or')
-        text = f'{capital(names)} with a probability of {percent_words(row["found"].probability)}'
+        names = words.joined([row['name'], *row['others']], 'or')
+        probability = words.percent_words(row['found'].probability)
+        text = f'{words.capital(names)} with a probability of {probability}'
         if row['others']:
             text += '; these readings leave open which of them it is'
         found.append(f'{text}.')
@@ -67,13 +60,12 @@ def costs(data: ReportData, diagnosis: Diagnosis) -> str:
     """By how much predictions are wrong without each effect that was added."""
     found = []
     for before, step in pairwise(diagnosis.history):
-        change = data.changes[step.added]
+        change, um = data.changes[step.added], words.micrometres
         found.append(
             f'Without {with_article(step.added)}, once the pattern has adapted as well as it can, '
-            f'the prediction differs by {micrometres(change.rms_um)} RMS at the points, by '
-            f'{micrometres(change.least_um, True)} to {micrometres(change.most_um, True)} at '
-            f'single ones, and the error is {micrometres(before.rmse_um)} instead of '
-            f'{micrometres(step.rmse_um)}.'
+            f'the prediction differs by {um(change.rms_um)} RMS at the points, by '
+            f'{um(change.least_um, True)} to {um(change.most_um, True)} at single ones, and the '
+            f'error is {um(before.rmse_um)} instead of {um(step.rmse_um)}.'
         )
     return ' '.join(found)
 
@@ -84,12 +76,12 @@ def accepted_rows(data: ReportData) -> list[dict]:
 
 def learned(data: ReportData, diagnosis: Diagnosis, what: str) -> str:
     """The laws that were learned, with their values and ranges, and the error before and after."""
-    rows = [row for row in accepted_rows(data) if is_learned(row['id'])]
+    rows = [row for row in accepted_rows(data) if words.is_learned(row['id'])]
     if not rows:
         return ''
     laws = [f'a {row["name"].removeprefix("learned ")} ({_values(row)})' for row in rows]
     before, after = diagnosis.history[-2:]
-    return f'{what} was learned as {joined(laws)}. {_errors(diagnosis, before, after)}'
+    return f'{what} was learned as {words.joined(laws)}. {_errors(diagnosis, before, after)}'
 
 
 def left_out(data: ReportData) -> str:
@@ -97,12 +89,12 @@ def left_out(data: ReportData) -> str:
     slips = []
     for slip in data.study.outliers:
         where, guess_um = slip.point.replace(': ', ' '), slip.guess_um
-        meant = '' if guess_um is None else f' (was it {micrometres(guess_um)}?)'
+        meant = '' if guess_um is None else f' (was it {words.micrometres(guess_um)}?)'
         slips.append(
-            f'{micrometres(slip.thickness_um)} at {where}, where '
-            f'{micrometres(slip.expected_um)} is expected{meant}'
+            f'{words.micrometres(slip.thickness_um)} at {where}, where '
+            f'{words.micrometres(slip.expected_um)} is expected{meant}'
         )
-    return f'The fit is without {joined(slips)}. Measure there again.' if slips else ''
+    return f'The fit is without {words.joined(slips)}. Measure there again.' if slips else ''
 
 
 def changes(data: ReportData, diagnosis: Diagnosis) -> str:
@@ -110,19 +102,20 @@ def changes(data: ReportData, diagnosis: Diagnosis) -> str:
     if not diagnosis.accepted:
         return 'The model was fitted as it is; no effect was added.'
     added = ' '.join(
-        f'{capital(row["name"])} was added with {_values(row)}.'
+        f'{words.capital(row["name"])} was added with {_values(row)}.'
         for row in accepted_rows(data)
-        if not is_learned(row['id'])
+        if not words.is_learned(row['id'])
     )
     return added and f'{added} {_errors(diagnosis, diagnosis.history[0], diagnosis.history[-1])}'
 
 
 def _errors(diagnosis: Diagnosis, before: Step, after: Step) -> str:
     worse = f' Worse than before: {"; ".join(diagnosis.worse)}.' if diagnosis.worse else ''
+    errors = before.holdout_rmse_um, after.holdout_rmse_um, diagnosis.noise_floor_um
+    first, last, floor = map(words.micrometres, errors)
     return (
-        f'At {diagnosis.left_out} left out of the fit the error goes from '
-        f'{micrometres(before.holdout_rmse_um)} to {micrometres(after.holdout_rmse_um)}; gauge '
-        f'and texture of the film scatter by {micrometres(diagnosis.noise_floor_um)}.{worse}'
+        f'At {diagnosis.left_out} left out of the fit the error goes from {first} to {last}; '
+        f'gauge and texture of the film scatter by {floor}.{worse}'
     )
 
 
@@ -132,16 +125,16 @@ def _values(row: dict) -> str:
         + (f' ({p["low"]} to {p["high"]})' if 'low' in p else '')
         for p in row['parameters']
     ]
-    return ' '.join(values) if is_learned(row['id']) else joined(values)
+    return ' '.join(values) if words.is_learned(row['id']) else words.joined(values)
 
 
 def with_article(name: str) -> str:
-    return f'a {effect_name(name)}' if is_learned(name) else effect_name(name)
+    return f'a {words.effect_name(name)}' if words.is_learned(name) else words.effect_name(name)
 
 
 def blind(diagnosis: Diagnosis) -> str:
-    names = [effect_name(e) for e in diagnosis.not_testable]
-    return f'Not testable with these readings: {joined(names)}.' if names else ''
+    names = [words.effect_name(e) for e in diagnosis.not_testable]
+    return f'Not testable with these readings: {words.joined(names)}.' if names else ''
 
 
 def to_do(data: ReportData) -> str:
@@ -149,7 +142,7 @@ def to_do(data: ReportData) -> str:
     _, sprays = data.proposals
     if not sprays:
         return 'Take more readings, and repeats at some points.'
-    return f'Spray {sprays[0].what}: {separation_words(sprays[0])}.'
+    return f'Spray {sprays[0].what}: {words.separation_words(sprays[0])}.'
 
 
 def to_use(data: ReportData, named: list[dict]) -> str:

@@ -8,33 +8,10 @@ from scipy.special import fdtrc
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
+from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.facts import (
-    accepted_rows,
-    blind,
-    chance,
-    changes,
-    costs,
-    explained,
-    learned,
-    left_out,
-    sure,
-    to_do,
-    to_use,
-    with_article,
-    with_confounded,
-)
+from paint_deposition.report.page import facts
 from paint_deposition.report.page.tables import class_rows
-from paint_deposition.report.words import (
-    capital,
-    covariate_label,
-    effect_name,
-    in_print,
-    is_learned,
-    joined,
-    micrometres,
-    p_words,
-)
 
 # Chance of deviations this large from the gauge alone, below which the model is called off.
 CHANCE = 0.01
@@ -67,7 +44,9 @@ def headline(data: ReportData) -> Headline:
         return _compared(data)
     # A diagnosis adds effects that it is sure of, and keeps learned laws for what they predict.
     added = [c for c in diagnosis.classes if c.best in diagnosis.accepted]
-    if any(c.probability < 1.0 if is_learned(c.best) else c.probability <= SURE for c in added):
+    if any(
+        c.probability < 1.0 if words.is_learned(c.best) else c.probability <= SURE for c in added
+    ):
         return _asked_for(data, diagnosis, min(c.probability for c in added))
     return {
         'effect_missing': _missing,
@@ -79,71 +58,73 @@ def headline(data: ReportData) -> Headline:
 
 
 def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
-    rows = accepted_rows(data)
-    named = [row for row in rows if not is_learned(row['id'])]
-    facts = (
-        ('What is missing', explained(named)),
-        ('What it costs', costs(data, diagnosis)),
-        ('What to do', to_use(data, named)),
-        ('How sure', f'{sure(rows)} {chance(diagnosis)}'),
-        ('What is learned', learned(data, diagnosis, 'What their laws leave over')),
-        ('What changes', changes(data, diagnosis)),
-        ('What is left out', left_out(data)),
+    rows = facts.accepted_rows(data)
+    named = [row for row in rows if not words.is_learned(row['id'])]
+    answers = (
+        ('What is missing', facts.explained(named)),
+        ('What it costs', facts.costs(data, diagnosis)),
+        ('What to do', facts.to_use(data, named)),
+        ('How sure', f'{facts.sure(rows)} {facts.chance(diagnosis)}'),
+        ('What is learned', facts.learned(data, diagnosis, 'What their laws leave over')),
+        ('What changes', facts.changes(data, diagnosis)),
+        ('What is left out', facts.left_out(data)),
     )
-    names = joined([with_confounded(row) for row in named])
+    names = words.joined([facts.with_confounded(row) for row in named])
     kicker = 'An effect is missing' if len(named) == 1 else 'Effects are missing'
-    return Headline('found', kicker, f'The model lacked {names}', facts)
+    return Headline('found', kicker, f'The model lacked {names}', answers)
 
 
 def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> Headline:
     """An effect that the user had added, and that no diagnosis would have added."""
-    rows = accepted_rows(data)
-    names = joined([with_article(row['id']) for row in rows])
+    rows = facts.accepted_rows(data)
+    names = words.joined([facts.with_article(row['id']) for row in rows])
     title = (
         f'The readings do not call for {names}'
         if probability < LIKELY
         else f'The readings do not settle whether {names} was missing'
     )
     if probability > SURE:
-        title = f'{capital(names)} was added'
+        title = f'{words.capital(names)} was added'
     more = 'Something is missing: run the diagnosis to find the cause.'
-    facts = (
-        ('What was added', explained(rows)),
-        ('What is learned', learned(data, diagnosis, 'It')),
-        ('How sure', f'{sure(rows)} {chance(diagnosis)}'),
-        ('What it does', costs(data, diagnosis)),
-        ('What changes', changes(data, diagnosis)),
+    answers = (
+        ('What was added', facts.explained(rows)),
+        ('What is learned', facts.learned(data, diagnosis, 'It')),
+        ('How sure', f'{facts.sure(rows)} {facts.chance(diagnosis)}'),
+        ('What it does', facts.costs(data, diagnosis)),
+        ('What changes', facts.changes(data, diagnosis)),
         ('What to do', more if diagnosis.p_value < ALPHA else ''),
     )
-    return Headline('open', 'Added as asked', title, facts)
+    return Headline('open', 'Added as asked', title, answers)
 
 
 def _nothing(data: ReportData, diagnosis: Diagnosis) -> Headline:
-    facts = (
+    answers = (
         ('What is missing', 'Nothing that these readings can show.'),
         ('What to do', 'Simulate and plan with model.yaml of this folder.'),
-        ('How sure', f'{chance(diagnosis)} {blind(diagnosis)}'),
-        ('What changes', changes(data, diagnosis)),
-        ('What is left out', left_out(data)),
+        ('How sure', f'{facts.chance(diagnosis)} {facts.blind(diagnosis)}'),
+        ('What changes', facts.changes(data, diagnosis)),
+        ('What is left out', facts.left_out(data)),
     )
-    return Headline('good', 'Nothing is missing', 'The model agrees with the readings', facts)
+    return Headline('good', 'Nothing is missing', 'The model agrees with the readings', answers)
 
 
 def _undecided(data: ReportData, diagnosis: Diagnosis) -> Headline:
     rows = [row for row in class_rows(data) if not row['accepted']]
-    causes = [f'{with_confounded(row)} ({percent(row["found"].probability)})' for row in rows[:3]]
-    named = [name for name in diagnosis.accepted if not is_learned(name)]
+    causes = [
+        f'{facts.with_confounded(row)} ({percent(row["found"].probability)})' for row in rows[:3]
+    ]
+    named = [name for name in diagnosis.accepted if not words.is_learned(name)]
     more = 'more ' if named else ''
-    facts = (
-        ('What is missing', f'Something {more}is, most likely {joined(causes, "or")}.'),
-        ('How sure', f'{chance(diagnosis)} No single cause is probable enough to be added.'),
-        ('What is learned', learned(data, diagnosis, 'What is missing')),
-        ('What changes', changes(data, diagnosis)),
-        ('What to do', to_do(data)),
-        ('What is left out', left_out(data)),
+    answers = (
+        ('What is missing', f'Something {more}is, most likely {words.joined(causes, "or")}.'),
+        ('How sure', f'{facts.chance(diagnosis)} No single cause is probable enough to be added.'),
+        ('What is learned', facts.learned(data, diagnosis, 'What is missing')),
+        ('What changes', facts.changes(data, diagnosis)),
+        ('What to do', facts.to_do(data)),
+        ('What is left out', facts.left_out(data)),
     )
     title = f'Something {more}is missing; the readings do not say which'
-    return Headline('open', 'Undecided', title, facts)
+    return Headline('open', 'Undecided', title, answers)
 
 
 def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
@@ -154,40 +135,39 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
         'residual below show its shape.'
     )
     if unknown:
-        label = covariate_label(unknown.covariate).split(' [')[0].split(',')[0].lower()
+        label = words.covariate_label(unknown.covariate).split(' [')[0].split(',')[0].lower()
         reason = reason.replace(f'against {unknown.covariate}', f'against {label}')
         where = (
-            f'{capital(in_print(unknown.where))}; most clearly against {label} '
-            f'({p_words(unknown.p_value)}).'
+            f'{words.capital(words.in_print(unknown.where))}; most clearly against {label} '
+            f'({words.p_words(unknown.p_value)}).'
         )
-    if any(map(is_learned, diagnosis.accepted)):
+    if any(map(words.is_learned, diagnosis.accepted)):
         title += '; its law was learned'
         remedy = (
             'Look at the learned laws below, and name the cause if you can. The model with them '
             'predicts as the error says, within the range of the readings.'
         )
-    facts = (
+    answers = (
         ('What is missing', reason),
         ('Where it shows', where),
-        ('How sure', chance(diagnosis)),
-        ('What is learned', learned(data, diagnosis, 'It')),
-        ('What changes', changes(data, diagnosis)),
+        ('How sure', facts.chance(diagnosis)),
+        ('What is learned', facts.learned(data, diagnosis, 'It')),
+        ('What changes', facts.changes(data, diagnosis)),
         ('What to do', remedy),
-        ('What is left out', left_out(data)),
+        ('What is left out', facts.left_out(data)),
     )
-    return Headline('open', 'Unexplained', title, facts)
+    return Headline('open', 'Unexplained', title, answers)
 
 
 def _broken(data: ReportData, diagnosis: Diagnosis) -> Headline:
-    facts = (
-        ('Why', f'{capital(diagnosis.reason)}.'),
-        (
-            'What changes',
-            f'{changes(data, diagnosis)} No conclusion was drawn. The charts below show the '
-            'fit as it stands, to find the fault.',
-        ),
+    more = (
+        'No conclusion was drawn. The charts below show the fit as it stands, to find the fault.'
     )
-    return Headline('bad', 'Not usable', 'The fit cannot be trusted', facts)
+    answers = (
+        ('Why', f'{words.capital(diagnosis.reason)}.'),
+        ('What changes', f'{facts.changes(data, diagnosis)} {more}'),
+    )
+    return Headline('bad', 'Not usable', 'The fit cannot be trusted', answers)
 
 
 def _compared(data: ReportData) -> Headline:
@@ -201,32 +181,32 @@ def _compared(data: ReportData) -> Headline:
         title = 'The model is further off than the gauge explains'
     off = bool(regions) or by_chance < CHANCE
     worst = float(np.abs(points.residual_um[points.worst]))
-    where = ' '.join(f'{capital(in_print(region.description))}.' for region in regions[:3])
-    facts = (
+    where = ' '.join(
+        f'{words.capital(words.in_print(region.description))}.' for region in regions[:3]
+    )
+    answers = (
         (
             'How far off',
-            f'RMSE {micrometres(points.rmse_um)}, at worst {micrometres(worst)}; '
-            f'the gauge alone gives {micrometres(data.study.noise_floor_um)}.',
+            f'RMSE {words.micrometres(points.rmse_um)}, at worst {words.micrometres(worst)}; '
+            f'the gauge alone gives {words.micrometres(data.study.noise_floor_um)}.',
         ),
         ('Where', where or 'No region stands out.'),
         ('What to do', 'Run the diagnosis on this campaign to find the cause.' if off else ''),
     )
-    return Headline('open' if off else 'good', 'Comparison', title, facts)
+    return Headline('open' if off else 'good', 'Comparison', title, answers)
 
 
 def _side_by_side(data: ReportData) -> Headline:
     errors = [comparison.points.rmse_um for comparison in data.comparisons]
     best = data.names[int(np.argmin(errors))]
-    errors_of_each = joined(
-        [f'{n} {micrometres(e)}' for n, e in zip(data.names, errors, strict=True)]
+    each = [f'{n} {words.micrometres(e)}' for n, e in zip(data.names, errors, strict=True)]
+    floor = words.micrometres(data.study.noise_floor_um)
+    remedy = 'unless it was fitted to these very readings and the others were not.'
+    answers = (
+        ('How far off', f'RMSE of {words.joined(each)}; the gauge alone gives {floor}.'),
+        ('What to do', f'Take {best}, {remedy}'),
     )
-    facts = (
-        ('How far off', f'RMSE of {errors_of_each}; the gauge alone gives '
-                        f'{micrometres(data.study.noise_floor_um)}.'),
-        ('What to do', f'Take {best}, unless it was fitted to these very readings and the others '
-                       'were not.'),
-    )  # fmt: skip
-    return Headline('open', 'Side by side', f'{best} is nearest to the readings', facts)
+    return Headline('open', 'Side by side', f'{best} is nearest to the readings', answers)
 
 
 def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
@@ -240,23 +220,20 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     if diagnosis is None:
         rmse_um = data.comparisons[-1].points.rmse_um
         return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]
-    fitted = [f'{step.rmse_um:.2f}' for step in diagnosis.history]
-    left_out = [f'{step.holdout_rmse_um:.2f}' for step in diagnosis.history]
-    found = [
-        (f'RMSE, {label}', errors[0] if len(errors) > 1 else '', errors[-1], 'µm')
-        for label, errors in (
-            ('fitted points', fitted),
-            (f'{diagnosis.left_out} left out', left_out),
-        )
-    ]
+    first, last = diagnosis.history[0], diagnosis.history[-1]
+    found = []
+    for label, name in (
+        ('fitted points', 'rmse_um'), (f'{diagnosis.left_out} left out', 'holdout_rmse_um')
+    ):  # fmt: skip
+        before = f'{getattr(first, name):.2f}' if first is not last else ''
+        found.append((f'RMSE, {label}', before, f'{getattr(last, name):.2f}', 'µm'))
     found.append(floor)
+    open_too = diagnosis.verdict == 'undecided'
     named = [
-        c
-        for c in diagnosis.classes
-        if not is_learned(c.best)
-        and (c.best in diagnosis.accepted or diagnosis.verdict == 'undecided')
-    ]
+        c for c in diagnosis.classes
+        if not words.is_learned(c.best) and (open_too or c.best in diagnosis.accepted)
+    ]  # fmt: skip
     for best in named[:1]:
         remark = 'probability' + (', with its like' if len(best.members) > 1 else '')
-        found.append((effect_name(best.best), '', percent(best.probability), remark))
+        found.append((words.effect_name(best.best), '', percent(best.probability), remark))
     return found

@@ -63,7 +63,6 @@ def report_html(data: ReportData) -> str:
     drawn = [
         charts.parity_figure(data),
         charts.covariate_figure(data),
-        charts.history_figure(data),
         charts.unknown_figure(data),
         learned_figure(data),
         map_figure(data),

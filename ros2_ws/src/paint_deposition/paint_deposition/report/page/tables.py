@@ -12,18 +12,9 @@ from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.style import TWO_SIDED_95
-from paint_deposition.report.words import (
-    SYMBOLS,
-    effect_meaning,
-    effect_name,
-    in_unit,
-    learned_words,
-    micrometres,
-    number,
-    parameter_words,
-)
 
 # A value below this share of its interval is printed as none.
 NEGLIGIBLE = 1e-4
@@ -32,9 +23,8 @@ LOW, IN, HIGH = 'low', 'in', 'high'
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
     """Candidate causes with the effects they are confounded with, and parameters."""
-    if data.diagnosis is None:
-        return []
-    return [_class_row(data, data.diagnosis, found) for found in data.diagnosis.classes]
+    diagnosis = data.diagnosis
+    return [_class_row(data, diagnosis, c) for c in diagnosis.classes] if diagnosis else []
 
 
 def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> dict[str, Any]:
@@ -46,11 +36,11 @@ def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> di
     return {
         'id': found.best,
         'found': found,
-        'name': effect_name(found.best),
+        'name': words.effect_name(found.best),
         'like': like,
-        'others': [effect_name(member) for member in like],
+        'others': [words.effect_name(member) for member in like],
         'accepted': found.best in diagnosis.accepted,
-        'meaning': effect_meaning(effect),
+        'meaning': words.effect_meaning(effect),
         'signature': effect.signature if effect else '',
         'parameters': parameters + _learned(data.model.effect(found.best)),
     }
@@ -61,8 +51,8 @@ def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[s
     unit = effect.parameters()[name]['unit'] if effect else ''
     if abs(values[0]) < NEGLIGIBLE * np.ptp(values):
         values = (0.0, *values[1:])
-    printed = zip(('unit', 'value', 'low', 'high'), in_unit(unit, *values), strict=False)
-    return {'words': parameter_words(name, unit)} | dict(printed)
+    printed = zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False)
+    return {'words': words.parameter_words(name, unit)} | dict(printed)
 
 
 def _learned(effect: Effect | None) -> list[dict[str, str]]:
@@ -70,25 +60,23 @@ def _learned(effect: Effect | None) -> list[dict[str, str]]:
     if not isinstance(effect, LearnedLaw):
         return []
     keys = ('words', 'value', 'unit')
-    return [dict(zip(keys, row, strict=True)) for row in learned_words(effect)]
+    return [dict(zip(keys, row, strict=True)) for row in words.learned_words(effect)]
 
 
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
     fitted = estimates(data.diagnosis.history[-1].fit) if data.diagnosis else ()
     found = {estimate.name: estimate for estimate in fitted}
-    numbers, rows = [brush.number for brush in data.model.brushes], []
-    several = len(numbers) > 1
-    for (k, planar), name in product(enumerate(data.model.patterns), PATTERN_NAMES):
-        symbol, words, unit = SYMBOLS[name]
+    brushes, rows = data.model.brushes, []
+    of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
+    for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
+        symbol, meaning, unit = words.SYMBOLS[name]
         factor, shown = (1e3, 'mm') if unit == 'm' else (1.0, unit)
-        value = number(factor * getattr(planar, name), 4)
-        row = {'symbol': symbol, 'words': words, 'unit': shown, 'value': value}
-        if several:
-            row['words'] = f'brush {numbers[k]}: {words}'
+        value = words.number(factor * getattr(planar, name), 4)
+        row = {'symbol': symbol, 'words': whose + meaning, 'unit': shown, 'value': value}
         if name in found:
-            low, high = (number(factor * end) for end in (found[name].low, found[name].high))
-            row['interval'] = f'{low} to {high}'
+            ends = (words.number(factor * end) for end in (found[name].low, found[name].high))
+            row['interval'] = ' to '.join(ends)
         rows.append(row)
     return rows
 
@@ -97,13 +85,11 @@ def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
     """What the readings scatter by: what, how much, and how that is known."""
     noise, texture = data.study.noise, data.study.texture
     known = {'repeats': 'from repeats', 'stated': 'as stated', 'neighbours': 'from neighbours'}
-    return [
-        (what, amount, known.get(source, source))
-        for what, amount, source in (
-            ('noise of the gauge, one reading', micrometres(noise.typical_um), noise.source),
-            ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
-        )
-    ]
+    rows = (
+        ('noise of the gauge, one reading', words.micrometres(noise.typical_um), noise.source),
+        ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
+    )
+    return [(what, amount, known.get(source, source)) for what, amount, source in rows]
 
 
 def effect_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -123,39 +109,36 @@ def effect_rows(data: ReportData) -> list[dict[str, Any]]:
 
 def blind_rows(data: ReportData) -> list[dict[str, Any]]:
     """Effects that these readings could not show, and what would have been seen of others."""
-    if data.diagnosis is None:
+    diagnosis, rows = data.diagnosis, []
+    if diagnosis is None:
         return []
-    not_testable, detectable = data.diagnosis.not_testable, data.diagnosis.detectable
-    rows = []
-    for effect_id in dict.fromkeys((*not_testable, *detectable)):
-        if effect_id in data.diagnosis.accepted:
+    ids = dict.fromkeys((*diagnosis.not_testable, *diagnosis.detectable))
+    for effect_id in ids:
+        if effect_id in diagnosis.accepted:
             continue
-        effect = data.effect_class(effect_id)
-        seen = detectable.get(effect_id, {})
+        effect, seen = data.effect_class(effect_id), diagnosis.detectable.get(effect_id, {})
+        parameters = effect.parameters() if effect else {}
         amplitudes = [
             {
-                'words': parameter_words(name, info['unit']),
+                'words': words.parameter_words(name, info['unit']),
                 'least': _size(seen.get(name), info['unit']),
                 'usual': _size(info['typical'], info['unit']),
             }
-            for name, info in (effect.parameters() if effect else {}).items()
+            for name, info in parameters.items()
             if info['role'] == 'amplitude'
         ]
-        rows.append(
-            {
-                'id': effect_id,
-                'testable': effect_id not in not_testable,
-                'amplitudes': amplitudes,
-                'meaning': effect_meaning(effect),
-            }
-        )
+        testable = effect_id not in diagnosis.not_testable
+        rows.append({
+            'id': effect_id, 'testable': testable, 'amplitudes': amplitudes,
+            'meaning': words.effect_meaning(effect),
+        })  # fmt: skip
     return rows
 
 
 def _size(value: float | None, unit: str) -> str:
     if value is None or not np.isfinite(value):
         return ''
-    shown_unit, size = in_unit(unit, abs(value))
+    shown_unit, size = words.in_unit(unit, abs(value))
     return f'{size} {shown_unit}'.strip()
 
 
@@ -177,17 +160,11 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
         )  # fmt: skip
-        rows.append(
-            {
-                'name': experiment.name,
-                'measured': measured,
-                'bands': band_shares(data, measured),
-                'areas': {
-                    LOW: film.below_target, IN: film.within_target, HIGH: film.above_target
-                },
-                'film': film,
-            }
-        )  # fmt: skip
+        areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}
+        rows.append({
+            'name': experiment.name, 'measured': measured, 'areas': areas, 'film': film,
+            'bands': band_shares(data, measured),
+        })  # fmt: skip
     return rows
 
 
@@ -226,15 +203,12 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
         for p, position in enumerate(experiment.measured_points.positions_m):
             row = first + p
             residual, scatter = found.residual_um[row], TWO_SIDED_95 * found.sigma_um[row]
-            rows.append(
-                {
-                    'part': experiment.name, 'point': str(labels[p]), 'group': str(groups[p]),
-                    'x_mm': 1e3 * position[0], 'y_mm': 1e3 * position[1],
-                    'z_mm': 1e3 * position[2],
-                    'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
-                    'deviation_um': residual, 'scatter_um': scatter,
-                    'model': 'OK' if abs(residual) <= scatter else 'off',
-                    'film': band_of(data, found.measured_um[row]),
-                }
-            )  # fmt: skip
+            rows.append({
+                'part': experiment.name, 'point': str(labels[p]), 'group': str(groups[p]),
+                **dict(zip(('x_mm', 'y_mm', 'z_mm'), 1e3 * position, strict=True)),
+                'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
+                'deviation_um': residual, 'scatter_um': scatter,
+                'model': 'OK' if abs(residual) <= scatter else 'off',
+                'film': band_of(data, found.measured_um[row]),
+            })  # fmt: skip
     return rows

@@ -1,8 +1,6 @@
 """The painted part with the figures of its film; first what is in the target band, if any."""
 
-from pathlib import Path
 from textwrap import fill
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +12,7 @@ from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scal
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import colours_of, new_figure, quiet, save_picture
+from paint_deposition.report.pictures.chart import colours_of, new_figure, quiet
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
@@ -22,11 +20,6 @@ from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 PART_IN = (7.6, 7.6)
 BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 2.7, 1.0, 3.4
 BINS = 40
-
-
-def write_film_picture(path: str | Path, *drawn: Any) -> Path:
-    """Write ``film_picture`` as PNG, SVG or PDF, by the suffix, in place of an older file."""
-    return save_picture(film_picture(*drawn), path)
 
 
 def film_picture(
@@ -37,16 +30,9 @@ def film_picture(
     title: str,
     subtitle: str,
 ) -> Figure:
-    """A painted part with the figures of its film.
+    """A painted part with the figures of its film (V,) [um].
 
     With a target the part is drawn twice: too thin, right and too thick first, then the film.
-
-    Args:
-        surface: the part.
-        film_um: (V,) film at the vertices of the surface [um].
-        spray: the tool path.
-        statistics: of the film.
-        title, subtitle: what to write above.
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
@@ -77,16 +63,8 @@ def draw_film(
 ) -> ColourScale:
     """Draw a painted part on axes of your own, seen from the gun's side.
 
-    Args:
-        axes: their limits, aspect and labels are set.
-        surface: the part.
-        film_um: (V,) film at the vertices of the surface [um].
-        spray: the tool path, drawn over the part.
-        painted_above_um: film that counts as painted; less is shown as bare metal.
-        part: the picture of the surface, where it is at hand.
-
-    Returns:
-        The scale of the colours. They are the film: relief is shown by lines alone.
+    The colours, whose scale is returned, are the film (V,) [um] and relief is shown by lines
+    alone; up to ``painted_above_um`` it is shown as bare metal.
     """
     part = part or PartPicture.of(surface)
     scale = film_scale(film_um)

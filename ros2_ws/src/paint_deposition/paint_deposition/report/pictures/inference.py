@@ -14,13 +14,7 @@ from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture
-from paint_deposition.report.style import (
-    ACCENT,
-    BEFORE,
-    COMPONENTS,
-    INK,
-    MUTED,
-)
+from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK, MUTED
 
 LINE_POINTS = 600
 PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26

@@ -15,15 +15,15 @@ from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, save_picture
-from paint_deposition.report.pictures.part import draw_triangles
+from paint_deposition.report.pictures.part import draw_triangles, dress
 from paint_deposition.report.pictures.view import View
 from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
 
 PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
 WARNING_COLOUR = '#c0392b'
-WIDTH_IN, VIEWS_IN, LINE_IN = 11.5, 7.4, 0.22
-TEXT_COLUMNS = 130
+SIZE_IN = (11.5, 8.0)
+TEXT_COLUMNS = 48
 # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
 AXIS_SHARE, AXES_APART = 0.09, 0.04
 # Smaller parts of a picture are marked: they would not be seen.
@@ -33,22 +33,12 @@ SMALL = 0.02
 def write_geometry_picture(
     path: str | Path, surface: Surface, spray: SprayPath, geometry: SprayGeometry, title: str
 ) -> Path:
-    """Draw part and motion from the gun, and from the right and the top of that picture.
-
-    Args:
-        path: PNG to write.
-        surface: the part.
-        spray: the tool path.
-        geometry: its sentence and warnings are written above.
-        title: what to write on top.
-    """
+    """Draw part and motion from the gun, and from the right and the top of that picture."""
     front = View.of_front(surface.outward, surface.down)
     views = (front, front.from_the_right(), front.from_above())
-    lines = [fill(f'warning: {warning}', TEXT_COLUMNS) for warning in geometry.warnings]
-    text_in = LINE_IN * (3.5 + sum(1 + line.count('\n') for line in lines))
-    figure = new_figure(WIDTH_IN, VIEWS_IN + text_in)
     corners = np.concatenate([surface.vertices_m, spray.position_m])
     sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
+    figure = new_figure(*SIZE_IN)
     grid = figure.add_gridspec(
         2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
         height_ratios=_ratios(sizes[0][1], sizes[2][1]),
@@ -62,16 +52,9 @@ def write_geometry_picture(
     key = figure.add_subplot(grid[1, 1])
     key.set_axis_off()
     key.legend(handles=_key(), loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
-    views_share = VIEWS_IN / (VIEWS_IN + text_in)
-    figure.set_layout_engine('constrained', rect=(0.0, 0.0, 1.0, views_share))
-    top = 1.0 - 0.5 * LINE_IN / (VIEWS_IN + text_in)
-    figure.text(0.02, top, title, va='top', fontsize=13, color=INK)
-    step = LINE_IN / (VIEWS_IN + text_in)
-    figure.text(0.02, top - 1.3 * step, f'{geometry.sentence}.', va='top', fontsize=10, color=INK)
-    figure.text(
-        0.02, top - 2.4 * step, '\n'.join(lines), va='top', fontsize=9, color=WARNING_COLOUR,
-        linespacing=1.4,
-    )  # fmt: skip
+    text = '\n'.join(fill(f'warning: {line}', TEXT_COLUMNS) for line in geometry.warnings)
+    key.text(0.0, 0.0, text, fontsize=9, color=WARNING_COLOUR, transform=key.transAxes)
+    figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
 
 
@@ -114,14 +97,7 @@ def _draw(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: fl
     axes.margins(0.06)
     axes.grid(True, color=GRID, linewidth=0.8)
     axes.set_axisbelow(True)
-    axes.spines[['top', 'right']].set_visible(False)
-    axes.tick_params(colors=MUTED, labelsize=8)
-    axes.set_xlabel(view.labels[0], color=MUTED, fontsize=9)
-    axes.set_ylabel(view.labels[1], color=MUTED, fontsize=9)
-    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
-    for axis, direction in ((axes.xaxis, view.right), (axes.yaxis, view.up)):
-        if direction[np.abs(direction).argmax()] < 0.0:
-            axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
+    dress(axes, view)
 
 
 def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:

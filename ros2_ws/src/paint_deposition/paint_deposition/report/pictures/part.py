@@ -114,16 +114,20 @@ class PartPicture:
         axes.set_aspect('equal')
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        axes.spines[['top', 'right']].set_visible(False)
-        axes.tick_params(colors=MUTED, labelsize=9)
-        across, upward = self.view.labels
-        axes.set_xlabel(across, color=MUTED)
-        axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
-        # Axes of the mesh that point the other way are labelled with the mesh's own sign.
-        if self.view.right.min() < -SNAP_COSINE:
-            axes.xaxis.set_major_formatter(lambda value, _: f'{-value:g}')
-        if self.view.up.min() < -SNAP_COSINE:
-            axes.yaxis.set_major_formatter(lambda value, _: f'{-value:g}')
+        dress(axes, self.view)
+
+
+def dress(axes: Axes, view: View) -> None:
+    """Axes with the coordinates of the mesh."""
+    axes.spines[['top', 'right']].set_visible(False)
+    axes.tick_params(colors=MUTED, labelsize=9)
+    across, upward = view.labels
+    axes.set_xlabel(across, color=MUTED)
+    axes.set_ylabel(upward, color=MUTED, rotation=0, ha='right', va='center')
+    # Axes of the mesh that point the other way are labelled with the mesh's own sign.
+    for axis, direction in ((axes.xaxis, view.right), (axes.yaxis, view.up)):
+        if direction.min() < -SNAP_COSINE:
+            axis.set_major_formatter(lambda value, _: f'{0.0 - value:g}')
 
 
 def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
@@ -142,14 +146,7 @@ def _borders(faces: np.ndarray) -> np.ndarray:
 def draw_tool_path(
     axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray
 ) -> None:
-    """Draw each pass as a line with its number and arrows, and the way between them dashed.
-
-    Args:
-        axes: on which one unit is 1 m.
-        spray: the motion.
-        view: the directions of the picture.
-        low, high: (2,) corners of the picture [m].
-    """
+    """Draw passes as lines with number and arrows, the way between them dashed, within corners."""
     on = spray.flow > 0.0
     apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
     breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (apart_s > 1e-3))

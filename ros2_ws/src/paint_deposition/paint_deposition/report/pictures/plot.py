@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import singledispatch
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -34,44 +33,20 @@ def plot(result: Any, ax: Axes | None = None) -> Axes:
         from matplotlib import pyplot
 
         ax = pyplot.gca()
-    _draw(result, ax)
+    if isinstance(result, Film | Plan | PartPlan):
+        above_um = result.statistics.painted_above_um
+        draw_film(ax, result.surface, result.film_um, result.path, above_um)
+    elif isinstance(result, ChosenReadings):
+        draw_points(ax, result)
+    elif isinstance(result, Recommendation):
+        draw_curve(ax, result)
+    elif isinstance(result, Calibration):
+        study = result.study
+        draw_agreement(ax, study.measured_um, result.fit.predicted_um, study.sigma_um)
+    elif isinstance(result, Comparison | Diagnosis):
+        of = result.comparisons[-1] if isinstance(result, Diagnosis) else result
+        found = of.readings
+        draw_agreement(ax, found.measured_um, found.predicted_um, found.sigma_um)
+    else:
+        raise TypeError(f'{type(result).__name__} is not a result that can be drawn')
     return ax
-
-
-@singledispatch
-def _draw(result: Any, ax: Axes) -> None:
-    raise TypeError(f'{type(result).__name__} is not a result that can be drawn')
-
-
-@_draw.register(Film)
-@_draw.register(Plan)
-@_draw.register(PartPlan)
-def _(result: Film | Plan | PartPlan, ax: Axes) -> None:
-    draw_film(ax, result.surface, result.film_um, result.path, result.statistics.painted_above_um)
-
-
-@_draw.register
-def _(result: ChosenReadings, ax: Axes) -> None:
-    draw_points(ax, result)
-
-
-@_draw.register
-def _(result: Recommendation, ax: Axes) -> None:
-    draw_curve(ax, result)
-
-
-@_draw.register
-def _(result: Comparison, ax: Axes) -> None:
-    readings = result.readings
-    draw_agreement(ax, readings.measured_um, readings.predicted_um, readings.sigma_um)
-
-
-@_draw.register
-def _(result: Diagnosis, ax: Axes) -> None:
-    _draw(result.comparisons[-1], ax)
-
-
-@_draw.register
-def _(result: Calibration, ax: Axes) -> None:
-    study = result.study
-    draw_agreement(ax, study.measured_um, result.fit.predicted_um, study.sigma_um)

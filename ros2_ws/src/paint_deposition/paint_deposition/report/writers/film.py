@@ -22,12 +22,10 @@ CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
 
 @written.register
 def _write_simulation(
-    result: Film,
-    folder: Path,
-    made_from: Mapping[str, Any] | None = None,
-    pictures: str = 'png',
+    result: Film, folder: Path, made_from: Mapping[str, Any] | None = None, pictures: str = 'png'
 ) -> list[Path]:
-    from paint_deposition.report.pictures.film import write_film_picture
+    from paint_deposition.report.pictures.chart import save_picture
+    from paint_deposition.report.pictures.film import film_picture
 
     models = {gun.name or 'model': gun.model for gun in result.guns}
     motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
@@ -42,12 +40,11 @@ def _write_simulation(
     mesh, motion, model = (
         Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')
     )
-    picture = write_film_picture(
-        folder / f'film.{pictures}', result.surface, result.film_um, result.path,
-        result.statistics, f'Film on {mesh or "the part"}',
-        f'{motion}, {model or "default model"}',
+    picture = film_picture(
+        result.surface, result.film_um, result.path, result.statistics,
+        f'Film on {mesh or "the part"}', f'{motion}, {model or "default model"}',
     )  # fmt: skip
-    return [*files, picture]
+    return [*files, save_picture(picture, folder / f'film.{pictures}')]
 
 
 def write_film(
@@ -69,10 +66,6 @@ def write_film(
         film_um: (V,) film at the vertices of the surface [um].
         details: more to say in the statistics, such as counts of poses and the files used.
         color_range_um: ends of the colour map in the PLY [um]; both 0 is automatic.
-        overwrite: whether older files of these names may go.
-
-    Returns:
-        The absolute paths written, in the order above.
 
     Raises:
         PaintError: a file of that name is there, or the folder cannot be written.

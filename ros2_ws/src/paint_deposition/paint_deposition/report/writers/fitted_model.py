@@ -4,11 +4,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.inference.diagnosis.verdict import Step
@@ -21,6 +18,8 @@ from paint_deposition.inference.posterior import Posterior
 
 # So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
 DIGITS = 8
+# The numbers of a learned law.
+LEARNED = ('learned', 'sd')
 # What a step of the history added, where it was no effect.
 PATTERN, REFIT = 'pattern', 'refit'
 
@@ -49,7 +48,9 @@ def write_fitted(
     history = history_as_list(study, steps, start.history)
     uncertainty = _uncertainty(fit, start.uncertainty)
     fitted = _rounded(fit, steps[0].model.effects)
-    posterior: Posterior | None = _short(posterior_of(fit, study.campaign))
+    found = posterior_of(fit, study.campaign)
+    few = {'mean': _short(found.mean), 'covariance': _short(found.covariance)}
+    posterior: Posterior | None = found.model_copy(update=few)
     whole = fitted.with_others(start.model)
     if whole is not fitted:
         # It is that of some brushes only and would be taken for that of all.
@@ -96,43 +97,29 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
     Learned laws among the ``given`` effects were not learned here and stay as they are.
     """
     model = fit.model.with_patterns(
-        p.model_copy(update={name: _few_digits(getattr(p, name)) for name in PATTERN_NAMES})
+        p.model_copy(update={name: _short(getattr(p, name)) for name in PATTERN_NAMES})
         for p in fit.model.patterns
     )
     for effect in model.effects:
-        values: dict[str, Any] = {
-            name: _few_digits(getattr(effect, name), info['low'], info['high'])
-            for name, info in effect.parameters().items()
-            if (effect.id, name) in fit.parameters.varied
-        }
         if isinstance(effect, LearnedLaw) and effect not in given:
+            values = {n: _short(v) for n, v in effect if isinstance(v, float) or n in LEARNED}
+        else:
             values = {
-                name: _few_digits(value)
-                for name, value in dict(effect).items()
-                if isinstance(value, float)
+                name: min(max(_short(getattr(effect, name)), info['low']), info['high'])
+                for name, info in effect.parameters().items()
+                if (effect.id, name) in fit.parameters.varied
             }
-            values['learned'] = tuple(map(_few_digits, effect.learned))
-            if isinstance(effect, LearnedCurve):
-                values['sd'] = tuple(float(f'{value:.3g}') for value in effect.sd)
         model = model.with_effect(effect.model_copy(update=values))
     return model
 
 
-def _short(posterior: Posterior) -> Posterior:
-    """The same with few digits."""
-    return posterior.model_copy(
-        update={
-            'mean': {name: _few_digits(value) for name, value in posterior.mean.items()},
-            'covariance': {
-                name: [_few_digits(value) for value in row]
-                for name, row in posterior.covariance.items()
-            },
-        }
-    )
-
-
-def _few_digits(value: float, low: float = -np.inf, high: float = np.inf) -> float:
-    return min(max(float(f'{value:.{DIGITS}g}'), low), high)
+def _short(value: Any) -> Any:
+    """The same with few digits in all its numbers."""
+    if isinstance(value, float):
+        return float(f'{value:.{DIGITS}g}')
+    if isinstance(value, dict):
+        return {name: _short(one) for name, one in value.items()}
+    return type(value)(map(_short, value))
 
 
 def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:

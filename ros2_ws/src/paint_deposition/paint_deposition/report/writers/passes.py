@@ -36,11 +36,9 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Passes:
-    """What is written.
+    """A motion in the part's frame, timed and as moves of a robot program, and its model.
 
     Attributes:
-        trajectory: the timed motion, in the part's frame. moves: the same for a robot program.
-        model: that they were made with.
         made: how, for the head of the program, as 'Planned'.
         part: the robot's frame and the pose of the part in it; bag and table have their poses in
             that frame then, and the program defines its work object so. None: the part's frame.
@@ -77,19 +75,11 @@ def write_plan(
     details: Mapping[str, Any] | None = None,
     part: tuple[str, Rigid] | None = None,
 ) -> list[Path]:
-    """Write figures, bag, ``passes.csv``, ``passes.mod``, ``model.yaml`` and the film.
-
-    An older plan in the folder is replaced.
+    """Write figures, what ``write_passes`` does, and the film, in place of an older plan.
 
     Args:
-        folder: where to; made if it is not there.
-        result: its figures are in ``plan.json``, those of an improvement in ``improvement.json``.
         details: more to say in the figures, such as the files used.
-        part: the robot's frame and the pose of the part in it; bag and table have their poses
-            in that frame then, and the module defines its work object so.
-
-    Returns:
-        The paths written.
+        part: as for ``Passes``.
 
     Raises:
         PaintError: the folder cannot be written, or holds another folder of the bag's name.
@@ -134,10 +124,11 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
         if not target.is_dir() or strangers:
             raise PaintError(f'{target} is there and no planned bag; move it away')
     trajectory, part = passes.trajectory, passes.part
+    placed = moved(trajectory, part[1], part[0]) if part else trajectory
     # A bag's files are named for their folder, so the folder is made under its own name.
     with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
         fresh = write_pose_bag(
-            Path(aside) / target.name, _in_frame(trajectory, part),
+            Path(aside) / target.name, placed,
             custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
             part=(trajectory.frame_id, part[1]) if part else None,
         )  # fmt: skip
@@ -145,11 +136,3 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
             shutil.rmtree(target)
         fresh.rename(target)
     write_model(target / MODEL_FILE, passes.model)
-
-
-def _in_frame(trajectory: Trajectory, part: tuple[str, Rigid] | None) -> Trajectory:
-    """The poses in the frame that is written."""
-    if part is None:
-        return trajectory
-    frame_id, place = part
-    return moved(trajectory, place, frame_id)

@@ -20,7 +20,8 @@ from paint_deposition.planning.improvement.improvement import Improvement
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.film import write_film_picture
+from paint_deposition.report.pictures.chart import save_picture
+from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import write_improvement_picture, write_uniformity
@@ -62,18 +63,16 @@ def _passes(
     pictures: str = 'png',
 ) -> list[Path]:
     surface = result.surface
-    if isinstance(result, Improvement):
-        said: dict[str, Any] = {'notes': (*surface.notes, *result.given.notes)}
-    else:
-        said = {'down': surface.down, 'notes': surface.notes}
+    given = result.given.notes if isinstance(result, Improvement) else ()
+    said = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(said | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_plan(folder, result, about, part)
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
-    film = write_film_picture(
-        folder / f'film.{pictures}', surface, result.film_um, result.path, result.statistics,
-        'Planned passes and their film', result.sentence,
+    film = film_picture(
+        surface, result.film_um, result.path, result.statistics, 'Planned passes and their film',
+        result.sentence,
     )  # fmt: skip
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
@@ -83,7 +82,7 @@ def _passes(
         files.append(folder / f'passes.{pictures}')
         title = 'Planned passes over the faces'
         write_geometry_picture(files[-1], surface, result.path, geometry, title)
-    return [*files, film]
+    return [*files, save_picture(film, folder / f'film.{pictures}')]
 
 
 @written.register

@@ -29,7 +29,7 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
 
     Args:
         result: what a verb of this package returned.
-        folder: where to; made if it is not there.
+        folder: made if it is not there.
         pictures: format of the pictures, 'png', 'svg' or 'pdf'.
         start: of a calibration or a diagnosis, the ``ModelFile`` that it started from: its name,
             history and uncertainties are carried on.
