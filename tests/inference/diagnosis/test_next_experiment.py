@@ -71,6 +71,20 @@ def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drift_or_tool):
 
 
 @pytest.mark.slow
+def test_a_rolled_gun_on_one_spot_tells_the_air_from_the_tool(study, drift_or_tool):
+    (panel,) = study.campaign.experiments
+    spot = next(s for s in drift_or_tool[1] if s.changes == ('standing', 'roll_180'))
+    assert spot.separation > 2.0 * spot.now
+    told = spot.to_dict()['stand']
+    assert told['dwell_s'] > 0.5
+    assert f'{told["dwell_s"]:.1f} s' in spot.what
+    assert told['peak_um'] <= study.measured_um.max()
+    at = np.array([told['x_m'], told['y_m'], told['z_m']])
+    (row,) = np.flatnonzero((panel.measured_points.positions_m == at).all(axis=1))
+    assert told['film_um'] == pytest.approx(panel.means.mean_um[row])
+
+
+@pytest.mark.slow
 def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit):
     found = rivals(study, fit, 'tcp_offset', 'footprint')
     predicted = found.here[1]

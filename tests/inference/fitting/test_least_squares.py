@@ -103,7 +103,7 @@ def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
     parameters = FreeParameters.of(TRUTH)
     sigma = np.full(len(exact), SIGMA_UM)
     vectors = []
-    for _ in range(50):
+    for _ in range(25):
         measured = exact + SIGMA_UM * random.normal(size=len(exact))
         vectors.append(fit_readings(forward, measured, sigma, parameters).vector)
     reference = fit_readings(forward, exact, sigma, parameters)
@@ -111,11 +111,11 @@ def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
     covariance = scaled_covariance(reference)
     information = reference.jacobian.T @ reference.jacobian
     expected = np.sqrt(np.diag(covariance @ information @ covariance))
-    # The standard error of a deviation from 50 draws is 10 %.
-    assert np.std(vectors, axis=0, ddof=1) / expected == pytest.approx(np.ones(7), abs=0.35)
+    # The standard error of a deviation from 25 draws is 14 %.
+    assert np.std(vectors, axis=0, ddof=1) / expected == pytest.approx(np.ones(7), abs=0.45)
     assert (np.sqrt(np.diag(covariance)) >= expected).all()
     shift = np.mean(vectors, axis=0) - reference.vector
-    assert (np.abs(shift) < 4.0 * expected / np.sqrt(50.0)).all()
+    assert (np.abs(shift) < 4.0 * expected / np.sqrt(25.0)).all()
 
 
 def test_readings_that_say_nothing_leave_the_priors(forward, exact):

@@ -56,10 +56,7 @@ def test_amplitudes_count_in_their_typical_size():
 def test_shapes_are_varied_on_a_logarithmic_scale():
     """Neutral is the centre; the whole physical range is a few widths of the prior."""
     parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
-    assert parameters.names[len(PATTERN) :] == (
-        'corner_slowdown.gain',
-        'corner_slowdown.length_m',
-    )
+    assert parameters.names[len(PATTERN) :] == ('corner_slowdown.gain', 'corner_slowdown.length_m')
     vector = parameters.encode(parameters.start)
     info = CornerSlowdown.parameters()['length_m']
     lengths = []

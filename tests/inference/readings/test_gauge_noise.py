@@ -32,7 +32,7 @@ LAYOUTS = {
     'one point': [8],
     'mixed': [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2,
 }
-CAMPAIGNS = 400
+CAMPAIGNS = 100
 
 
 def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
@@ -85,13 +85,13 @@ def test_normal_readings_are_not_dropped(layout):
 
 @pytest.mark.parametrize('layout', ['20 pairs', 'mixed'])
 def test_the_noise_of_normal_readings_is_unbiased(layout):
-    """400 campaigns with 20 degrees of freedom or more know a standard deviation to 0.8 %."""
+    """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
     random = np.random.default_rng(3)
     squares = [
         np.mean((gauge_noise(readings).sigma_um / usual_noise_um(film)) ** 2)
         for readings, film in campaigns(layout, lambda count: random.normal(size=count))
     ]
-    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.03)
+    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.05)
 
 
 def test_a_display_in_whole_micrometres_makes_no_outliers():

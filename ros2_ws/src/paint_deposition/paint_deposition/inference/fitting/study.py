@@ -104,12 +104,8 @@ class Study:
         How much of it is true is fitted for each part: it is one of the nuisance directions. What
         it does not follow is noise of its own.
         """
-        facet_um = np.concatenate(
-            [
-                facet_errors_um(e.surface, e.measured_points, e.path, model)
-                for e in self.campaign.experiments
-            ]
-        )
+        parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
+        facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
         if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
             return self
         sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
@@ -117,8 +113,6 @@ class Study:
 
     def without(self, outliers: dict[int, Outlier]) -> 'Study':
         """The same without some points, by their row."""
-        if not outliers:
-            return self
         kept = ~np.isin(np.arange(len(self)), list(outliers))
         return replace(self.of_points(kept), outliers=tuple(outliers.values()))
 
@@ -147,18 +141,12 @@ class Study:
         return len(self.measured_um)
 
     def fit(
-        self,
-        parameters: FreeParameters,
-        starts: int = 1,
-        seed: int = 0,
-        nuisance: np.ndarray | None = None,
-        remainder: np.ndarray | None = None,
-    ) -> Fit:
+        self, parameters: FreeParameters, starts: int = 1, seed: int = 0,
+        nuisance: np.ndarray | None = None, remainder: np.ndarray | None = None,
+    ) -> Fit:  # fmt: skip
         """Fit these parameters to the points; see ``fit_readings``."""
-        return fit_readings(
-            self.forward, self.measured_um, self.sigma_um, parameters, starts, seed, nuisance,
-            remainder,
-        )  # fmt: skip
+        data = self.forward, self.measured_um, self.sigma_um
+        return fit_readings(*data, parameters, starts, seed, nuisance, remainder)
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].
@@ -181,16 +169,12 @@ class Study:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks on the readings for the user."""
-        assumed = (
+        notes = [] if self.noise.source != 'assumed' else [
             'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
-            'p-values that can be trusted.',
-        )
-        return (
-            *(assumed if self.noise.source == 'assumed' else ()),
-            *(() if self.texture.source == 'assumed' else (str(self.texture),)),
-            *self._facet_notes,
-            *self.left_out,
-        )
+            'p-values that can be trusted.'
+        ]  # fmt: skip
+        notes += [] if self.texture.source == 'assumed' else [str(self.texture)]
+        return (*notes, *self._facet_notes, *self.left_out)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -230,11 +214,11 @@ class Study:
         if self.facet_um is None:
             return {}
         owner, over_noise = self.campaign.experiment_of, self.facet_um / self.sigma_um
-        found = {
-            experiment.name: np.where(owner == number, over_noise, 0.0)
+        return {
+            experiment.name: direction
             for number, experiment in enumerate(self.campaign.experiments)
+            if (direction := np.where(owner == number, over_noise, 0.0)).any()
         }
-        return {name: direction for name, direction in found.items() if direction.any()}
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
