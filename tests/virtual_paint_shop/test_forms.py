@@ -95,22 +95,6 @@ def test_incidence_acts_on_surface_that_turns_away(name, amplitude):
     assert kept.min() > 0.0
 
 
-@pytest.mark.parametrize('name', forms('standoff_efficiency'))
-def test_standoff_costs_in_proportion_near_the_model_plane(name):
-    truth = hidden(name, 0.5)
-    near, far = (truth.on_landing(landed(FLAT, 0.0, 0.4, 1.0, d), scene()) for d in (0.0, 0.003))
-    assert near == pytest.approx(1.0)
-    assert far == pytest.approx(1.0 - 0.5 * 0.01, abs=1e-4)
-
-
-@pytest.mark.parametrize('name', forms('corner_slowdown'))
-def test_dwell_is_longest_at_the_reversal(name):
-    dwell = hidden(name, 0.6).dwell(np.linspace(0.0, 2.0, 200))
-    assert dwell[0] == pytest.approx(1.6)
-    assert dwell[-1] == pytest.approx(1.0, abs=1e-4)
-    assert np.all(np.diff(dwell) <= 1e-12)
-
-
 def test_a_delayed_valve_gives_what_it_owes():
     """As long late at the end as at the start: the same paint, moved along."""
     truth = hidden('trigger_lag~delay', 0.2, fall_ratio=1.0)
@@ -165,13 +149,3 @@ def test_every_fluid_runs_down_and_none_is_lost(name):
     left = after.sum() + (0.1 / 20.0**3 * 5.0**3) / (z[1] - z[0]) * (name == 'sag')
     assert left == pytest.approx(bump.sum(), rel=2e-4)
     assert (after * z).sum() < (bump * z).sum()
-
-
-@pytest.mark.parametrize('name', forms('gauge_curvature_bias'))
-def test_the_gauge_reads_high_on_ridges_low_in_valleys(name):
-    truth, film = hidden(name, 1.0), np.array([20.0])
-    at = np.zeros(1), np.array([0.45])
-    high, low, flat = (truth.on_gauge(film, *at, scene(p))[0] - 20 for p in (RIDGE, VALLEY, FLAT))
-    assert high > 0.7
-    assert low < -0.25
-    assert flat == pytest.approx(0.0, abs=1e-12)

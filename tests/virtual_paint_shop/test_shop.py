@@ -48,17 +48,6 @@ def test_jobs_are_believable(seed):
     assert 0.15 < away[over].min() < away[over].max() < 0.40
 
 
-def test_a_fixed_tool_axis_meets_the_surface_at_larger_angles():
-    angles = []
-    for follow in (0.0, 1.0):
-        _, (job,) = draw_jobs(8, [], ('door',), 0.05, 'outside', follow)
-        aim = job.motion.tcp_m + job.plan.standoff_m * job.motion.turn[:, :, 2]
-        on = job.part.edge_distance(aim[:, 0], aim[:, 2]) > 0
-        normal = job.part.normal(aim[on, 0], aim[on, 2])
-        angles.append(np.arccos(-np.sum(normal * job.motion.turn[on, :, 2], axis=1)).max())
-    assert angles[0] > 0.2 > 0.15 > angles[1]
-
-
 @pytest.mark.slow
 def test_panel_study_paints_one_bell_at_three_indexes():
     studies = [panel_study(1, index, parcels=200_000) for index in (0.577, 0.525, 0.625)]

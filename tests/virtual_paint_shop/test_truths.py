@@ -120,16 +120,6 @@ def test_the_field_sees_the_convex_line_and_the_hollow(truth_id, at_m, sign):
     assert gain.max() > 0.10
 
 
-def test_edges_build_up_on_all_four_sides():
-    clean, film = change('edge_build', COLUMN, 0.25, passes=4, index_m=0.3)
-    gain = relative(clean, film)
-    assert gain[0] > 0.1
-    assert gain[-1] > 0.1
-    assert 0.0 <= gain[30] < 0.001
-    clean, film = change('edge_build', ROW, 0.25)
-    assert relative(clean, film)[[0, -1]].min() > 0.1
-
-
 @pytest.mark.parametrize(('standoff', 'sign'), [(0.30, -1), (0.20, 1)])
 def test_distance_costs_paint_and_shaping_air_holds_the_plume_together(standoff, sign):
     clean, film = change('standoff_efficiency', COLUMN, 0.5, standoff_m=standoff)
@@ -154,11 +144,6 @@ def test_obstacles_only_take_paint(kind, x, z, passes, index_m):
     assert gain.max() <= 1e-9
     assert -1.0 < gain.min() < -0.1
     assert np.median(gain) > gain.min() / 2
-
-
-def test_wet_film_runs_down():
-    clean, film = change('sag', COLUMN, 0.3)
-    assert centre(film, COLUMN[1]) < centre(clean, COLUMN[1]) - 0.002
 
 
 @pytest.mark.parametrize('name', sorted(n for n in library() if n.startswith('footprint:')))

@@ -180,10 +180,3 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction():
     curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
     assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)
     assert square(0.0)[1] != pytest.approx(square(0.0)[0], rel=1e-3)
-
-
-def test_the_level_of_a_part_helps_to_predict_the_rest_of_it():
-    level, out = np.ones((POINTS, 1)), FOLDS == 3
-    raw = np.random.default_rng(1).normal(size=POINTS) + 5.0
-    assert abs(left_out(NullModel.of(10.0 * level, raw), [], out).mean()) < 1.0
-    assert left_out(NullModel.of(0.0 * level, raw), [], out) == pytest.approx(raw[out])

@@ -160,15 +160,6 @@ def test_a_signed_amplitude_beside_free_ones_is_integrated_over_its_side():
     assert log_factor(columns, data, [0, 1]) == pytest.approx(np.log(integral), abs=1e-5)
 
 
-@pytest.mark.parametrize('sides', [(0, 0, 0), (1, 0, -1)])
-def test_amplitudes_are_the_posterior_means_of_the_directions_as_they_were(columns, sides):
-    data = np.random.default_rng(9).normal(size=READINGS)
-    found = Principal.of(columns, np.array(sides, dtype=float)).amplitudes(data, SIZES)
-    for size, amounts in zip(SIZES, found, strict=True):
-        precision = columns.T @ columns + np.eye(3) / size**2
-        assert amounts == pytest.approx(np.linalg.solve(precision, columns.T @ data))
-
-
 def test_simulated_deviations_are_as_wide_as_the_noise_is_uncertain():
     squares = (simulated(1, 8.0, 4000, seed=3) ** 2).ravel()
     assert kstest(squares, f(1, 8).cdf).pvalue > 0.01

@@ -3,6 +3,8 @@
 Comparison, diagnosis and calibration all take their readings from here.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect
@@ -58,7 +60,7 @@ def clean_and_fit(
         misfit = _misfit(study, fit)
     texture = _texture(study, misfit)
     if texture != study.texture:
-        study = study.textured(texture)
+        study = replace(study, texture=texture)
         fit = _fitted(study, fit.model, 1, seed, known)
     faceted = study.with_facets(fit.model)
     if faceted is not study:
