@@ -42,6 +42,13 @@ def remainder(columns):
     return 2.0 * columns @ columns.T
 
 
+def log_density(data: np.ndarray, covariance: np.ndarray, freedom: float):
+    """Student's where the noise was estimated, else the normal one."""
+    if np.isinf(freedom):
+        return multivariate_normal.logpdf(data, cov=covariance)
+    return multivariate_t.logpdf(data, shape=covariance, df=freedom)
+
+
 def log_factor(columns, deviations, sides=None, sizes=None, freedom=np.inf) -> float:
     """The log Bayes factor of whitened directions (P, n) for whitened deviations (P,)."""
     known = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)
@@ -88,7 +95,7 @@ def test_log_evidence_is_the_log_density_up_to_a_constant(fit, columns, remainde
     data = np.random.default_rng(5).normal(size=(READINGS, 4))
     differences = []
     for null in nulls:
-        density = multivariate_t.logpdf(data.T, shape=null.lower @ null.lower.T, df=freedom)
+        density = log_density(data.T, null.lower @ null.lower.T, freedom)
         differences.append(density - null.log_evidence(null.whiten(data), freedom))
     assert np.ptp(differences) == pytest.approx(0.0, abs=1e-9)
 
@@ -120,8 +127,7 @@ def test_factor_is_the_ratio_of_densities(fit, columns, freedom):
     null, without = null_of(fit), covariance_of(fit)
     sizes = np.array([0.5, 1.0, 2.0])
     with_it = without + (columns * sizes**2) @ columns.T
-    of_one, of_other = (multivariate_t.logpdf(deviation(fit), shape=covariance, df=freedom)
-                        for covariance in (with_it, without))  # fmt: skip
+    of_one, of_other = (log_density(deviation(fit), c, freedom) for c in (with_it, without))
     found = log_factor(null.whiten(columns), null.deviation, sizes=sizes, freedom=freedom)
     assert found == pytest.approx(of_one - of_other)
 
