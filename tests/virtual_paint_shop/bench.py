@@ -18,13 +18,9 @@ class Bench:
     """Paints one job with any truths, always with the same parcels."""
 
     def __init__(
-        self,
-        seed: int,
-        job: Job,
-        pattern: Pattern,
-        parcels: int,
+        self, seed: int, job: Job, pattern: Pattern, parcels: int,
         brushes: Mapping[int, Pattern] | None = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """Where the plan names brushes, each paints its own passes with its pattern."""
         self.scene = Scene(job.part, pattern, job.motion)
         self.parcels_total = parcels
@@ -73,17 +69,9 @@ class Bench:
         air = still_air(spraying, plume)
         for truth in flying:
             air = truth.on_air(air, spraying, plume)
-        pattern = self.scene.pattern
-        landings = fly(
-            self.scene.part,
-            spraying,
-            plume,
-            air,
-            self.scene.part.point(x, z),
-            pattern.model_plane_m,
-            pattern.emission_offset_m,
-            self.parcels_total,
-        )
+        part, pattern = self.scene.part, self.scene.pattern
+        landings = fly(part, spraying, plume, air, part.point(x, z), pattern.model_plane_m,
+                       pattern.emission_offset_m, self.parcels_total)  # fmt: skip
         if not flying:
             self._clean_landings[key] = landings
         return landings

@@ -15,17 +15,11 @@ from .parcels import Pattern
 def planar_flux(p: Pattern, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """Eq. (1), um/s."""
     rho, s1, s2 = np.hypot(x, y), p.sigma1_m, p.sigma2_m
-    gamma = (
-        2
-        * np.pi
-        * (
-            2 * s1**2 * np.exp(-(p.r_m**2) / (2 * s1**2))
-            + p.r_m * s1 * np.sqrt(2 * np.pi) * erf(p.r_m / (np.sqrt(2) * s1))
-        )
-    )
-    g1 = (
-        np.exp(-((rho - p.r_m) ** 2) / (2 * s1**2)) + np.exp(-((rho + p.r_m) ** 2) / (2 * s1**2))
-    ) / gamma
+    inner = 2 * s1**2 * np.exp(-(p.r_m**2) / (2 * s1**2))
+    outer = p.r_m * s1 * np.sqrt(2 * np.pi) * erf(p.r_m / (np.sqrt(2) * s1))
+    gamma = 2 * np.pi * (inner + outer)
+    ring = sum(np.exp(-((rho + side * p.r_m) ** 2) / (2 * s1**2)) for side in (-1, 1))
+    g1 = ring / gamma
     g2 = np.exp(-(rho**2) / (2 * s2**2)) / (2 * np.pi * s2**2)
     f = 1 + p.K3 * np.sin(np.arctan2(y, x) - p.phi_rad)
     return p.K1_cm3_per_s * ((1 - p.K2) * f * g1 + p.K2 * g2)
@@ -48,11 +42,7 @@ def film_um(
             q = p.model_plane_m * e[:, :2] / e[:, 2:]
             facing = -(ray @ normal) / length
             seen = (facing > 0) & (e[:, 2] > 0)
-            flux = (
-                p.model_plane_m**2
-                * facing
-                / (length**2 * e[:, 2] ** 3)
-                * planar_flux(p, q[:, 0], q[:, 1])
-            )
+            flux = p.model_plane_m**2 * facing / (length**2 * e[:, 2] ** 3)
+            flux = flux * planar_flux(p, q[:, 0], q[:, 1])
             film[i] += np.sum(flux[seen]) * step
     return film

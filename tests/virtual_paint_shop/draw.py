@@ -23,8 +23,8 @@ def draw_jobs(
     seed: int,
     truths: list[Truth],
     experiments: tuple[str, ...],
-    emission_offset_m: float,
-    gun: str | None,
+    emission_offset_m: float = 0.05,
+    gun: str | None = None,
     follow: float | None = None,
 ) -> tuple[Pattern, list[Job]]:
     rng = stream(seed, 2)
@@ -35,11 +35,8 @@ def draw_jobs(
     usual_gun = rng.choice(['outside', 'near_edge'], p=[0.6, 0.4])
     gun = str(gun or usual_gun)
     vertical = 'door_vertical' not in experiments and rng.random() < 0.25
-    across = (
-        max(door.height_m, door.width_m)
-        if 'door_vertical' in experiments or vertical
-        else (door.height_m)
-    )
+    both_ways = 'door_vertical' in experiments or vertical
+    across = max(door.height_m, door.width_m) if both_ways else door.height_m
     index, half_width = _matched_index(rng, across)
     flow, film = solids_cm3_per_s(rng), rng.uniform(13.0, 28.0)
     pattern = draw_pattern(rng, half_width, flow, emission_offset_m)
@@ -49,9 +46,8 @@ def draw_jobs(
         if name == 'panel':
             part, direction = flat_panel(0.6, 2 * index + 0.7 * half_width), 'horizontal'
             plan = draw_plan(own, part, index, half_width, direction, 'outside')
-            plan = replace(
-                plan, passes=3, overrun_m=half_width, gun_margin_m=0.9 * half_width, follow=0.0
-            )
+            margin = 0.9 * half_width
+            plan = replace(plan, passes=3, overrun_m=half_width, gun_margin_m=margin, follow=0.0)
         else:
             part = door
             direction = 'vertical' if name == 'door_vertical' or vertical else 'horizontal'

@@ -39,26 +39,16 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
         trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
             folder / mesh
         )
-        write_bag(
-            experiment.log, folder / experiment.name, experiment.plan.flow, experiment.plan.brushes
-        )
-        write_readings(experiment.readings, folder / f'{experiment.name}.csv', sigma_column)
-        write_readings(
-            experiment.heldout, folder / 'truth' / f'heldout_{experiment.name}.csv', sigma_column
-        )
-        for name, table in (('readings', experiment.readings), ('heldout', experiment.heldout)):
-            _write_films(table, folder / 'truth' / f'films_{name}_{experiment.name}.csv')
-        entries.append(
-            {
-                'name': experiment.name,
-                'mesh': mesh,
-                'trajectory': experiment.name,
-                'pose_topic': POSE_TOPIC,
-                'state_topic': STATE_TOPIC,
-                'measurements': f'{experiment.name}.csv',
-                **_otherwise(experiment.plan),
-            }
-        )
+        name, plan, truth = experiment.name, experiment.plan, folder / 'truth'
+        write_bag(experiment.log, folder / name, plan.flow, plan.brushes)
+        write_readings(experiment.readings, folder / f'{name}.csv', sigma_column)
+        write_readings(experiment.heldout, truth / f'heldout_{name}.csv', sigma_column)
+        _write_films(experiment.readings, truth / f'films_readings_{name}.csv')
+        _write_films(experiment.heldout, truth / f'films_heldout_{name}.csv')
+        entries.append({
+            'name': name, 'mesh': mesh, 'trajectory': name, 'pose_topic': POSE_TOPIC,
+            'state_topic': STATE_TOPIC, 'measurements': f'{name}.csv', **_otherwise(plan),
+        })  # fmt: skip
     (folder / 'truth' / 'truth.json').write_text(json.dumps(campaign.truth, indent=1) + '\n')
     path = folder / 'campaign.yaml'
     path.write_text(yaml.safe_dump({'experiments': entries}, sort_keys=False))
@@ -82,21 +72,16 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...
     header_type = types.types['std_msgs/msg/Header']
     pose_type = types.types['geometry_msgs/msg/PoseStamped']
     bool_type = types.types['std_msgs/msg/Bool']
-    inner, point, quaternion = (
-        types.types[f'geometry_msgs/msg/{name}'] for name in ('Pose', 'Point', 'Quaternion')
-    )
+    of_pose = ('Pose', 'Point', 'Quaternion')
+    inner, point, quaternion = (types.types[f'geometry_msgs/msg/{name}'] for name in of_pose)
     queue = []
     with Writer(folder, version=9, storage_plugin=StoragePlugin.MCAP) as bag:
         poses = bag.add_connection(POSE_TOPIC, pose_type.__msgtype__, typestore=types)
         plain = flow == 1.0 and not brushes
         state_type = bool_type.__msgtype__ if plain else STATE_TYPE
         states = bag.add_connection(STATE_TOPIC, state_type, typestore=types)
-        for stamp, p, q in zip(
-            log.stamps_ns.tolist(),
-            log.positions_m.tolist(),
-            log.quaternions_xyzw.tolist(),
-            strict=True,
-        ):
+        columns = (log.stamps_ns, log.positions_m, log.quaternions_xyzw)
+        for stamp, p, q in zip(*(column.tolist() for column in columns), strict=True):
             header = header_type(time_type(stamp // 10**9, stamp % 10**9), 'part')
             message = pose_type(header, inner(point(*p), quaternion(*q)))
             queue.append((stamp, poses, types.serialize_cdr(message, pose_type.__msgtype__)))
@@ -108,9 +93,8 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...
                 header = header_type(time_type(stamp // 10**9, stamp % 10**9), '')
                 brush = brushes[number % len(brushes)] if brushes and on else 0
                 number += on
-                message = types.types[STATE_TYPE](
-                    header, on, flow=flow * on, brush=brush, **NOT_KNOWN
-                )
+                state = types.types[STATE_TYPE]
+                message = state(header, on, flow=flow * on, brush=brush, **NOT_KNOWN)
             queue.append((stamp, states, types.serialize_cdr(message, state_type)))
         for stamp, connection, data in sorted(queue, key=lambda entry: entry[0]):
             bag.write(connection, stamp, data)

@@ -57,6 +57,14 @@ class Spots:
     group: np.ndarray  # (s,) str, '' if none
     repeats: np.ndarray  # (s,) how many readings
 
+    @staticmethod
+    def at(x_m: np.ndarray, z_m: np.ndarray) -> Spots:
+        """Points without a group, each read once."""
+        return Spots(x_m, z_m, np.full(x_m.size, ''), np.ones(x_m.size, int))
+
+    def select(self, rows: np.ndarray) -> Spots:
+        return Spots(*(column[rows] for column in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class Readings:
@@ -76,15 +84,14 @@ class Readings:
     def __len__(self) -> int:
         return self.thickness_um.size
 
+    def select(self, rows: np.ndarray | slice) -> Readings:
+        return Readings(*(column[rows] for column in vars(self).values()))
+
 
 def layout(
-    part: Part,
-    style: str,
-    readings: int,
-    repeats: int,
-    rng: np.random.Generator,
+    part: Part, style: str, readings: int, repeats: int, rng: np.random.Generator,
     keep_off_m: float = 0.015,
-) -> Spots:
+) -> Spots:  # fmt: skip
     """`readings` in all, of which `repeats` are second and third visits to some of the points."""
     points = max(readings - repeats, 3)
     if style == 'random':
@@ -100,12 +107,9 @@ def layout(
 
 
 def measure(
-    spot: np.ndarray,
-    film_um: np.ndarray,
-    expected_um: np.ndarray,
-    noise: GaugeNoise,
+    spot: np.ndarray, film_um: np.ndarray, expected_um: np.ndarray, noise: GaugeNoise,
     rng: np.random.Generator,
-) -> Session:
+) -> Session:  # fmt: skip
     """Read a part anew: another part of its kind, in another session.
 
     All arrays (n,). `spot` names the place of each reading; repeats share it and its texture.
@@ -168,11 +172,9 @@ def keep_clear(part: Part, spots: Spots) -> Spots:
     on_surface = body[np.abs(body[:, 1] - part.height(body[:, 0], body[:, 2])) < 0.02]
     if not on_surface.size:
         return spots
-    foot = np.hypot(
-        spots.x_m[:, None] - on_surface[None, :, 0], spots.z_m[:, None] - on_surface[None, :, 2]
-    )
-    free = foot.min(axis=1) > 0.018
-    return Spots(spots.x_m[free], spots.z_m[free], spots.group[free], spots.repeats[free])
+    x, _, z = on_surface.T
+    foot = np.hypot(spots.x_m[:, None] - x, spots.z_m[:, None] - z)
+    return spots.select(foot.min(axis=1) > 0.018)
 
 
 def _lines(
@@ -186,14 +188,9 @@ def _lines(
     each = np.bincount(number, minlength=lines)[number]
     share = place / np.maximum(each - 1, 1)
     room = keep_off_m + 0.001
-    if style == 'columns':
-        z = room + share * (part.height_m - 2 * room)
-        x = part.left(z) + room + across * (0.5 * part.width_m - part.left(z) - 2 * room)
-        name = 'column'
-    else:
-        z = room + across * (part.height_m - 2 * room)
-        x = part.left(z) + room + share * (0.5 * part.width_m - part.left(z) - 2 * room)
-        name = 'row'
+    name, aside, up = ('column', across, share) if style == 'columns' else ('row', share, across)
+    z = room + up * (part.height_m - 2 * room)
+    x = part.left(z) + room + aside * (0.5 * part.width_m - part.left(z) - 2 * room)
     wobble = rng.normal(0.0, 0.003, (2, points))
     free = part.edge_distance(x + wobble[0], z + wobble[1]) > 0.013
     x, z = np.where(free, x + wobble[0], x), np.where(free, z + wobble[1], z)

@@ -12,7 +12,7 @@ import yaml
 
 from .draw import stream
 from .files import STATE_TOPIC, write_bag, write_readings
-from .gauge import GaugeNoise, Readings, measure
+from .gauge import GaugeNoise, measure
 from .shop import PARCELS, Campaign, generate
 
 FIRST = datetime(2026, 11, 2, 6, 0, tzinfo=timezone.utc)
@@ -69,16 +69,9 @@ def taken_on(row: int, points: int, points_a_part: int | None) -> np.ndarray:
 
 
 def write_line(
-    job: Campaign,
-    folder: Path,
-    count: int,
-    hidden: Hidden,
-    *,
-    seed: int = 0,
-    noise: GaugeNoise = LINE_NOISE,
-    minutes: float = 90.0,
-    points_a_part: int | None = None,
-) -> list[str]:
+    job: Campaign, folder: Path, count: int, hidden: Hidden, *, seed: int = 0,
+    noise: GaugeNoise = LINE_NOISE, minutes: float = 90.0, points_a_part: int | None = None,
+) -> list[str]:  # fmt: skip
     """Write ``count`` runs with their readings, line.yaml and a model; returns the runs' names.
 
     The model is the true bell as a calibration finds it: a little off. With ``points_a_part`` the
@@ -115,6 +108,5 @@ def write_line(
         shown = measure(readings.point, film, film, noise, stream(1000 * seed + row, 80))
         table = replace(readings, thickness_um=shown.thickness_um)
         taken = taken_on(row, len(readings), points_a_part)
-        table = Readings(*(column[taken] for column in vars(table).values()))
-        write_readings(table, folder / f'{names[-1]}.csv', False)
+        write_readings(table.select(taken), folder / f'{names[-1]}.csv', False)
     return names

@@ -31,12 +31,8 @@ class Pattern:
 
     def scaled(self, factor: float) -> Pattern:
         """The same shape, `factor` times as wide."""
-        return replace(
-            self,
-            r_m=self.r_m * factor,
-            sigma1_m=self.sigma1_m * factor,
-            sigma2_m=self.sigma2_m * factor,
-        )
+        lengths = ('r_m', 'sigma1_m', 'sigma2_m')
+        return replace(self, **{name: getattr(self, name) * factor for name in lengths})
 
     def as_dict(self) -> dict:
         return asdict(self)
@@ -72,9 +68,8 @@ def conner_plume(pattern: Pattern, count: int, seed: int) -> Parcels:
     square = lattice(count, seed)
     disc, turn = _disc(square[:, 0], square[:, 1])
     rho, ring, centred = _radial_densities(pattern)
-    mass = np.concatenate(
-        [[0.0], np.cumsum(0.5 * np.diff(rho) * ((ring + centred)[1:] + (ring + centred)[:-1]))]
-    )
+    both = ring + centred
+    mass = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(rho) * (both[1:] + both[:-1]))])
     radius = np.interp(disc**2, mass / mass[-1], rho)
     lopsided = pattern.K3 * np.interp(radius, rho, ring / np.maximum(ring + centred, 1e-300))
     angle = _lopsided_angle(turn, lopsided) + pattern.phi_rad
@@ -86,16 +81,10 @@ def _radial_densities(pattern: Pattern) -> tuple[np.ndarray, np.ndarray, np.ndar
     """Radii, and mass per radius of the ring and of the centred Gaussian, each weighted."""
     sigma1, sigma2 = pattern.sigma1_m, pattern.sigma2_m
     rho = np.linspace(0.0, max(pattern.r_m + 6.5 * sigma1, 6.5 * sigma2), 6001)
-    ring = rho * (
-        np.exp(-0.5 * ((rho - pattern.r_m) / sigma1) ** 2)
-        + np.exp(-0.5 * ((rho + pattern.r_m) / sigma1) ** 2)
-    )
-    centred = rho * np.exp(-0.5 * (rho / sigma2) ** 2)
-    return (
-        rho,
-        (1.0 - pattern.K2) * ring / np.trapezoid(ring, rho),
-        pattern.K2 * centred / np.trapezoid(centred, rho),
-    )
+    inner, outer = (np.exp(-0.5 * ((rho + r) / sigma1) ** 2) for r in (-pattern.r_m, pattern.r_m))
+    ring, centred = rho * (inner + outer), rho * np.exp(-0.5 * (rho / sigma2) ** 2)
+    ring = (1.0 - pattern.K2) * ring / np.trapezoid(ring, rho)
+    return rho, ring, pattern.K2 * centred / np.trapezoid(centred, rho)
 
 
 def _disc(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -140,15 +129,8 @@ def draw_pattern(
     rng: np.random.Generator, half_width: float, flow_cm3_per_s: float, emission_offset_m: float
 ) -> Pattern:
     """A believable bell pattern with the given SB50 (metres)."""
-    raw = Pattern(
-        flow_cm3_per_s,
-        K2=rng.uniform(0.05, 0.35),
-        K3=rng.uniform(0.0, 0.3),
-        phi_rad=rng.uniform(-np.pi, np.pi),
-        r_m=rng.uniform(0.28, 0.40),
-        sigma1_m=rng.uniform(0.13, 0.20),
-        sigma2_m=rng.uniform(0.20, 0.30),
-        emission_offset_m=emission_offset_m,
-    )
+    ranges = ((0.05, 0.35), (0.0, 0.3), (-np.pi, np.pi), (0.28, 0.40), (0.13, 0.20), (0.20, 0.30))
+    shape = (rng.uniform(*limits) for limits in ranges)
+    raw = Pattern(flow_cm3_per_s, *shape, emission_offset_m=emission_offset_m)
     start = raw.scaled(half_width)
     return start.scaled(half_width / half_width_m(conner_plume(start, 1 << 15, seed=1)))

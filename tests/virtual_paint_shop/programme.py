@@ -9,10 +9,10 @@ from scipy.spatial.transform import Rotation
 
 from .bench import Bench
 from .draw import stream
-from .gauge import GaugeNoise, Readings, Spots, tabulate
-from .jobs import Job, Motion, Plan, record
+from .gauge import GaugeNoise
+from .jobs import Job, Motion, Plan
 from .parcels import Pattern
-from .shop import PARCELS, Experiment
+from .shop import PARCELS, Experiment, gauged
 from .truths import Truth
 
 # The gun stands below this share of its greatest speed: there a pass ends.
@@ -22,12 +22,9 @@ LEVEL, SESSION_UM = 0.02, 0.3
 
 
 def motion_of(
-    time_s: np.ndarray,
-    tcp_m: np.ndarray,
-    quaternions_xyzw: np.ndarray,
-    trigger_s: np.ndarray,
+    time_s: np.ndarray, tcp_m: np.ndarray, quaternions_xyzw: np.ndarray, trigger_s: np.ndarray,
     trigger_on: np.ndarray,
-) -> Motion:
+) -> Motion:  # fmt: skip
     """The motion of n poses (n,), (n, 3), (n, 4), and e trigger events (e,).
 
     Passes go from standstill to standstill with the gun open in between.
@@ -78,15 +75,9 @@ class Painted:
     """A part painted by a motion, with hidden effects."""
 
     def __init__(
-        self,
-        name: str,
-        part,
-        pattern: Pattern,
-        truths: list[Truth],
-        motion: Motion,
-        seed: int,
+        self, name: str, part, pattern: Pattern, truths: list[Truth], motion: Motion, seed: int,
         parcels: int = PARCELS,
-    ) -> None:
+    ) -> None:  # fmt: skip
         # Of the plan only how the gun flows is asked for: the motion is given.
         self.job = Job(name, part, Plan(), motion)
         self.truths, self.seed = truths, seed
@@ -103,15 +94,5 @@ class Painted:
         level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
         if noise is None:
             noise, level, offset, expected = GaugeNoise(0.0, 0.002), 1.0, 0.0, film
-        spots = Spots(x_m, z_m, np.full(x_m.size, ''), np.ones(x_m.size, int))
-        none = np.empty((x_m.size, 0))
-        table = tabulate(
-            self.job.part, spots, level * film, level * expected, level * film, none, noise,
-            offset, rng,
-        )  # fmt: skip
-        nothing = Readings(*(column[:0] for column in vars(table).values()))
-        log = record(self.job.motion, self.job.plan.sample_s, rng)
-        return Experiment(
-            self.job.name, self.job.part, self.job.plan, *self.job.part.mesh(), log, table,
-            nothing, {},
-        )  # fmt: skip
+        films = film, expected, film
+        return gauged(self.job, x_m, z_m, films, noise, level, offset, rng)

@@ -9,10 +9,10 @@ import numpy as np
 
 from .bench import Bench
 from .draw import stream, timed
-from .gauge import GaugeNoise, Readings, Spots, tabulate
-from .jobs import Job, Plan, hold, record
+from .gauge import GaugeNoise
+from .jobs import Job, Plan, hold
 from .parcels import Pattern
-from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment
+from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment, gauged
 from .truths import Scene, Truth
 
 # A part's own level of film, as a share, and its gauge session's own zero [um].
@@ -64,7 +64,6 @@ def respray(
         place = np.array([stand[f'{axis}_m'] for axis in 'xyz'])
         motion = hold(part, plan, place, stand['standoff_m'], stand['dwell_s'])
         truths = [_less_fog(t, experiment, stand['dwell_s']) for t in truths]
-    job = Job(f'{experiment.name}_next', part, plan, motion)
     arriving = plan.flow
     if 'voltage' in plan.switched_off:
         truths = [t for t in truths if t.id not in OF_VOLTAGE]
@@ -75,24 +74,12 @@ def respray(
         truths = [_upside_down(t) for t in truths]
     _, first = np.unique(experiment.readings.point, return_index=True)
     x, _, z = experiment.readings.positions_m[np.sort(first)].T
+    job = Job(f'{experiment.name}_next', part, plan, motion)
     sprayed = replace(pattern, K1_cm3_per_s=arriving * pattern.K1_cm3_per_s)
     bench = Bench(seed, job, sprayed, parcels)
-    clean, _ = bench.readings([], x, z)
-    film, expected = bench.readings(truths, x, z)
+    films = *bench.readings(truths, x, z), bench.readings([], x, z)[0]
     level, offset = 1.0 + LEVEL * rng.normal(), SESSION_UM * rng.normal()
-    spots = Spots(x, z, np.full(x.size, ''), np.ones(x.size, int))
-    marks = np.empty((x.size, 0))  # what each effect does by itself is not asked here
-    table = tabulate(
-        part, spots, level * film, level * expected, level * clean, marks, noise, offset, rng
-    )
-    return Experiment(
-        job.name, part, plan, *part.mesh(), record(motion, plan.sample_s, rng), table,
-        _none(table), {},
-    )  # fmt: skip
-
-
-def _none(table: Readings) -> Readings:
-    return Readings(*(column[:0] for column in vars(table).values()))
+    return gauged(job, x, z, films, noise, level, offset, rng)
 
 
 def _longer_open(plan: Plan, part) -> Plan:
@@ -108,42 +95,30 @@ def _turned(plan: Plan, part) -> Plan:
     return replace(plan, direction=direction, index_m=index, roll_rad=plan.roll_rad - 0.5 * np.pi)
 
 
-def _moved_off(distance_m: float):
-    return lambda plan, part: replace(plan, standoff_m=plan.standoff_m + distance_m)
+def _plus(name: str, more):
+    return lambda plan, part: replace(plan, **{name: getattr(plan, name) + more})
 
 
-def _flow(factor: float):
-    return lambda plan, part: replace(plan, flow=factor * plan.flow)
-
-
-def _speed(factor: float):
-    return lambda plan, part: replace(plan, speed_m_per_s=factor * plan.speed_m_per_s)
-
-
-def _rolled(angle_rad: float):
-    return lambda plan, part: replace(plan, roll_rad=plan.roll_rad + angle_rad)
-
-
-def _off(setting: str):
-    return lambda plan, part: replace(plan, switched_off=(*plan.switched_off, setting))
+def _times(name: str, factor: float):
+    return lambda plan, part: replace(plan, **{name: factor * getattr(plan, name)})
 
 
 PLANS = {
-    'roll_180': _rolled(np.pi),
-    'roll_90': _rolled(0.5 * np.pi),
+    'roll_180': _plus('roll_rad', np.pi),
+    'roll_90': _plus('roll_rad', 0.5 * np.pi),
     'reverse_order': lambda plan, part: replace(plan, from_below=not plan.from_below),
     'other_way': lambda plan, part: replace(plan, other_way=not plan.other_way),
-    'further': _moved_off(STANDOFF_STEP_M),
-    'closer': _moved_off(-STANDOFF_STEP_M),
-    'half_flow': _flow(0.5),
-    'double_flow': _flow(2.0),
-    'half_speed': _speed(0.5),
-    'double_speed': _speed(2.0),
+    'further': _plus('standoff_m', STANDOFF_STEP_M),
+    'closer': _plus('standoff_m', -STANDOFF_STEP_M),
+    'half_flow': _times('flow', 0.5),
+    'double_flow': _times('flow', 2.0),
+    'half_speed': _times('speed_m_per_s', 0.5),
+    'double_speed': _times('speed_m_per_s', 2.0),
     'longer_open': _longer_open,
     'turned': _turned,
     'upside_down': lambda plan, part: replace(plan, upside_down=not plan.upside_down),
-    'voltage_off': _off('voltage'),
-    'draught_off': _off('draught'),
+    'voltage_off': _plus('switched_off', ('voltage',)),
+    'draught_off': _plus('switched_off', ('draught',)),
     'standing': lambda plan, part: plan,  # see `stand`
 }
 

@@ -66,9 +66,7 @@ def generate(
     noise: GaugeNoise = USUAL_NOISE,
     amplitude: float | dict | None = None,
     scale: float = 1.0,
-    emission_offset_m: float = 0.05,
     gun: str | None = None,
-    follow: float | None = None,
     parcels: int = PARCELS,
     mesh_edge_m: float = 0.012,
     second_brush: float | None = None,
@@ -78,7 +76,6 @@ def generate(
     truth: None, an effect id, 'id~form', 'unknown:...', 'footprint:...' ('*' for any), 'a+b' or a
         list.
     style: 'columns', 'rows', 'random' or None for any. gun: 'outside', 'near_edge' or None.
-    follow: how much the tool axis follows the surface, 0 fixed to 1 normal; None for U(0.3, 0.9).
     amplitude: instead of typical x U(0.7, 2), in the effect's unit (dict: by id); scale multiplies
     a drawn one. second_brush: every other pass is painted with a brush 2, so many times as wide.
     Raises ValueError for a name that does not exist.
@@ -87,7 +84,7 @@ def generate(
     if strange:
         raise ValueError(f'no experiment {strange.pop()!r}; there are: {", ".join(EXPERIMENTS)}')
     truths = choose(truth, stream(seed, 1), amplitude, scale)
-    pattern, jobs = draw_jobs(seed, truths, experiments, emission_offset_m, gun, follow)
+    pattern, jobs = draw_jobs(seed, truths, experiments, gun=gun)
     brushes = {} if second_brush is None else {1: pattern, 2: brush_beside(pattern, second_brush)}
     jobs = [replace(job, plan=replace(job.plan, brushes=tuple(brushes))) for job in jobs]
     taking = Taking(readings, repeats, heldout, style, noise)
@@ -121,16 +118,9 @@ def panel_study(
     if pattern is None:
         pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
     truths = choose(truth, stream(seed, 1), amplitude)
-    plan = Plan(
-        index_m=index_m,
-        passes=3,
-        standoff_m=0.25,
-        follow=0.0,
-        overrun_m=0.55,
-        gun_margin_m=0.50,
-        teach_error_m=0.0,
-        speed_m_per_s=pattern.K1_cm3_per_s / (film_um * 0.577),
-    )
+    speed = pattern.K1_cm3_per_s / (film_um * 0.577)
+    plan = Plan(index_m=index_m, passes=3, standoff_m=0.25, follow=0.0, overrun_m=0.55,
+                gun_margin_m=0.50, teach_error_m=0.0, speed_m_per_s=speed)  # fmt: skip
     part = flat_panel(0.6, 2 * index_m + 0.5)
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
     taking = Taking(readings, repeats, heldout, 'columns', noise)
@@ -144,10 +134,8 @@ def _paint(
 ) -> Experiment:  # fmt: skip
     rng, noise = stream(seed, 40 + number), taking.noise
     style = taking.style or str(rng.choice(['columns', 'rows', 'random']))
-    spots = layout(job.part, style, taking.readings, taking.repeats, rng)
-    spots = keep_clear(job.part, spots)
-    x, z = scatter(job.part, taking.heldout, rng, 0.015)
-    others = keep_clear(job.part, Spots(x, z, np.full(x.size, ''), np.ones(x.size, int)))
+    spots = keep_clear(job.part, layout(job.part, style, taking.readings, taking.repeats, rng))
+    others = keep_clear(job.part, Spots.at(*scatter(job.part, taking.heldout, rng, 0.015)))
     at_x = np.concatenate([spots.x_m, others.x_m])
     at_z = np.concatenate([spots.z_m, others.z_m])
     bench = Bench(seed, job, pattern, parcels, brushes)
@@ -171,13 +159,22 @@ def _paint(
     )
 
 
+def gauged(
+    job: Job, x: np.ndarray, z: np.ndarray, films: tuple[np.ndarray, ...], noise: GaugeNoise,
+    level: float, offset: float, rng: np.random.Generator,
+) -> Experiment:  # fmt: skip
+    """A part with readings at points (n,): film, what a gauge says, and film without effects."""
+    none = np.empty((x.size, 0))  # what each effect does by itself is not asked here
+    levelled = (level * film for film in films)
+    table = tabulate(job.part, Spots.at(x, z), *levelled, none, noise, offset, rng)
+    log, nothing = record(job.motion, job.plan.sample_s, rng), table.select(slice(0))
+    return Experiment(job.name, job.part, job.plan, *job.part.mesh(), log, table, nothing, {})
+
+
 def _campaign(
-    seed: int,
-    pattern: Pattern,
-    painted: list[Experiment],
-    truths: list[Truth],
+    seed: int, pattern: Pattern, painted: list[Experiment], truths: list[Truth],
     brushes: dict[int, Pattern] | None = None,
-) -> Campaign:
+) -> Campaign:  # fmt: skip
     hidden = [
         {**t.as_dict(), 'visible_rms_um': {e.name: e.visible_um[t.id] for e in painted}}
         for t in truths

@@ -6,24 +6,21 @@ to where the other plume has them, so that the solids are kept; no physics is mi
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 
-from .flight import Air, Landings, Slices
-from .parcels import Parcels, Pattern
+from .flight import Landings
 from .truths import Scene, Truth, between, with_drift
 
 
 class MaskingTape(Truth):
     """A strip across the door, half shadowed by a lifted masking tape, takes less paint."""
 
-    id, family, typical, unit = 'unknown:masking_tape', 'unknown', 0.25, '1'
-    most = 0.95
+    id, family, typical, most, unit = 'unknown:masking_tape', 'unknown', 0.25, 0.95, '1'
     ranges = between(angle_rad=(0.0, np.pi), width_m=(0.06, 0.14), at=(-0.2, 0.2, 2))
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+    def on_landing(self, landings, scene):
         if scene.part.kind != 'door':
             return 1.0
         part, a = scene.part, self.drawn['angle_rad']
@@ -36,8 +33,7 @@ class MaskingTape(Truth):
 class ThermalStripe(Truth):
     """Hot and cold stripes of the surface ripple the film along x."""
 
-    id, family, typical, unit = 'unknown:thermal_stripe', 'unknown', 0.06, '1'
-    most = 0.4
+    id, family, typical, most, unit = 'unknown:thermal_stripe', 'unknown', 0.06, 0.4, '1'
     ranges = between(wavelength_m=(0.25, 0.50), phase_rad=(0, 2 * np.pi))
 
     def on_film(self, film_um, x, z, scene, film_at):
@@ -48,11 +44,10 @@ class ThermalStripe(Truth):
 class PoorGround(Truth):
     """A bolted-on patch is badly grounded and attracts less."""
 
-    id, family, typical, unit = 'unknown:poor_ground', 'unknown', 0.12, '1'
-    most = 0.9
+    id, family, typical, most, unit = 'unknown:poor_ground', 'unknown', 0.12, 0.9, '1'
     ranges = between(at=(0.2, 0.8, 2), radius_m=(0.12, 0.22))
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+    def on_landing(self, landings, scene):
         if scene.part.kind != 'door':
             return 1.0
         outside = _away_m(landings, scene, self.drawn['at']) - self.drawn['radius_m']
@@ -62,11 +57,10 @@ class PoorGround(Truth):
 class LocalBump(Truth):
     """A dripping bell leaves a soft spot of more paint."""
 
-    id, family, typical, unit = 'unknown:local_bump', 'unknown', 0.12, '1'
-    most = 1.0
+    id, family, typical, most, unit = 'unknown:local_bump', 'unknown', 0.12, 1.0, '1'
     ranges = between(at=(0.15, 0.85, 2), radius_m=(0.06, 0.16))
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+    def on_landing(self, landings, scene):
         away = _away_m(landings, scene, self.drawn['at']) / self.drawn['radius_m']
         return 1.0 + self.amplitude * np.exp(-0.5 * away**2)
 
@@ -80,71 +74,61 @@ def _away_m(landings: Landings, scene: Scene, at: np.ndarray) -> np.ndarray:
 class PumpPulsation(Truth):
     """A worn gear pump: the flow swings with a period of a few pattern radii of travel."""
 
-    id, family, typical, unit = 'unknown:pump_pulsation', 'unknown', 0.15, '1'
-    most = 0.8
+    id, family, typical, most, unit = 'unknown:pump_pulsation', 'unknown', 0.15, 0.8, '1'
     ranges = between(travel_m=(0.5, 0.9), phase_rad=(0, 2 * np.pi))
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
-        nominal = scene.nominal
-        speed = np.median(
-            np.linalg.norm(np.diff(nominal.tcp_m, axis=0), axis=1) / np.diff(nominal.time_s)
-        )
-        period = self.drawn['travel_m'] / speed
-        return lambda t: (
-            flow(t)
-            * (1.0 + self.amplitude * np.sin(2 * np.pi * t / period + self.drawn['phase_rad']))
-        )
+    def on_flow(self, flow, scene):
+        way_m = np.linalg.norm(np.diff(scene.nominal.tcp_m, axis=0), axis=1)
+        period = self.drawn['travel_m'] / np.median(way_m / np.diff(scene.nominal.time_s))
+        phase = self.drawn['phase_rad']
+        return lambda t: flow(t) * (1.0 + self.amplitude * np.sin(2 * np.pi * t / period + phase))
 
 
 class ChargeSwirl(Truth):
     """Charge builds up on the bell and swings the plume round slowly in the tool's frame."""
 
-    id, family, typical, unit = 'unknown:charge_swirl', 'unknown', 0.015, 'm'
-    most = 0.08
+    id, family, typical, most, unit = 'unknown:charge_swirl', 'unknown', 0.015, 0.08, 'm'
     ranges = between(period_s=(4.0, 9.0), phase_rad=(0, 2 * np.pi))
 
-    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+    def on_air(self, air, slices, parcels):
         angle = 2 * np.pi * slices.time_0_s / self.drawn['period_s'] + self.drawn['phase_rad']
-        swing = (
-            np.cos(angle)[:, None] * slices.turn_0[:, :, 0]
-            + np.sin(angle)[:, None] * slices.turn_0[:, :, 1]
-        )
+        x, y = slices.turn_0[:, :, 0], slices.turn_0[:, :, 1]
+        swing = np.cos(angle)[:, None] * x + np.sin(angle)[:, None] * y
         return with_drift(air, self.amplitude * swing)
+
+
+def _turned(x: np.ndarray, y: np.ndarray, angle_rad: float) -> tuple[np.ndarray, np.ndarray]:
+    """Coordinates along axes that are turned by an angle."""
+    cos, sin = np.cos(angle_rad), np.sin(angle_rad)
+    return x * cos + y * sin, -x * sin + y * cos
 
 
 class Elliptic(Truth):
     """Axes stretched by sqrt(1 + a) and 1 / sqrt(1 + a), at any angle."""
 
-    id, family, typical, unit = 'footprint:elliptic', 'footprint', 0.30, '1'
-    most = 1.5
+    id, family, typical, most, unit = 'footprint:elliptic', 'footprint', 0.30, 1.5, '1'
     ranges = between(angle_rad=(0.0, np.pi))
 
-    def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
+    def on_plume(self, parcels, pattern):
         a, stretch = self.drawn['angle_rad'], np.sqrt(1.0 + self.amplitude)
-        u = (parcels.x_m * np.cos(a) + parcels.y_m * np.sin(a)) * stretch
-        v = (-parcels.x_m * np.sin(a) + parcels.y_m * np.cos(a)) / stretch
-        return replace(
-            parcels, x_m=u * np.cos(a) - v * np.sin(a), y_m=u * np.sin(a) + v * np.cos(a)
-        )
+        u, v = _turned(parcels.x_m, parcels.y_m, a)
+        x, y = _turned(u * stretch, v / stretch, -a)
+        return replace(parcels, x_m=x, y_m=y)
 
 
 class TriangularRing(Truth):
     """Radii follow a triangle (0, peak, end) instead; a = 1 entirely, less: part of the way."""
 
-    id, family, typical, unit = 'footprint:triangular_ring', 'footprint', 0.6, '1'
-    most = 1.0
+    id, family, typical, most, unit = 'footprint:triangular_ring', 'footprint', 0.6, 1.0, '1'
 
-    def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
+    def on_plume(self, parcels, pattern):
         rho = np.hypot(parcels.x_m, parcels.y_m)
         rank = np.empty(rho.size)
         rank[np.argsort(rho)] = (np.arange(rho.size) + 0.5) / rho.size
-        peak = pattern.r_m
         end = pattern.r_m + 2.2 * pattern.sigma1_m
-        bend = peak / end
-        triangle = (
-            np.where(rank < bend, np.sqrt(rank * bend), 1.0 - np.sqrt((1.0 - rank) * (1.0 - bend)))
-            * end
-        )
+        bend = pattern.r_m / end
+        falling = 1.0 - np.sqrt((1.0 - rank) * (1.0 - bend))
+        triangle = np.where(rank < bend, np.sqrt(rank * bend), falling) * end
         share = min(self.amplitude, 1.0)
         scale = ((1.0 - share) * rho + share * triangle) / np.maximum(rho, 1e-9)
         return replace(parcels, x_m=parcels.x_m * scale, y_m=parcels.y_m * scale)
@@ -153,28 +137,24 @@ class TriangularRing(Truth):
 class Skewed(Truth):
     """A banana: parcels are pushed sideways by a x^2 / r."""
 
-    id, family, typical, unit = 'footprint:skewed', 'footprint', 0.25, '1'
-    most = 1.2
+    id, family, typical, most, unit = 'footprint:skewed', 'footprint', 0.25, 1.2, '1'
     ranges = between(angle_rad=(-np.pi, np.pi))
 
-    def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
+    def on_plume(self, parcels, pattern):
         a = self.drawn['angle_rad']
-        u = parcels.x_m * np.cos(a) + parcels.y_m * np.sin(a)
-        bend = u**2 / pattern.r_m
+        bend = _turned(parcels.x_m, parcels.y_m, a)[0] ** 2 / pattern.r_m
         push = self.amplitude * (bend - bend.mean())
-        return replace(
-            parcels, x_m=parcels.x_m - push * np.sin(a), y_m=parcels.y_m + push * np.cos(a)
-        )
+        x, y = parcels.x_m - push * np.sin(a), parcels.y_m + push * np.cos(a)
+        return replace(parcels, x_m=x, y_m=y)
 
 
 class TwoLobes(Truth):
     """The ring has two lobes: angular density about 1 + a cos 2(angle - lobe)."""
 
-    id, family, typical, unit = 'footprint:two_lobes', 'footprint', 0.30, '1'
-    most = 0.9
+    id, family, typical, most, unit = 'footprint:two_lobes', 'footprint', 0.30, 0.9, '1'
     ranges = between(lobe_rad=(0.0, np.pi))
 
-    def on_plume(self, parcels: Parcels, pattern: Pattern) -> Parcels:
+    def on_plume(self, parcels, pattern):
         rho, angle = np.hypot(parcels.x_m, parcels.y_m), np.arctan2(parcels.y_m, parcels.x_m)
         moved = angle - 0.5 * self.amplitude * np.sin(2.0 * (angle - self.drawn['lobe_rad']))
         return replace(parcels, x_m=rho * np.cos(moved), y_m=rho * np.sin(moved))

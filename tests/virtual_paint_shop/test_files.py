@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 import trimesh
 import yaml
-from click.testing import CliRunner
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
-from .__main__ import main
 from .files import write
 from .gauge import layout
 from .shop import generate
@@ -32,7 +29,7 @@ def folder(campaign, tmp_path_factory):
     return write(campaign, tmp_path_factory.mktemp('shop') / 'out').parent
 
 
-def test_campaign_file_names_what_exists_and_hides_the_truth(folder):
+def test_campaign_file_names_what_exists_and_hides_the_truth(campaign, folder):
     text = (folder / 'campaign.yaml').read_text()
     assert 'truth' not in text
     assert 'edge' not in text
@@ -40,6 +37,8 @@ def test_campaign_file_names_what_exists_and_hides_the_truth(folder):
         for key in ('mesh', 'trajectory', 'measurements'):
             assert (folder / entry[key]).exists()
     assert json.loads((folder / 'truth' / 'truth.json').read_text())['id'] == 'edge_build'
+    with pytest.raises(FileExistsError, match='not empty'):
+        write(campaign, folder)
 
 
 def test_bag_holds_the_log(campaign, folder):
@@ -76,11 +75,6 @@ def test_readings_and_mesh_read_back(campaign, folder):
     assert np.min(np.sum(mesh.face_normals[face] * table.normals, axis=1)) > 0.97
 
 
-def test_existing_files_are_not_overwritten(campaign, folder):
-    with pytest.raises(FileExistsError, match='not empty'):
-        write(campaign, folder)
-
-
 @pytest.mark.parametrize('style', ['columns', 'rows', 'random'])
 def test_layouts_stay_on_the_part_and_repeat(campaign, style):
     part = campaign.experiments[1].part
@@ -89,20 +83,3 @@ def test_layouts_stay_on_the_part_and_repeat(campaign, style):
     assert spots.repeats.sum() == 120
     assert spots.repeats.max() == 3
     assert part.edge_distance(spots.x_m, spots.z_m).min() > 0.0125
-
-
-def test_command_writes_a_campaign(tmp_path):
-    command = [
-        '--seed',
-        '7',
-        '--truth',
-        'gauge_zero',
-        '--readings',
-        '30',
-        '--parcels',
-        '200000',
-        '--out',
-    ]
-    done = CliRunner().invoke(main, [*command, str(tmp_path)])
-    assert done.exit_code == 0, done.output
-    assert Path(done.stdout.strip()) == tmp_path / 'campaign.yaml'

@@ -67,13 +67,6 @@ def test_edges_gain_their_amplitude_and_the_middle_nothing(name):
     assert gain[-1] == pytest.approx(1.0, abs=0.002)
 
 
-def test_a_fat_edge_takes_its_paint_from_the_band_beside_it():
-    truth = KNOWN['edge_build~flow']
-    d = np.linspace(0.0, 60.0, 200_001)
-    assert np.trapezoid(truth.gain(d), d) == pytest.approx(0.0, abs=1e-6)
-    assert truth.gain(d).min() < -0.05
-
-
 @pytest.mark.parametrize('name', [n for n in forms('faraday_shielding') if '~' in n])
 def test_recesses_lose_by_their_measure_and_ridges_nothing(name):
     """The measure is 1 in a valley of 250 mm radius, so that little amplitudes mean the same."""
@@ -100,22 +93,6 @@ def test_incidence_acts_on_surface_that_turns_away(name, amplitude):
     assert kept[0] == pytest.approx(1.0)
     assert np.all(np.sign(amplitude) * np.diff(kept) > 0.0)
     assert kept.min() > 0.0
-
-
-@pytest.mark.parametrize('name', forms('standoff_efficiency'))
-def test_standoff_costs_in_proportion_near_the_model_plane(name):
-    truth = hidden(name, 0.5)
-    near, far = (truth.on_landing(landed(FLAT, 0.0, 0.4, 1.0, d), scene()) for d in (0.0, 0.003))
-    assert near == pytest.approx(1.0)
-    assert far == pytest.approx(1.0 - 0.5 * 0.01, abs=1e-4)
-
-
-@pytest.mark.parametrize('name', forms('corner_slowdown'))
-def test_dwell_is_longest_at_the_reversal(name):
-    dwell = hidden(name, 0.6).dwell(np.linspace(0.0, 2.0, 200))
-    assert dwell[0] == pytest.approx(1.6)
-    assert dwell[-1] == pytest.approx(1.0, abs=1e-4)
-    assert np.all(np.diff(dwell) <= 1e-12)
 
 
 def test_a_delayed_valve_gives_what_it_owes():
@@ -172,24 +149,3 @@ def test_every_fluid_runs_down_and_none_is_lost(name):
     left = after.sum() + (0.1 / 20.0**3 * 5.0**3) / (z[1] - z[0]) * (name == 'sag')
     assert left == pytest.approx(bump.sum(), rel=2e-4)
     assert (after * z).sum() < (bump * z).sum()
-
-
-@pytest.mark.parametrize('name', [*forms('fog_gradient'), *forms('overspray_fog')])
-def test_fog_only_adds(name):
-    x, z = np.linspace(-0.6, 0.6, 40), np.linspace(0.0, 0.9, 40)
-    film = np.full(40, 10.0)
-    added = hidden(name, 1.5).on_film(film, x, z, scene(), None) - film
-    assert added.min() >= 0.0
-    assert 0.9 < added.max() <= 1.5 + 1e-9
-    if name.startswith('fog_gradient'):
-        assert np.all(np.diff(added) <= 1e-12)
-
-
-@pytest.mark.parametrize('name', forms('gauge_curvature_bias'))
-def test_the_gauge_reads_high_on_ridges_low_in_valleys(name):
-    truth, film = hidden(name, 1.0), np.array([20.0])
-    at = np.zeros(1), np.array([0.45])
-    high, low, flat = (truth.on_gauge(film, *at, scene(p))[0] - 20 for p in (RIDGE, VALLEY, FLAT))
-    assert high > 0.7
-    assert low < -0.25
-    assert flat == pytest.approx(0.0, abs=1e-12)

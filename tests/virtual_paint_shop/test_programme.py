@@ -8,46 +8,25 @@ from scipy.spatial.transform import Rotation
 
 from .bench import Bench
 from .draw import draw_jobs
-from .gauge import GaugeNoise, scatter
+from .gauge import scatter
 from .programme import Painted, motion_of
-from .truths import library
 
 pytestmark = pytest.mark.slow
 
 PARCELS = 300_000
 
 
-@pytest.fixture(scope='module')
-def shop():
-    pattern, (job,) = draw_jobs(5, [], ('door',), 0.05, 'outside')
-    return pattern, job, scatter(job.part, 40, np.random.default_rng(1), 0.02)
-
-
-def given(job):
+def test_the_same_motion_lays_the_same_film():
     """The shop's own motion as one would get it from a bag."""
-    motion = job.motion
-    return motion_of(
+    pattern, (job,) = draw_jobs(5, [], ('door',), 0.05, 'outside')
+    spots, motion = scatter(job.part, 40, np.random.default_rng(1), 0.02), job.motion
+    given = motion_of(
         motion.time_s, motion.tcp_m, Rotation.from_matrix(motion.turn).as_quat(),
         motion.trigger_s, motion.trigger_on,
     )  # fmt: skip
-
-
-def test_the_same_motion_lays_the_same_film(shop):
-    pattern, job, spots = shop
     expected = Bench(9, job, pattern, PARCELS).readings([], *spots)[0]
-    painted = Painted('door', job.part, pattern, [], given(job), 9, PARCELS)
+    painted = Painted('door', job.part, pattern, [], given, 9, PARCELS)
     np.testing.assert_allclose(painted.film_um(*spots), expected, rtol=1e-9)
-
-
-def test_readings_without_noise_are_the_film_and_not_what_the_gauge_says(shop):
-    pattern, job, spots = shop
-    truths = [library()['gauge_zero'](3.0, {})]
-    painted = Painted('door', job.part, pattern, truths, given(job), 9, PARCELS)
-    film = painted.film_um(*spots)
-    exact = painted.measured(*spots, None).readings.thickness_um
-    np.testing.assert_allclose(exact, film, atol=0.02 + 0.01 * film.max())
-    noisy = painted.measured(*spots, GaugeNoise(0.1, 0.0)).readings.thickness_um
-    assert abs(np.mean(noisy - film)) > 1.0
 
 
 def test_passes_go_from_standstill_to_standstill():

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from pathlib import Path
 
@@ -30,7 +29,7 @@ def test_same_seed_same_campaign_whatever_is_hidden():
     assert not np.array_equal(other.vertices_m, a.vertices_m)
 
 
-@pytest.mark.parametrize('seed', range(8))
+@pytest.mark.parametrize('seed', range(4))
 def test_jobs_are_believable(seed):
     pattern, (job,) = draw_jobs(seed, [], ('door',), 0.05, None)
     plan, motion = job.plan, job.motion
@@ -49,35 +48,9 @@ def test_jobs_are_believable(seed):
     assert 0.15 < away[over].min() < away[over].max() < 0.40
 
 
-def test_a_fixed_tool_axis_meets_the_surface_at_larger_angles():
-    angles = []
-    for follow in (0.0, 1.0):
-        _, (job,) = draw_jobs(8, [], ('door',), 0.05, 'outside', follow)
-        aim = job.motion.tcp_m + job.plan.standoff_m * job.motion.turn[:, :, 2]
-        on = job.part.edge_distance(aim[:, 0], aim[:, 2]) > 0
-        normal = job.part.normal(aim[on, 0], aim[on, 2])
-        angles.append(np.arccos(-np.sum(normal * job.motion.turn[on, :, 2], axis=1)).max())
-    assert angles[0] > 0.2 > 0.15 > angles[1]
-
-
-@pytest.mark.slow
-def test_two_effects_and_two_parts():
-    campaign = generate(
-        3,
-        'air_drift+edge_build',
-        experiments=('panel', 'door', 'door_vertical'),
-        parcels=300_000,
-        amplitude={'air_drift': 0.02, 'edge_build': 0.3},
-    )
-    assert [e.name for e in campaign.experiments] == ['panel', 'door', 'door_vertical']
-    assert [h['id'] for h in campaign.truth['hidden']] == ['air_drift', 'edge_build']
-    assert campaign.truth['experiments']['door_vertical']['direction'] == 'vertical'
-    assert json.dumps(campaign.truth)
-
-
 @pytest.mark.slow
 def test_panel_study_paints_one_bell_at_three_indexes():
-    studies = [panel_study(1, index, parcels=1_000_000) for index in (0.577, 0.525, 0.625)]
+    studies = [panel_study(1, index, parcels=200_000) for index in (0.577, 0.525, 0.625)]
     assert len({s.pattern for s in studies}) == 1
     films = [s.experiments[0].readings.film_um.mean() for s in studies]
     assert films[1] > films[0] > films[2]

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from inspect import getattr_static
 
 import numpy as np
 
@@ -51,7 +52,6 @@ class Truth:
     unit = ''
     sign = 'positive'  # 'positive', 'negative' or 'either'
     ranges = between()  # of further parameters: low, high and, of several, how many
-    of_covariates: tuple[str, ...] = ()  # members that are functions of covariates alone
 
     @classmethod
     def draw(
@@ -133,15 +133,11 @@ def changes_flight(truth: Truth) -> bool:
 
 def variant(base: type[Truth], form: str, why: str, **members: object) -> type[Truth]:
     """Another form of an effect's law: `members` in the place of the base's, `why` in words."""
-    plain_members = {
-        name: staticmethod(one) if callable(one) and name in base.of_covariates else one
-        for name, one in members.items()
-    }
-    kind = type(
-        f'{base.__name__.strip("_")}_{form}',
-        (base,),
-        {'form': form, '__doc__': why} | plain_members,
-    )
+    for name, one in members.items():
+        if isinstance(getattr_static(base, name), staticmethod):
+            members[name] = staticmethod(one)
+    own = {'form': form, '__doc__': why} | members
+    kind = type(f'{base.__name__.strip("_")}_{form}', (base,), own)
     _VARIANTS.append(kind)
     return kind
 
@@ -185,12 +181,9 @@ def choose(
     return truths
 
 
-def with_drift(air: Air, drift_m: np.ndarray) -> Air:
-    return replace(air, drift_m=air.drift_m + drift_m)
-
-
-def with_narrowing(air: Air, narrowing: np.ndarray) -> Air:
-    return replace(air, narrowing=air.narrowing + narrowing)
+def with_drift(air: Air, drift_m: np.ndarray, growth: float | None = None) -> Air:
+    growth = air.growth if growth is None else growth
+    return replace(air, drift_m=air.drift_m + drift_m, growth=growth)
 
 
 def plain(value: object) -> object:

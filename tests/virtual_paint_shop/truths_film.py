@@ -16,8 +16,7 @@ class Sag(Truth):
     `amplitude` is the volume per width that crosses a horizontal line of 20 um film (um m).
     """
 
-    id, family, typical, unit = 'sag', 'lateral shift', 0.06, 'um m'
-    most = 0.5
+    id, family, typical, most, unit = 'sag', 'lateral shift', 0.06, 0.5, 'um m'
     power, yield_um = 3.0, 0.0
 
     def on_film(self, film_um, x, z, scene, film_at):
@@ -64,8 +63,7 @@ def run_down(
 class OversprayFog(Truth):
     """Fine overspray settles everywhere alike."""
 
-    id, family, typical, unit = 'overspray_fog', 'level', 1.0, 'um'
-    most = 6.0
+    id, family, typical, most, unit = 'overspray_fog', 'level', 1.0, 6.0, 'um'
 
     def on_film(self, film_um, x, z, scene, film_at):
         return film_um + self.amplitude
@@ -84,8 +82,7 @@ class FogThinsOut(OversprayFog):
 class FogGradient(Truth):
     """Overspray that settles more below: a (1 - height share)^1.5."""
 
-    id, family, typical, unit = 'fog_gradient', 'order', 1.5, 'um'
-    most = 10.0
+    id, family, typical, most, unit = 'fog_gradient', 'order', 1.5, 10.0, 'um'
 
     def on_film(self, film_um, x, z, scene, film_at):
         share = np.clip(z / scene.part.height_m, 0.0, 1.0)
@@ -113,8 +110,7 @@ class FogLayer(FogGradient):
 class GaugeGain(Truth):
     """The gauge reads (1 + a) times the film."""
 
-    id, family, typical, unit, sign = 'gauge_gain', 'level', 0.02, '1', 'either'
-    most = 0.15
+    id, family, typical, most, unit, sign = 'gauge_gain', 'level', 0.02, 0.15, '1', 'either'
 
     def on_gauge(self, film_um, x, z, scene):
         return (1.0 + self.amplitude) * film_um
@@ -123,8 +119,7 @@ class GaugeGain(Truth):
 class GaugeZero(Truth):
     """The gauge reads `amplitude` too much."""
 
-    id, family, typical, unit, sign = 'gauge_zero', 'level', 1.2, 'um', 'either'
-    most = 5.0
+    id, family, typical, most, unit, sign = 'gauge_zero', 'level', 1.2, 5.0, 'um', 'either'
 
     def on_gauge(self, film_um, x, z, scene):
         return film_um + self.amplitude
@@ -138,7 +133,6 @@ class GaugeCurvatureBias(Truth):
 
     id, family, typical, unit = 'gauge_curvature_bias', 'curvature', 1.2, 'um'
     most, probe_m = 6.0, 0.005
-    of_covariates = ('too_much',)
 
     def on_gauge(self, film_um, x, z, scene):
         low, high = scene.part.curvature_over(x, z, self.probe_m)

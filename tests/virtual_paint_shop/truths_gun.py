@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .flight import Air, Slices
-from .jobs import Motion, moved
-from .parcels import Parcels
+from .jobs import moved
 from .truths import DOWN, Scene, Truth, between, variant, with_drift
 
 
 class TcpOffset(Truth):
     """The true bell sits beside the logged TCP by a fixed vector in the tool frame."""
 
-    id, family, typical, unit = 'tcp_offset', 'lateral shift', 0.004, 'm'
-    most = 0.04
+    id, family, typical, most, unit = 'tcp_offset', 'lateral shift', 0.004, 0.04, 'm'
     ranges = between(direction_rad=(-np.pi, np.pi))
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         a = self.drawn['direction_rad']
         aside = motion.turn @ np.array([np.cos(a), np.sin(a), 0.0])
         return moved(motion, tcp_m=motion.tcp_m + self.amplitude * aside)
@@ -30,10 +26,9 @@ class TcpOffset(Truth):
 class TcpStandoff(Truth):
     """The true bell is `amplitude` nearer to the part (along +z of the tool) than logged."""
 
-    id, family, typical, unit, sign = 'tcp_standoff', 'standoff', 0.006, 'm', 'either'
-    most = 0.05
+    id, family, typical, most, unit, sign = 'tcp_standoff', 'standoff', 0.006, 0.05, 'm', 'either'
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         return moved(motion, tcp_m=motion.tcp_m + self.amplitude * motion.turn[:, :, 2])
 
 
@@ -44,7 +39,7 @@ class TcpTilt(Truth):
     most = np.deg2rad(12.0)
     ranges = between(axis_rad=(-np.pi, np.pi))
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         a = self.drawn['axis_rad']
         tilt = Rotation.from_rotvec(self.amplitude * np.array([np.cos(a), np.sin(a), 0.0]))
         return moved(motion, turn=motion.turn @ tilt.as_matrix())
@@ -53,8 +48,7 @@ class TcpTilt(Truth):
 class PartMisalignment(Truth):
     """The door hangs elsewhere than its drawing: displaced (amplitude) and turned a little."""
 
-    id, family, typical, unit = 'part_misalignment', 'lateral shift', 0.006, 'm'
-    most = 0.05
+    id, family, typical, most, unit = 'part_misalignment', 'lateral shift', 0.006, 0.05, 'm'
 
     @classmethod
     def details(cls, rng):
@@ -62,7 +56,7 @@ class PartMisalignment(Truth):
         turn = np.deg2rad(rng.uniform(0.2, 0.8)) * axis / np.linalg.norm(axis)
         return {'direction': direction / np.linalg.norm(direction), 'turn_rad': turn}
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         if scene.part.kind != 'door':
             return motion
         centre = np.array([0.0, 0.0, 0.5 * scene.part.height_m])
@@ -74,10 +68,9 @@ class PartMisalignment(Truth):
 class PoseLag(Truth):
     """A pose is logged `amplitude` seconds after the gun was there; triggers are on time."""
 
-    id, family, typical, unit = 'pose_lag', 'time', 0.015, 's'
-    most = 0.15
+    id, family, typical, most, unit = 'pose_lag', 'time', 0.015, 0.15, 's'
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         return replace(motion, time_s=motion.time_s - self.amplitude)
 
 
@@ -90,7 +83,6 @@ class CornerSlowdown(Truth):
 
     id, family, typical, unit = 'corner_slowdown', 'boundary', 0.3, '1'
     most, ranges = 2.5, between(reach_m=(0.22, 0.38))
-    of_covariates = ('longer',)
 
     def dwell(self, reversal_m: np.ndarray) -> np.ndarray:
         return self.longer(reversal_m / self.drawn['reach_m'], 1.0 + self.amplitude)
@@ -99,7 +91,7 @@ class CornerSlowdown(Truth):
     def longer(share: np.ndarray, peak: float) -> np.ndarray:
         return peak / np.sqrt(1.0 + np.minimum(share, 1.0) * (peak**2 - 1.0))
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         nominal = scene.nominal
         return lambda t: flow(t) * self.dwell(np.interp(t, nominal.time_s, nominal.reversal_m))
 
@@ -127,14 +119,13 @@ variant(CornerSlowdown, 'ramp',
 class TriggerLag(Truth):
     """The flow answers the trigger like a first-order lag: rise in `amplitude`, fall faster."""
 
-    id, family, typical, unit = 'trigger_lag', 'boundary', 0.08, 's'
-    most = 0.6
+    id, family, typical, most, unit = 'trigger_lag', 'boundary', 0.08, 0.6, 's'
     ranges = between(fall_ratio=(0.3, 0.8))
 
     def staging(self) -> dict:
         return {'gun': 'near_edge'}
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         nominal = scene.nominal
         level = flow(nominal.trigger_s[nominal.trigger_on] + 1e-6).mean()
         starts, opens = nominal.trigger_s, nominal.trigger_on
@@ -156,10 +147,9 @@ class TriggerLag(Truth):
 class FlowDrift(Truth):
     """The pump's flow drifts steadily with time, by `amplitude` of the mean per pass."""
 
-    id, family, typical, unit, sign = 'flow_drift', 'order', 0.02, '1/pass', 'either'
-    most = 0.12
+    id, family, typical, most, unit, sign = 'flow_drift', 'order', 0.02, 0.12, '1/pass', 'either'
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         first, last = scene.nominal.trigger_s[0], scene.nominal.trigger_s[-1]
         one_pass = (last - first) / (scene.nominal.pass_number.max() + 1)
         middle = 0.5 * (first + last)
@@ -172,11 +162,10 @@ class GunWake(Truth):
     id, family, typical, unit = 'gun_wake', 'time', 0.020, 's'
     most, growth = 0.15, None
 
-    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+    def on_air(self, air, slices, parcels):
         duration = (slices.time_1_s - slices.time_0_s)[:, None]
         velocity = (slices.tcp_1_m - slices.tcp_0_m) / duration
-        carried = with_drift(air, -self.amplitude * velocity)
-        return carried if self.growth is None else replace(carried, growth=self.growth)
+        return with_drift(air, -self.amplitude * velocity, self.growth)
 
 
 variant(GunWake, 'even', 'The plume is left behind at an even rate all along its way.', growth=1.0)
@@ -197,9 +186,9 @@ class AirDrift(Truth):
         side = np.array([rng.choice([-1.0, 1.0]), 0.0, 0.0])
         return {'direction': DOWN.copy() if rng.random() < 0.75 else side}
 
-    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
-        carried = with_drift(air, self.amplitude * np.asarray(self.drawn['direction']))
-        return carried if self.growth is None else replace(carried, growth=self.growth)
+    def on_air(self, air, slices, parcels):
+        drift_m = self.amplitude * np.asarray(self.drawn['direction'])
+        return with_drift(air, drift_m, self.growth)
 
 
 variant(AirDrift, 'square',
@@ -216,7 +205,7 @@ class TiltBentBracket(TcpTilt):
     form = 'bent_bracket'
     ranges = TcpTilt.ranges | between(pivot_m=(0.03, 0.12))
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         tilted = super().on_motion(motion, scene)
         aside = self.drawn['pivot_m'] * (tilted.turn[:, :, 2] - motion.turn[:, :, 2])
         return moved(tilted, tcp_m=tilted.tcp_m + aside)
@@ -231,7 +220,7 @@ class MisalignmentSwing(PartMisalignment):
     def details(cls, rng):
         return {'side': rng.choice([-1.0, 1.0])}
 
-    def on_motion(self, motion: Motion, scene: Scene) -> Motion:
+    def on_motion(self, motion, scene):
         part = scene.part
         if part.kind != 'door':
             return motion
@@ -246,7 +235,7 @@ class TriggerDelay(TriggerLag):
 
     form = 'delay'
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         motion = scene.nominal
         late = self.amplitude * np.where(motion.trigger_on, 1.0, self.drawn['fall_ratio'])
         level = flow(motion.trigger_s[motion.trigger_on] + 1e-6).mean()
@@ -260,7 +249,7 @@ class FlowSettling(FlowDrift):
     form = 'settling'
     ranges = between(share=(0.15, 0.5))
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         first, passes, length = _spraying(scene)
         tau = self.drawn['share'] * length
         whole = self.amplitude * (passes - 1) / (1.0 - np.exp(-length / tau))
@@ -273,7 +262,7 @@ class FlowStep(FlowDrift):
     form = 'step'
     ranges = between(at=(0.3, 0.7))
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         first, passes, length = _spraying(scene)
         at, half = first + self.drawn['at'] * length, 0.35 * self.amplitude * (passes - 1)
         return lambda t: flow(t) * (1.0 + half * np.tanh((t - at) / (0.03 * length)))
@@ -284,7 +273,7 @@ class FlowByPass(FlowDrift):
 
     form = 'by_pass'
 
-    def on_flow(self, flow: Callable, scene: Scene) -> Callable:
+    def on_flow(self, flow, scene):
         starts = scene.nominal.trigger_s[scene.nominal.trigger_on]
         middle = 0.5 * (starts.size - 1)
 
@@ -304,7 +293,7 @@ class DriftByHeight(AirDrift):
     def details(cls, rng):
         return {'direction': DOWN.copy(), 'gain_per_m': rng.uniform(0.4, 1.2)}
 
-    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+    def on_air(self, air, slices, parcels):
         here = 1.0 + self.drawn['gain_per_m'] * (0.45 - slices.tcp_0_m[:, 2:])
         down = np.asarray(self.drawn['direction'])
         return with_drift(air, self.amplitude * np.maximum(here, 0.1) * down)

@@ -15,9 +15,8 @@ import trimesh
 from scipy.interpolate import RectBivariateSpline
 
 from .doors import OUTLINE_MARGIN_M, Part
-from .flight import Air, Landings, Slices
-from .parcels import Parcels
-from .truths import KAPPA_REF_PER_M, Scene, Truth, between, variant, with_narrowing
+from .flight import Landings
+from .truths import KAPPA_REF_PER_M, Scene, Truth, between, variant
 
 GRID_M = 0.01
 RIM_M = np.array([0.03, 0.06, 0.09, 0.12])
@@ -32,16 +31,14 @@ class IncidenceAttraction(Truth):
     away = u for a bounce and u / (1 + u / 0.8), saturating, for a gain.
     """
 
-    id, family, typical, unit = 'incidence_attraction', 'incidence', 1.0, '1'
-    most = 6.0
-    of_covariates = ('away',)
+    id, family, typical, most, unit = 'incidence_attraction', 'incidence', 1.0, 6.0, '1'
 
     @classmethod
     def of_size(cls, size, rng):
         amount = min(cls.typical * size, cls.most)
         return amount if rng.random() < 0.7 else -0.6 * amount
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         away = self.away(np.maximum(landings.cos_incidence, 0.2), self.amplitude >= 0)
         if self.amplitude >= 0:
             return 1.0 + self.amplitude * away
@@ -70,7 +67,7 @@ class IncidencePower(IncidenceAttraction):
 
     form, most = 'power', 1.2
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         return np.maximum(landings.cos_incidence, 0.2) ** -self.amplitude
 
 
@@ -82,9 +79,8 @@ class ConvexAttraction(Truth):
 
     id, family, typical, unit = 'convex_attraction', 'curvature', 0.15, '1'
     most, over_m = 1.0, 0.015
-    of_covariates = ('gain',)
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         low, _ = _curvature(landings, scene, self.over_m)
         return 1.0 + self.amplitude * self.gain(np.maximum(-low, 0.0) / KAPPA_REF_PER_M)
 
@@ -104,25 +100,12 @@ variant(ConvexAttraction, 'cylinder',
 class FaradayShielding(Truth):
     """Recesses get less: exp(-a k^0.8), k = concave curvature over 30 mm x 250 mm."""
 
-    id, family, typical, unit = 'faraday_shielding', 'curvature', 0.15, '1'
-    most = 1.0
-    of_covariates = ('measure',)
+    id, family, typical, most, unit = 'faraday_shielding', 'curvature', 0.15, 1.0, '1'
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         _, high = _curvature(landings, scene, 0.030)
         k = np.maximum(high, 0.0) / KAPPA_REF_PER_M
         return np.exp(-self.amplitude * k**0.8)
-
-
-class _Recess(FaradayShielding):
-    """Shielding by a measure of the recess that is 1 in a valley of 250 mm radius."""
-
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
-        x, z = landings.position_m[:, 0], landings.position_m[:, 2]
-        recess = np.maximum(_on_grid(scene.part, self.measure).ev(x, z), 0.0)
-        if self.form == 'depth':
-            return 1.0 / (1.0 + self.amplitude * recess)
-        return np.exp(-self.amplitude * recess)
 
 
 def _depth(part: Part, x: np.ndarray, z: np.ndarray) -> np.ndarray:
@@ -137,6 +120,19 @@ def _hidden_sky(part: Part, x: np.ndarray, z: np.ndarray) -> np.ndarray:
         tangent = (_rise(part, x, z, a, HORIZON_M) / HORIZON_M[:, None, None]).max(axis=0)
         hidden = hidden + tangent**2 / (1.0 + tangent**2) * (tangent > 0) / AROUND.size
     return hidden / 0.036
+
+
+class _Recess(FaradayShielding):
+    """Shielding by a measure of the recess that is 1 in a valley of 250 mm radius."""
+
+    measure = staticmethod(_depth)
+
+    def on_landing(self, landings, scene):
+        x, z = landings.position_m[:, 0], landings.position_m[:, 2]
+        recess = np.maximum(_on_grid(scene.part, self.measure).ev(x, z), 0.0)
+        if self.form == 'depth':
+            return 1.0 / (1.0 + self.amplitude * recess)
+        return np.exp(-self.amplitude * recess)
 
 
 variant(_Recess, 'depth',
@@ -156,9 +152,8 @@ class EdgeBuild(Truth):
 
     id, family, typical, unit = 'edge_build', 'boundary', 0.25, '1'
     most, ranges = 2.0, between(reach_m=(0.015, 0.035))
-    of_covariates = ('gain',)
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         x, z = landings.position_m[:, 0], landings.position_m[:, 2]
         d = np.maximum(scene.part.edge_distance(x, z), 0.0) / self.drawn['reach_m']
         return np.maximum(1.0 + self.amplitude * self.gain(d), 0.0)
@@ -191,11 +186,9 @@ variant(EdgeBuild, 'flow',
 class StandoffEfficiency(Truth):
     """Droplets are lost under way: e^(-a s), s = own path beyond the model plane over Omega."""
 
-    id, family, typical, unit = 'standoff_efficiency', 'standoff', 0.5, '1'
-    most = 3.0
-    of_covariates = ('kept',)
+    id, family, typical, most, unit = 'standoff_efficiency', 'standoff', 0.5, 3.0, '1'
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray:
+    def on_landing(self, landings, scene):
         return self.kept(landings.beyond_m / scene.pattern.model_plane_m, self.amplitude)
 
     @staticmethod
@@ -222,13 +215,13 @@ class PatternSpread(Truth):
     b = amplitude x 0.7 (small droplets) to 1.3 (large); b > 0: shaping air holds them together.
     """
 
-    id, family, typical, unit, sign = 'pattern_spread', 'standoff', 0.3, '1', 'either'
-    most = 0.8
+    id, family, typical, most, unit, sign = 'pattern_spread', 'standoff', 0.3, 0.8, '1', 'either'
     by_size = (0.7, 0.6)  # of the smallest droplet, and how much more of the largest
 
-    def on_air(self, air: Air, slices: Slices, parcels: Parcels) -> Air:
+    def on_air(self, air, slices, parcels):
         least, more = self.by_size
-        return with_narrowing(air, self.amplitude * (least + more * parcels.size))
+        narrowing = self.amplitude * (least + more * parcels.size)
+        return replace(air, narrowing=air.narrowing + narrowing)
 
 
 variant(PatternSpread, 'uniform', 'Shaping air that holds every droplet alike.',
@@ -246,8 +239,7 @@ class Occlusion(Truth):
     way to its landing meets the mesh (Embree) never arrives.
     """
 
-    id, family, typical, unit = 'occlusion', 'visibility', 0.06, 'm'
-    most = 0.11
+    id, family, typical, most, unit = 'occlusion', 'visibility', 0.06, 0.11, 'm'
 
     @classmethod
     def details(cls, rng):
@@ -274,10 +266,10 @@ class Occlusion(Truth):
         x = part.left(z) + span * (0.5 * part.width_m - part.left(z))
         return _swept(part, x, z, np.array([0.0, 0.0, 0.003]), 0.0, size)
 
-    def on_part(self, part: Part) -> Part:
+    def on_part(self, part):
         return replace(part, obstacle=self.obstacle(part)) if part.kind == 'door' else part
 
-    def on_landing(self, landings: Landings, scene: Scene) -> np.ndarray | float:
+    def on_landing(self, landings, scene):
         if scene.part.obstacle is None:
             return 1.0
         mesh = trimesh.Trimesh(*scene.part.mesh(), process=False)

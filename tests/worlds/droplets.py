@@ -10,7 +10,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import block_diag
 
 from virtual_paint_shop.cases import PARCELS, Case, draw_case
 from virtual_paint_shop.cases import paint as paint_case
@@ -22,7 +21,7 @@ from virtual_paint_shop.parcels import Pattern
 from virtual_paint_shop.shop import Experiment
 from virtual_paint_shop.truths import choose
 
-from .record import Painted, Part, detectability
+from .record import Judged, Painted, Part, strengths
 
 OFFSET_M = 0.05
 # Scatter of the film by the number of droplets traced, a share.
@@ -61,23 +60,17 @@ def paint(
     rng, amplitudes = stream(case.seed, 61), dict(zip(case.truths, case.amplitudes, strict=True))
     truths = choose(list(case.truths), stream(case.seed, 1), amplitudes)
     pattern, jobs = draw_jobs(case.seed, truths, case.layout, OFFSET_M, None)
-    parts, rows = [], []
-    for experiment, job in zip(painted.experiments, jobs, strict=True):
-        part, columns = _measured(case, experiment, rng)
-        table = experiment.readings
-        first = np.unique(table.point, return_index=True)[1]
-        slopes = _pattern_slopes_um(pattern, job, table.positions_m[first], table.normals[first])
-        parts.append(part)
-        rows.append((*columns, slopes))
-    marks, sigma, own, slopes = zip(*rows, strict=True)
-    free = np.hstack([np.concatenate(slopes), block_diag(*own)])
-    strengths = detectability(np.concatenate(marks), free, np.concatenate(sigma))
+    parts, judged = zip(*(
+        _measured(case, experiment, pattern, job, rng)
+        for experiment, job in zip(painted.experiments, jobs, strict=True)
+    ), strict=True)  # fmt: skip
+    together, *each = strengths(judged)
     hidden = painted.truth['hidden']
     passes = [job.plan.passes for job in jobs]
     noise_from = 'stated' if case.stated else 'repeats'
     return Painted(
         'droplets', seed, kind, tuple(name.partition('~')[0] for name in case.truths),
-        tuple(parts), float(strengths[0]), tuple(strengths[1:].tolist()),
+        parts, together, tuple(each),
         true_amounts(hidden[0], passes) if len(hidden) == 1 else {},
         case.noise.level, case.noise.session_offset_um,
         {'shape': 'conner', 'noise_from': noise_from, 'truths': case.truths,
@@ -86,9 +79,9 @@ def paint(
 
 
 def _measured(
-    case: Case, experiment: Experiment, rng: np.random.Generator
-) -> tuple[Part, tuple[np.ndarray, ...]]:
-    """The part as read in one session, and marks, noise and own freedom of its points [um]."""
+    case: Case, experiment: Experiment, pattern: Pattern, job: Job, rng: np.random.Generator
+) -> tuple[Part, Judged]:
+    """The part as read in one session, and what the judge needs of its points."""
     noise, table, unseen = case.noise, experiment.readings, experiment.heldout
     session = measure(table.point, table.film_um, table.expected_um, noise, rng)
     log, texture = experiment.log, np.hypot(noise.texture, TRACED)
@@ -106,7 +99,8 @@ def _measured(
     gauge = noise.sigma_um(table.expected_um[first]) / np.sqrt(count)
     own = np.column_stack([noise.level * film, np.full(film.size, noise.session_offset_um)])
     sigma = np.hypot(gauge, texture * film)
-    return part, (np.column_stack([together, marks]), sigma, own)
+    slopes = _pattern_slopes_um(pattern, job, table.positions_m[first], table.normals[first])
+    return part, Judged(np.column_stack([together, marks]), slopes, own, sigma)
 
 
 def _pattern_slopes_um(

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import trimesh
 import yaml
+from scipy.linalg import block_diag
 
 from virtual_paint_shop.files import POSE_TOPIC, STATE_TOPIC, write_bag
 
@@ -97,6 +100,29 @@ class Painted:
         return folder / 'campaign.yaml'
 
 
+class Judged(NamedTuple):
+    """What a judge needs of the P points of a part, all in um.
+
+    Attributes:
+        marks: (P, m) change by all that is hidden together, then by each cause.
+        pattern: (P, k) change by what is free in the pattern, each in its standard deviation.
+        own: (P, n) the same by what is the part's own.
+        sigma: (P,) independent noise of the point means.
+    """
+
+    marks: np.ndarray
+    pattern: np.ndarray
+    own: np.ndarray
+    sigma: np.ndarray
+
+
+def strengths(parts: Sequence[Judged]) -> list[float]:
+    """Of all that is hidden together, then of each cause; see ``detectability``."""
+    marks, pattern, own, sigma = zip(*parts, strict=True)
+    free = np.hstack([np.concatenate(pattern), block_diag(*own)])
+    return detectability(np.concatenate(marks), free, np.concatenate(sigma)).tolist()
+
+
 def detectability(marks: np.ndarray, free: np.ndarray, sigma_um: np.ndarray) -> np.ndarray:
     """Size of marks (P, m) in standard deviations, all that is free fitted around them.
 
@@ -122,6 +148,32 @@ def grid_mesh(height: np.ndarray, x: np.ndarray, z: np.ndarray) -> tuple[np.ndar
         np.stack([first, above, first + 1], 1), np.stack([first + 1, above, above + 1], 1)
     ])  # fmt: skip
     return vertices, faces
+
+
+def trigger(begun_ns: int, open_s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Stamps [ns] and states of a trigger that is off first and open from and to (passes, 2)."""
+    stamps = begun_ns + np.rint(1e9 * np.append(0.0, open_s.ravel())).astype(np.int64)
+    return stamps, np.append(False, np.tile([True, False], len(open_s)))
+
+
+def amounts(hidden: dict[str, dict]) -> dict[str, float]:
+    """Sizes in the parameters of the library, where both mean the same."""
+    meant = {
+        'tcp_offset': lambda h: {'offset_x_m': h['m'][0], 'offset_y_m': h['m'][1]},
+        'tcp_tilt': lambda h: {'tilt_x_rad': h['rad'][0], 'tilt_y_rad': h['rad'][1]},
+        'tcp_standoff': lambda h: {'offset_z_m': h['m']},
+        'air_drift': lambda h: {'shift_down_m': -h['m'][2], 'shift_across_m': -h['m'][0]},
+        'gun_wake': lambda h: {'lag_s': h['s']},
+        'pose_lag': lambda h: {'lag_s': h['s']},
+        'overspray_fog': lambda h: {'fog_um': h['um']},
+        'gauge_zero': lambda h: {'offset_um': h['um']},
+    }
+    return {
+        f'{name}.{key}': float(value)
+        for name, sizes in hidden.items()
+        if name in meant
+        for key, value in meant[name](sizes).items()
+    }
 
 
 def _write_csv(path, positions_m, point, thickness_um, sigma_um) -> None:

@@ -24,11 +24,8 @@ def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
     covariance = np.outer(prior.width, prior.width) * (root @ root.T)
     covariance *= np.outer(parameters.scale, parameters.scale)
     centre = parameters.offset + parameters.scale * (prior.centre + 0.1 * prior.width)
-    return Posterior(
-        mean=dict(zip(parameters.coordinates, centre.tolist(), strict=True)),
-        covariance=dict(zip(parameters.coordinates, covariance.tolist(), strict=True)),
-        readings=('those of another job',),
-    )
+    readings = ('those of another job',)
+    return Posterior.of(parameters.coordinates, centre, covariance, readings=readings)
 
 
 # The same parameters after another job.

@@ -34,7 +34,7 @@ TIME_S = np.linspace(0.0, 40.0, KNOTS)
 def test_a_curve_made_from_a_form_is_named_with_its_parameters(form, x, unit, curve, expected):
     sd = np.full(KNOTS, 0.004)
     held = []
-    for seed in range(8):
+    for seed in range(4):
         noise = np.random.default_rng(seed).normal(0.0, sd)
         best, *others = fitting_forms(x, curve(x) + noise, sd, unit=unit)
         held.append(best.name == form)
@@ -48,7 +48,7 @@ def test_a_curve_made_from_a_form_is_named_with_its_parameters(form, x, unit, cu
         probabilities = [one.probability for one in (best, *others)]
         assert probabilities == sorted(probabilities, reverse=True)
         assert sum(probabilities) < 1.0 + 1e-9
-    assert sum(held) >= 6
+    assert sum(held) >= 3
 
 
 def test_an_addition_is_in_micrometres():

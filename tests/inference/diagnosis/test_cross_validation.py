@@ -14,7 +14,6 @@ from inference.diagnosis.linear import (
     null_of,
     smooth_curves,
 )
-from paint_deposition.inference.diagnosis import learning
 from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out, left_out
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
@@ -42,22 +41,6 @@ def test_the_linear_update_is_a_refit(fit):
         kept = fit_linear(fit.jacobian[~out], data[~out], fit.parameters)
         expected[out] = data[out] - fit.jacobian[out] @ kept.vector
     assert hold_out(null_of(fit), BLOCKS) == pytest.approx(expected)
-
-
-def test_everything_left_out_is_predicted_by_the_priors(fit):
-    prior = fit.parameters.prior
-    data = fit.predicted_um + fit.residual
-    deviation = hold_out(null_of(fit), np.zeros(READINGS))
-    assert deviation == pytest.approx(data - fit.jacobian @ prior.centre)
-
-
-def test_readings_left_out_are_predicted_worse_than_fitted_ones():
-    random = np.random.default_rng(9)
-    worse = 0
-    for _ in range(20):
-        fit = linear_fit(random, READINGS)
-        worse += np.sum(hold_out(null_of(fit), BLOCKS) ** 2) > fit.chi_square
-    assert worse == 20
 
 
 # Choosing effects and laws without the points left out.
@@ -164,12 +147,6 @@ def test_a_fold_that_calls_for_another_set_does_not_go_on():
     assert stages[0].chosen() is edge
 
 
-def test_on_noise_the_nested_errors_are_larger_than_the_fitted_one():
-    for seed in range(5):
-        fitted = linear_fit(np.random.default_rng(seed), POINTS).residual
-        assert nested(stages_of(0.0 * FORM, seed=seed)).min() > root_mean_square(fitted)
-
-
 def test_what_acts_lowers_the_nested_error_to_the_noise():
     """The effect by its law; the wave, which no law has, by one learned curve."""
     assert nested(stages_of(2.0 * FORM))[0] == pytest.approx(1.0, abs=0.25)
@@ -187,28 +164,6 @@ def test_a_law_must_say_more_than_any_footprint_could():
     wave = replace(NOTHING_LEFT, footprint=(3.0 * CURVES[0].columns,))
     stages = [replace(one, here=replace(one.here, usual=wave)) for one in stages_of(WAVE)]
     assert nested(stages[-1:]) == pytest.approx([nested(stages_of(WAVE))[0]] * (1 + MOST_LAWS))
-
-
-def test_laws_chosen_on_all_points_flatter_and_nested_ones_do_not(monkeypatch):
-    """On noise alone, of thirty laws that explain nothing, the best one must be learned."""
-    monkeypatch.setattr(learning, 'WORTH_LEARNING', -np.inf)
-    folds = [fold == FOLDS for fold in np.unique(FOLDS)]
-    nothing_else = np.zeros((POINTS, POINTS))
-    without, chosen_on_all, chosen_inside = [], [], []
-    for seed in range(24):
-        random = np.random.default_rng([7, seed])
-        none = [learnable(smooth_curves(random.permutation(PLACE), KNOTS, 0.5)) for _ in range(30)]
-        one = trial(np.zeros(POINTS), seed=seed)
-        ((k, size),) = learning.choose_laws(one.fit, nothing_else, none, np.inf)
-        columns = [size * none[k].columns]
-        errors = np.concatenate([left_out(one.fit, columns, out) for out in folds])
-        chosen_on_all.append(root_mean_square(errors))
-        before, after, *_ = nested([Stage(one, [])], none)
-        without.append(before)
-        chosen_inside.append(after)
-    gain, nested_gain = np.subtract(without, chosen_on_all), np.subtract(without, chosen_inside)
-    assert gain.mean() > 3.0 * gain.std() / np.sqrt(len(gain))
-    assert nested_gain.mean() < 0.0
 
 
 def test_a_point_left_out_has_no_part_in_its_own_prediction():
@@ -229,10 +184,3 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction():
     curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
     assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)
     assert square(0.0)[1] != pytest.approx(square(0.0)[0], rel=1e-3)
-
-
-def test_the_level_of_a_part_helps_to_predict_the_rest_of_it():
-    level, out = np.ones((POINTS, 1)), FOLDS == 3
-    raw = np.random.default_rng(1).normal(size=POINTS) + 5.0
-    assert abs(left_out(NullModel.of(10.0 * level, raw), [], out).mean()) < 1.0
-    assert left_out(NullModel.of(0.0 * level, raw), [], out) == pytest.approx(raw[out])

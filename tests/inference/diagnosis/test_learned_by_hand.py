@@ -3,18 +3,14 @@
 import numpy as np
 import pytest
 
-from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.learned import learned_figure
-from paint_deposition.report.page.report import report_html
 from paint_deposition.report.writers.fitted_model import write_fitted
 from small_campaign import small_campaign
 
@@ -35,7 +31,7 @@ def measured(experiment: Experiment, random: np.random.Generator) -> Experiment:
     sigma_um = np.full(len(at), NOISE_UM)
     normals = surface.normals[at]
     readings = Readings.of(surface.vertices_m[at], film_um, sigma_um=sigma_um, normals=normals)
-    return Experiment.of(experiment.name, surface, experiment.path, readings)
+    return experiment.with_readings(readings)
 
 
 @pytest.fixture(scope='module')
@@ -70,14 +66,6 @@ def test_the_error_falls_also_on_points_left_out(done):
     assert done.to_dict()['rmse_um']['holdout_after'] == after.holdout_rmse_um
 
 
-def test_the_curve_is_that_of_the_hidden_law_up_to_a_constant(done):
-    law = done.model.effect('learned:time_s')
-    assert isinstance(law, LearnedCurve)
-    times = np.linspace(law.low, law.high, 50)
-    ratio = law.factor(times) / HIDDEN.factor(times)
-    assert np.std(ratio) < 0.3 * np.std(HIDDEN.factor(times))
-
-
 def test_the_band_holds_the_hidden_law_up_to_a_constant(done):
     law = done.model.effect('learned:time_s')
     times = np.linspace(law.low, law.high, 50)
@@ -100,35 +88,7 @@ def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
         refit(campaign, file.model, LEARNED['time_s'])
 
 
-def test_what_does_not_vary_cannot_be_learned(tmp_path):
-    panel = small_campaign(tmp_path, experiments=('panel',))
+def test_what_does_not_vary_cannot_be_learned(campaign):
+    panel = Campaign(campaign.experiments[:1])
     with pytest.raises(ModelError, match='sky_view_factor is the same at all readings'):
         refit(panel, DepositionModel(), LEARNED['sky_view_factor'])
-
-
-def test_the_report_tells_the_law_and_draws_it(done):
-    data = ReportData.of(done)
-    page = report_html(data)
-    assert 'no known effect explains; its law was learned' in page
-    assert 'learned law over the time since the motion began' in page
-    assert 'id="figure-learned' in page
-    (chart,) = learned_figure(data)['charts']
-    band, curve, *_ = chart['data']
-    law = done.model.effects[0]
-    within = (curve['x'] > law.low) & (curve['x'] < law.high)
-    np.testing.assert_allclose(curve['y'][within], law.factor(curve['x'][within]))
-    assert curve['x'][0] < law.low
-    assert 'how well the readings determine the curve' in page
-    assert curve['y'][[0, -1]] == pytest.approx([1.0, 1.0], abs=1e-9)
-    assert learned_figure(ReportData.of(done.comparisons[0])) is None
-    low, high = np.split(band['y'], 2)
-    times = band['x'][: len(low)]
-    assert (times[0], times[-1]) == (law.low, law.high)
-    np.testing.assert_allclose(0.5 * (low + high[::-1]), law.factor(times))
-    np.testing.assert_allclose(high[::-1] - low, 2.0 * 1.96 * law.deviation(times))
-
-
-def test_other_effects_can_be_found_beside_a_learned_law(done, campaign):
-    again = refit(campaign, done.model, EFFECTS['edge_build'])
-    assert [effect.id for effect in again.model.effects] == ['learned:time_s', 'edge_build']
-    assert again.model.effects[0] == done.model.effects[0]

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import expit, logsumexp
+from scipy.special import logsumexp
 from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
 from inference.diagnosis.linear import bounds, linear_fit, no_remainder, null_of
@@ -24,7 +24,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     SIZES,
     ModelSpace,
     Weighed,
-    inclusion_of,
     log_odds,
     probable_sizes,
 )
@@ -132,8 +131,7 @@ def p_values(plain, found, remainder, of: Sizes, known: tuple[Sizes, ...], freed
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('size', [SMALL, LARGE], ids=['small', 'large'])
-@pytest.mark.parametrize('freedom', [np.inf, 15.0])
+@pytest.mark.parametrize(('size', 'freedom'), [(SMALL, np.inf), (LARGE, 15.0)])
 def test_the_p_value_is_uniform_where_nothing_is_missing(
     plain, found, remainder, freedom, size, monkeypatch
 ):
@@ -292,8 +290,3 @@ def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, remainder):
     weights = [Weighed.of(there, remainder, s, np.inf).log_weight for s in without
                if not s.is_beyond_nature]  # fmt: skip
     assert min(np.exp(weights - logsumexp(weights))) > LEAST_SHARE
-
-
-def test_probability_of_any_of_some_models():
-    assert inclusion_of([1.0, 2.0], 0.5) == pytest.approx(expit(np.log(np.e + np.e**2) - 0.5))
-    assert inclusion_of([-1e6], 0.0) == 0.0

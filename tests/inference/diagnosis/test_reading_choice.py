@@ -49,25 +49,6 @@ def test_noncentrality_is_what_the_whitened_mark_leaves(marks):
     np.testing.assert_allclose(marks.around(rows).information, exact, rtol=1e-9)
 
 
-def test_one_more_reading_gains_what_is_predicted(marks):
-    """For a change so small that the worth is linear in it."""
-    faint = Marks(1e-3 * marks.free, 1e-3 * marks.columns, marks.effects)
-    rows = np.arange(12)
-    design = faint.around(rows)
-    before, gains = design.worth, design.gains()
-    for place in (15, 22, 31):
-        after = faint.around(np.append(rows, place)).worth
-        assert after - before == pytest.approx(gains[place], rel=0.02)
-
-
-def test_a_point_left_out_costs_its_share(marks):
-    rows = np.arange(15)
-    design = marks.around(rows)
-    without = marks.around(rows[1:]).noncentralities
-    lost = 1.0 - without / design.noncentralities
-    np.testing.assert_allclose(design.shares(rows)[0], lost, rtol=1e-9)
-
-
 def test_power_is_that_of_the_likelihood_ratio():
     """Both tails of a normal score are one tail of the noncentral chi-square."""
     strength = np.array([0.0, 2.0, 8.0])

@@ -13,7 +13,6 @@ from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.smooth_laws import (
     Basis,
     bases_over,
-    curve_basis,
     footprint_basis,
     map_bases,
 )
@@ -86,12 +85,6 @@ def test_values_have_the_size_and_the_correlation_that_were_asked_for(length):
     assert covariance == pytest.approx(expected, abs=0.03 * 0.2**2)
 
 
-def test_no_law_is_shorter_than_its_knots_resolve():
-    basis = basis_on_a_line()
-    at_once, resolved = basis.random(1.0, 0.01), basis.random(1.0, 0.5)
-    assert np.array_equal(at_once.at_knots, resolved.at_knots)
-
-
 def test_a_law_may_leave_the_film_as_a_whole_as_it_is():
     """Beside a pattern of which the level is free that part of it would say nothing."""
     basis = replace(basis_on_a_line(), film_um=np.diag(np.arange(1.0, 10.0)))
@@ -130,18 +123,6 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     ]
 
 
-def test_a_map_over_several_parts_has_nothing_in_common_between_them():
-    door, panel, both = map_bases(study_of(on_door(count=12), on_panel()), MODEL)
-    random = both.random(0.1, 0.25)
-    covariance = random.at_knots @ random.at_knots.T
-    assert np.abs(covariance[: len(door.knots), len(door.knots) :]).max() < 1e-12
-    law = random.learned(np.ones(random.at_knots.shape[1]))
-    (_, on_its_door), (_, on_its_panel) = law.on_parts()
-    assert on_its_door.size == len(door.knots)
-    assert on_its_panel.size == len(panel.knots)
-    np.testing.assert_allclose(both.film_um, np.hstack([door.film_um, panel.film_um]))
-
-
 def test_a_map_bends_more_sharply_than_a_curve():
     """Half a length from an edge it still knows less of the other side."""
     curve = basis_on_a_line(knots=41, step=0.05)
@@ -154,8 +135,3 @@ def test_a_map_bends_more_sharply_than_a_curve():
     assert correlation[1][middle + 10] < correlation[0][middle + 10] - 0.05
     d = np.sqrt(3.0) * 0.5
     assert correlation[1][middle + 10] == pytest.approx((1.0 + d) * np.exp(-d), abs=0.03)
-
-
-@pytest.mark.parametrize('covariate', ['curvature_per_m', 'sky_view_factor', 'speed_m_per_s'])
-def test_over_what_does_not_vary_there_is_no_law(covariate):
-    assert curve_basis(study_of(on_panel()), MODEL, covariate) is None

@@ -8,14 +8,10 @@ from scipy.stats import norm
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.next_experiment import propose
 from paint_deposition.inference.diagnosis.proposals import Spray, chance_of_settling
-from paint_deposition.inference.diagnosis.rivals import Rivals
 from paint_deposition.inference.diagnosis.sprays import MENU
 from paint_deposition.inference.diagnosis.stationary_spray import StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
 
 MODEL = DepositionModel()
@@ -78,24 +74,6 @@ def test_effects_of_a_whole_job_do_not_suit_a_spot():
     assert not suits(MODEL, {'lateral shift', 'order'})
     fog = MODEL.model_copy(update={'effects': (EFFECTS['overspray_fog'].typical(),)})
     assert not suits(fog, {'lateral shift'})
-
-
-@pytest.mark.slow
-def test_a_rolled_gun_on_one_spot_tells_the_air_from_the_tool(panel):
-    study = Study.of(Campaign((panel,)))
-    fit = study.fit(FreeParameters.of(MODEL), starts=3)
-    _, sprays = propose(
-        Rivals.of(study, fit, {n: EFFECTS[n] for n in ('air_drift', 'tcp_offset')})
-    )
-    spot = next(s for s in sprays if s.changes == ('standing', 'roll_180'))
-    assert spot.separation > 2.0 * spot.now
-    told = spot.to_dict()['stand']
-    assert told['dwell_s'] > 0.5
-    assert f'{told["dwell_s"]:.1f} s' in spot.what
-    assert told['peak_um'] <= study.measured_um.max()
-    at = np.array([told['x_m'], told['y_m'], told['z_m']])
-    (row,) = np.flatnonzero((panel.measured_points.positions_m == at).all(axis=1))
-    assert told['film_um'] == pytest.approx(panel.means.mean_um[row])
 
 
 def test_the_chance_is_that_of_the_evidence():

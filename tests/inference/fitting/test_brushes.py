@@ -14,7 +14,7 @@ from paint_deposition.api.inference import calibrate, compare, diagnose
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.inference.fitting.brushes import with_brushes_of
+from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes
@@ -94,48 +94,54 @@ def test_the_jacobian_is_that_of_the_coordinates(shifts):
     np.testing.assert_allclose(VECTOR.jacobian(vector), np.array(slopes).T, atol=1e-6)
 
 
-@pytest.mark.slow
-def test_panels_of_two_brushes_give_both_patterns_back(campaign, tmp_path):
+@pytest.fixture(scope='module')
+def calibrated(campaign):
     """From a plain start: nothing says what the brushes are but the recordings."""
-    found = calibrate(campaign)
-    assert found.chi_square_per_freedom < 1.5
-    for brush, truth in zip(found.model.brushes, TRUTH.brushes, strict=True):
+    return calibrate(campaign)
+
+
+@pytest.mark.slow
+def test_panels_of_two_brushes_give_both_patterns_back(calibrated):
+    assert calibrated.chi_square_per_freedom < 1.5
+    by_name = {value.name: value for value in calibrated.parameters}
+    shared = calibrated.model.brushes[0].planar.phi_rad
+    for brush, truth in zip(calibrated.model.brushes, TRUTH.brushes, strict=True):
         assert brush.number == truth.number
         assert brush.planar.K1_cm3_per_s == pytest.approx(truth.planar.K1_cm3_per_s, rel=0.02)
         assert brush.planar.r_m == pytest.approx(truth.planar.r_m, abs=0.02)
-        shared = found.model.brushes[0].planar.phi_rad
         assert brush.planar.phi_rad == pytest.approx(shared, abs=1e-12)
-    by_name = {value.name: value for value in found.parameters}
-    for brush in TRUTH.brushes:
         for name in ('K1_cm3_per_s', 'r_m', 'sigma1_m'):
             value = by_name[f'brush_{brush.number}.{name}']
-            assert abs(value.value - getattr(brush.planar, name)) < 4.0 * value.sigma
+            assert abs(value.value - getattr(truth.planar, name)) < 4.0 * value.sigma
     # Three parameters of eq. (3) start each brush from a panel of its own; one has no panel.
-    assert [panel is None for panel in found.panels] == [False, False, True]
-    start = ModelFile(TRUTH.model_copy(update={'effects': ()}))
-    write(found, tmp_path, start=start)
-    again = read_model_file(tmp_path / 'model.yaml')
-    assert [b.number for b in again.model.brushes] == [1, 4]
-    assert again.posterior is not None
-    assert again.uncertainty['brush_4']['r_m'] > 0.0
+    assert [panel is None for panel in calibrated.panels] == [False, False, True]
 
 
 @pytest.mark.slow
-def test_a_calibration_tells_transfer_efficiency_and_exponents(campaign, tmp_path):
-    found = calibrate(campaign, TRUTH)
-    figures = found.to_dict()['brushes']
+def test_a_calibration_tells_transfer_efficiency_and_exponents(calibrated):
+    settled = [Brush(number=b.number, planar=b.planar, **SETTINGS[b.number])
+               for b in calibrated.model.brushes]  # fmt: skip
+    figures = brush_figures(DepositionModel.of_brushes(settled), calibrated.parameters)
     for brush in TRUTH.brushes:
         told = figures['by_number'][str(brush.number)]
         share = brush.planar.K1_cm3_per_s * 60.0 / (brush.flow_cm3_per_min * brush.solids)
         assert told['transfer_efficiency'] == pytest.approx(share, rel=0.02)
         assert 0.0 < told['transfer_efficiency_sigma'] < 0.02
     assert set(figures['exponents']['width']) == {'flow_cm3_per_min', 'bell_speed_rpm'}
-    third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
-    files = write(
-        found, tmp_path, start=ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
-    )
-    assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
+
+
+@pytest.mark.slow
+def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path):
+    write(calibrated, tmp_path / 'two', start=ModelFile(TRUTH))
+    again = read_model_file(tmp_path / 'two/model.yaml')
+    assert [b.number for b in again.model.brushes] == [1, 4]
+    assert again.posterior is not None
+    assert again.uncertainty['brush_4']['r_m'] > 0.0
     # A brush that was not painted with stays as it was given.
+    third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
+    start = ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
+    files = write(calibrated, tmp_path / 'three', start=start)
+    assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
     kept = read_model_file(files[0])
     assert kept.model.brushes[-1] == third
     assert kept.posterior is None
@@ -156,13 +162,9 @@ def test_the_start_of_a_campaign_has_its_brushes_and_what_recordings_tell(campai
 
 
 def test_recordings_that_do_not_all_name_their_brush_are_refused(campaign):
-    unnamed = replace(
-        campaign.experiments[0], name='silent',
-        path=campaign.experiments[0].path.with_(
-            brush=np.zeros(len(campaign.experiments[0].path), np.int64)
-        ),
-    )  # fmt: skip
-    mixed = Campaign((unnamed, campaign.experiments[1], campaign.experiments[2]))
+    one, *others = campaign.experiments
+    path = one.path.with_(brush=np.zeros(len(one.path), np.int64))
+    mixed = Campaign((replace(one, name='silent', path=path), *others))
     with pytest.raises(ReadingsError, match="'silent' names no brush, others name 1, 4: give it"):
         with_brushes_of(mixed, DepositionModel())
 
@@ -207,10 +209,8 @@ def test_some_brushes_out_of_all_keep_their_patterns(shifts, numbers):
 def known_of(model: DepositionModel, deviation: float = 0.02) -> Posterior:
     """A calibration of these brushes, each entry known by itself."""
     vector = PatternVector(tuple(brush.number for brush in model.brushes))
-    names = [c.name for c in vector.coordinates]
-    mean = dict(zip(names, map(float, vector.encode(model.patterns)), strict=True))
-    rows = (deviation**2 * np.eye(len(names))).tolist()
-    return Posterior(mean=mean, covariance=dict(zip(names, rows, strict=True)), readings=('a',))
+    names, mean = [c.name for c in vector.coordinates], np.array(vector.encode(model.patterns))
+    return Posterior.of(names, mean, deviation**2 * np.eye(len(names)), readings=('a',))
 
 
 def spread(known: Posterior, model: DepositionModel, first: str, second: str) -> tuple[float, ...]:

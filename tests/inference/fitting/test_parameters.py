@@ -40,26 +40,10 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
     assert again.projection == model.projection
 
 
-def test_amplitudes_count_in_their_typical_size():
-    parameters = FreeParameters.of(DepositionModel(), AirDrift())
-    vector = parameters.encode(parameters.start)
-    assert vector[len(PATTERN) :].tolist() == [0.0, 0.0]
-    vector[len(PATTERN)] = 2.0
-    typical = AirDrift.parameters()['shift_down_m']['typical']
-    assert parameters.decode(vector).effect('air_drift').shift_down_m == pytest.approx(2 * typical)
-    assert parameters.names[len(PATTERN) :] == (
-        'air_drift.shift_down_m',
-        'air_drift.shift_across_m',
-    )
-
-
 def test_shapes_are_varied_on_a_logarithmic_scale():
     """Neutral is the centre; the whole physical range is a few widths of the prior."""
     parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
-    assert parameters.names[len(PATTERN) :] == (
-        'corner_slowdown.gain',
-        'corner_slowdown.length_m',
-    )
+    assert parameters.names[len(PATTERN) :] == ('corner_slowdown.gain', 'corner_slowdown.length_m')
     vector = parameters.encode(parameters.start)
     info = CornerSlowdown.parameters()['length_m']
     lengths = []

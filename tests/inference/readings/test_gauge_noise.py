@@ -8,10 +8,9 @@ import pytest
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.gauge_noise import (
     ASSUMED_FREEDOM,
-    ENOUGH_REPEATS,
     gauge_noise,
     gross_outliers,
     left_out_lines,
@@ -24,15 +23,8 @@ from paint_deposition.inference.readings.readings import (
 from paint_deposition.inference.readings.residuals import Residuals
 
 # Numbers of readings at each point.
-LAYOUTS = {
-    '3 pairs': [2] * 3,
-    '6 pairs': [2] * 6,
-    '20 pairs': [2] * 20,
-    '6 triples': [3] * 6,
-    'one point': [8],
-    'mixed': [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2,
-}
-CAMPAIGNS = 400
+LAYOUTS = {'20 pairs': [2] * 20, 'mixed': [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2}
+CAMPAIGNS = 100
 
 
 def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
@@ -72,26 +64,17 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
 # --- honest readings stay
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize('layout', LAYOUTS)
-def test_normal_readings_are_not_dropped(layout):
-    random = np.random.default_rng(2)
-    dropped = [
-        gross_outliers(readings).mean()
-        for readings, _ in campaigns(layout, lambda count: random.normal(size=count))
-    ]
-    assert np.mean(dropped) < 1e-3
-
-
-@pytest.mark.parametrize('layout', ['20 pairs', 'mixed'])
-def test_the_noise_of_normal_readings_is_unbiased(layout):
-    """400 campaigns with 20 degrees of freedom or more know a standard deviation to 0.8 %."""
+def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
+    """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
     random = np.random.default_rng(3)
-    squares = [
-        np.mean((gauge_noise(readings).sigma_um / usual_noise_um(film)) ** 2)
-        for readings, film in campaigns(layout, lambda count: random.normal(size=count))
-    ]
-    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.03)
+    squares, dropped = [], []
+    for readings, film in campaigns(layout, lambda count: random.normal(size=count)):
+        noise = gauge_noise(readings)
+        squares.append(np.mean((noise.sigma_um / usual_noise_um(film)) ** 2))
+        dropped.append(noise.gross.mean())
+    assert np.sqrt(np.mean(squares)) == pytest.approx(1.0, abs=0.05)
+    assert np.mean(dropped) < 2e-3
 
 
 def test_a_display_in_whole_micrometres_makes_no_outliers():
@@ -162,9 +145,7 @@ def test_a_study_goes_without_slips_and_says_so(sample):
     slip, *others = np.flatnonzero(door.means.owner == point)
     thickness = door.readings.thickness_um.copy()
     thickness[slip] -= 11.0
-    slipped = Experiment.of(
-        'door', door.surface, door.path, replace(door.readings, thickness_um=thickness)
-    )
+    slipped = door.with_readings(replace(door.readings, thickness_um=thickness))
     study, clean = Study.of(Campaign((slipped,))), Study.of(Campaign((door,)))
     beside = ', '.join(f'{value:.4g}' for value in thickness[others])
     assert study.notes == (
@@ -174,7 +155,6 @@ def test_a_study_goes_without_slips_and_says_so(sample):
     assert clean.notes == ()
     kept = study.campaign.experiments[0]
     assert np.flatnonzero(~kept.used).tolist() == [slip]
-    assert kept.taken is slipped.readings
     without = Study.of(Campaign((door.without(~kept.used),)))
     assert study.measured_um == pytest.approx(without.measured_um)
     assert study.sigma_um == pytest.approx(without.sigma_um)
@@ -211,15 +191,6 @@ def test_noise_is_pooled_within_points():
     assert noise.sigma_um == pytest.approx(np.sqrt(squares / 6), rel=1e-3)
 
 
-def test_one_label_on_two_parts_is_two_points_of_one_gauge():
-    first, second = at_points('aab', [1.0, 2.0, 9.0]), at_points('aabbbb', [7.0, 8.0, 1, 2, 3, 4])
-    parts = {'first': first, 'second': second}
-    noise = gauge_noise(Readings.joined(parts))  # 1 + 1 + 3 degrees of freedom are too few
-    assert noise.source == 'assumed'
-    parts['third'] = at_points('aa', [5.0, 6.0])
-    assert gauge_noise(Readings.joined(parts)).degrees_of_freedom == ENOUGH_REPEATS
-
-
 @pytest.mark.parametrize('thickness', [[20.0, 30.0], [20.0] * 9])
 def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
     labels = 'ab' if len(thickness) == 2 else 'a' * 9
@@ -254,4 +225,3 @@ def test_figures_of_residuals_by_hand():
     assert found.rmse_painted_um == pytest.approx(np.sqrt((4 + 9) / 2))
     assert found.chi_square_per_reading == pytest.approx(29 / 3 / 4)
     assert found.worst == 0
-    assert found.painted.tolist() == [False, True, True]

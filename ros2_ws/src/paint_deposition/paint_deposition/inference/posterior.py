@@ -1,5 +1,6 @@
 """What a fit knows of a model's parameters, as a section of the model file."""
 
+from collections.abc import Sequence
 from typing import Annotated
 
 import numpy as np
@@ -30,6 +31,16 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
     )
     readings: tuple[str, ...] = Field((), description='fingerprints of the readings behind it')
     process: dict[str, Number] = Field({}, description='numbers by name')
+
+    @staticmethod
+    def of(
+        names: Sequence[str], centre: np.ndarray, matrix: np.ndarray, **more: object
+    ) -> 'Posterior':
+        """That of k coordinates with mean (k,) and covariance (k, k)."""
+        mean = dict(zip(names, centre.tolist(), strict=True))
+        return Posterior.model_validate(
+            {'mean': mean, 'covariance': dict(zip(names, matrix.tolist(), strict=True))} | more
+        )
 
     @property
     def names(self) -> tuple[str, ...]:

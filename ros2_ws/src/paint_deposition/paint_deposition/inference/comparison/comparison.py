@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from itertools import combinations
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -79,10 +80,10 @@ def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> l
             mean = float(np.mean(points.residual_um[region]))
             words = _described(values, region, rows, readings, mean)
             described = Region(words, experiment.name, region, readings, mean)
-            found.append((abs(scores[best]), described))
+            found.append((-abs(scores[best]), described))
             # The next region is sought among the other points.
             left = np.where(members, 0.0, left)
-    return [region for _, region in sorted(found, key=lambda item: -item[0])]
+    return [region for _, region in sorted(found, key=itemgetter(0))]
 
 
 def _windows(positions_m: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -102,12 +103,9 @@ def _windows(positions_m: np.ndarray, height: np.ndarray) -> np.ndarray:
 
 
 def _described(
-    values: dict[str, np.ndarray],
-    region: np.ndarray,
-    rows: np.ndarray,
-    readings: int,
+    values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray, readings: int,
     mean_um: float,
-) -> str:
+) -> str:  # fmt: skip
     incidence = values['incidence_deg'][region]
     return (
         f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} µm '
@@ -118,22 +116,15 @@ def _described(
 
 def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
     """The thirds of the part's height, and the half as seen by the gun if it lies in one only."""
-    height = values['height_fraction'][region]
-    low, high = np.quantile(height, [0.1, 0.9])
-    thirds = ['lower third', 'middle third', 'upper third']
+    low, high = np.quantile(values['height_fraction'][region], [0.1, 0.9])
     first, last = (int(min(2, max(0, 3 * value))) for value in (low, high))
-    if last - first == 2:
-        vertical = 'full height'
-    else:
-        vertical = ' and '.join(thirds[first : last + 1])
+    thirds = ['lower third', 'middle third', 'upper third'][first : last + 1]
+    vertical = 'full height' if len(thirds) == 3 else ' and '.join(thirds)
     across = values['across_m']
-    ends = across[rows].min(), across[rows].max()
-    share = (across[region] - ends[0]) / max(ends[1] - ends[0], 1e-9)
+    share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
     if share.min() > 0.5:
         return f'{vertical}, right half'
-    if share.max() < 0.5:
-        return f'{vertical}, left half'
-    return vertical
+    return f'{vertical}, left half' if share.max() < 0.5 else vertical
 
 
 @dataclass(frozen=True)
@@ -148,6 +139,11 @@ class Misfit:
     kind: str
     label: str
     residuals: Residuals
+
+    def to_dict(self) -> dict[str, Any]:
+        """An entry of ``misfits`` in the files of results."""
+        of = {'experiment': self.experiment, 'kind': self.kind, 'label': self.label}
+        return of | self.residuals.figures()
 
 
 @dataclass(frozen=True)
@@ -202,11 +198,7 @@ class Comparison:
             'readings': len(self.readings),
             'noise': self.study.noise_figures,
             'left_out': [outlier.to_dict() for outlier in self.study.outliers],
-            'misfits': [
-                {'experiment': m.experiment, 'kind': m.kind, 'label': m.label}
-                | m.residuals.figures()
-                for m in self.misfits
-            ],
+            'misfits': [misfit.to_dict() for misfit in self.misfits],
             'regions': [region.to_dict() for region in self.regions],
             'dependences': [asdict(dependence) for dependence in self.dependences],
             'notes': [*self.warnings, *self.study.notes],
@@ -245,25 +237,18 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     """Predict every reading and summarise the misfit."""
     points = study.residuals(study.forward.predict_um(model))
     campaign = study.campaign
-    readings = Residuals(
-        campaign.readings.thickness_um,
-        points.predicted_um[campaign.means.owner],
-        study.noise.sigma_um,
-    )
+    predicted_um = points.predicted_um[campaign.means.owner]
+    readings = Residuals(campaign.readings.thickness_um, predicted_um, study.noise.sigma_um)
     dependences = [
         Dependence(one.name, *map(float, spearmanr(one.values, points.residual_um)))
         for one in study.covariates(model)
         if one.varies
     ]
     return Comparison(
-        study,
-        readings,
-        points,
-        tuple(_misfits(study, model, readings)),
+        study, readings, points, tuple(_misfits(study, model, readings)),
         tuple(sorted(dependences, key=lambda d: d.p_value)),
-        tuple(misfit_regions(study, points, model)),
-        model,
-    )
+        tuple(misfit_regions(study, points, model)), model,
+    )  # fmt: skip
 
 
 def _misfits(study: Study, model: DepositionModel, residuals: Residuals) -> Iterator[Misfit]:

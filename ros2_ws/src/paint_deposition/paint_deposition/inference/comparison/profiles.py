@@ -5,7 +5,7 @@ of each single pass.
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,6 @@ from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
 from paint_deposition.inference.readings.placement import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.part.points import SurfacePoints
 
 # Model lines are drawn through points this close along the surface [m].
 LINE_STEP_M = 0.01
@@ -57,66 +56,28 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     Args:
         models: whose lines are wanted; single passes are those of the last.
     """
-    found = []
-    for index, experiment in enumerate(study.campaign.experiments):
-        rows = np.flatnonzero(study.campaign.experiment_of == index)
-        lines = [_line(experiment, label, members) for label, members in _grouped(experiment)]
-        lines = lines or list(_strips(experiment))
-        drawn = [line for line in lines if len(line.members) >= FEWEST_ON_A_LINE]
-        films = _films_along(experiment, drawn, models)
-        for line in lines:
-            nothing = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
-            at, lines_um, passes_um = films.get(line.label, nothing)
-            found.append(
-                Profile(experiment.name, line.label, line.axis, rows[line.members],
-                        line.position_m, at, lines_um, passes_um)
-            )  # fmt: skip
+    found, first = [], 0
+    for experiment in study.campaign.experiments:
+        for line in list(_grouped(experiment)) or list(_strips(experiment)):
+            profile = _profile(experiment, models, *line)
+            found.append(replace(profile, rows=first + profile.rows))
+        first += len(experiment)
     return found
 
 
-@dataclass(frozen=True)
-class _Line:
-    """Readings in order along an axis, and places (n, 3) along which the model's line runs."""
-
-    label: str
-    axis: str
-    members: np.ndarray
-    position_m: np.ndarray
-    places_m: np.ndarray
-
-
-def _line(
-    experiment: Experiment, label: str, members: np.ndarray, upright: bool | None = None
-) -> _Line:
-    """Of a group, along its longer side; of a strip, upright or not, along its middle."""
-    surface = experiment.surface
-    height_m, across_m = _axes(experiment, members)
-    is_strip = upright is not None
-    if upright is None:
-        upright = bool(np.ptp(height_m) >= np.ptp(across_m))
-    position = height_m if upright else across_m
-    axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
-    order = np.argsort(position, kind='stable')
-    places = experiment.points.positions_m[members[order]]
-    if is_strip:
-        aside = across_axis(surface.outward, surface.down) if upright else -surface.down
-        away = places @ aside
-        places = places - np.outer(away - np.median(away), aside)
-    return _Line(label, axis, members[order], position[order], places)
-
-
-def _axes(experiment: Experiment, members: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Height over the part's lowest point and distance to the right of its centre [m]."""
-    surface = experiment.surface
-    positions = experiment.points.positions_m[members]
+def _axes(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+    """(P,) height over the part's lowest point and distance to the right of its centre [m]."""
+    surface, positions = experiment.surface, experiment.measured_points.positions_m
     height = -positions @ surface.down - (-surface.vertices_m @ surface.down).min()
     return height, (positions - surface.centre_m) @ across_axis(surface.outward, surface.down)
 
 
-def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray]]:
-    groups = experiment.groups
-    for label in sorted({str(g) for g in groups if g}, key=_natural):
-        yield label, np.flatnonzero(groups == label)
+def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
+    """Label and members of each group, and whether it is longer upright than across."""
+    height_m, across_m = _axes(experiment)
+    for label in sorted({str(g) for g in experiment.groups if g}, key=_natural):
+        members = np.flatnonzero(experiment.groups == label)
+        yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False
 
 
 def _natural(label: str) -> tuple:
@@ -125,72 +86,61 @@ def _natural(label: str) -> tuple:
     return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
 
 
-def _strips(experiment: Experiment) -> Iterator[_Line]:
+def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
     """Strips that cross the passes, each with about as many readings."""
-    members = np.arange(len(experiment))
-    if not len(members):
-        return
-    height_m, across_m = _axes(experiment, members)
     upright = passes_are_level(experiment.path, experiment.surface.down)
-    aside = across_m if upright else height_m
-    count = int(np.clip(round(len(members) / READINGS_A_STRIP), 1, MOST_STRIPS))
+    height_m, across_m = _axes(experiment)
+    aside, what = (across_m, 'across') if upright else (height_m, 'height')
+    count = int(np.clip(round(len(aside) / READINGS_A_STRIP), 1, MOST_STRIPS))
     for part in np.array_split(np.argsort(aside, kind='stable'), count):
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
-        what = 'across' if upright else 'height'
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
-        yield _line(experiment, label, members[part], upright)
+        yield label, part, upright, True
 
 
-def _films_along(
-    experiment: Experiment, lines: Sequence[_Line], models: Sequence[DepositionModel]
-) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """By label of a line: positions, films of the models, and film of each pass alone."""
-    if not lines:
-        return {}
-    along_lines = [_along(experiment, line) for line in lines]
-    cuts = np.cumsum([len(at) for at, _, _ in along_lines])
-    count = int(cuts[-1])
+def _profile(
+    experiment: Experiment, models: Sequence[DepositionModel], label: str, members: np.ndarray,
+    upright: bool, is_strip: bool,
+) -> Profile:  # fmt: skip
+    """Of some of an experiment's points, in order upright or across."""
+    surface, along = experiment.surface, _axes(experiment)[0 if upright else 1][members]
+    order = np.argsort(along, kind='stable')
+    members, position = members[order], along[order]
+    axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
+    film = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
+    if len(members) >= FEWEST_ON_A_LINE:
+        measured = experiment.measured_points.select(members)
+        places = measured.positions_m
+        if is_strip:
+            aside = across_axis(surface.outward, surface.down) if upright else -surface.down
+            away = places @ aside
+            places = places - np.outer(away - np.median(away), aside)
+        film = _film_along(experiment, models, position, np.hstack([places, measured.normals]))
+    return Profile(experiment.name, label, axis, members, position, *film)
+
+
+def _film_along(
+    experiment: Experiment, models: Sequence[DepositionModel], position_m: np.ndarray,
+    places: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
+    """Positions, films of the models and of each pass alone, through places and normals (n, 6)."""
+    low, high = position_m[[0, -1]]
+    steps = max(2, int(np.ceil((high - low) / LINE_STEP_M)) + 1)
+    at = np.unique(np.concatenate([np.linspace(low, high, steps), position_m]))
+    line = np.column_stack([np.interp(at, position_m, column) for column in places.T])
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
-    points = experiment.surface.at(
-        np.concatenate([places_m for _, places_m, _ in along_lines]),
-        np.concatenate([normals for _, _, normals in along_lines]),
-        stencil_m=STENCIL_M if slopes else None,
-    )
-    films = np.array([_gauge_um(experiment, points, model)[:count] for model in models])
-    passes = np.array(list(_single_passes_um(experiment, points, models[-1])))[:, :count]
-    found = {}
-    for line, (at, _, _), stop in zip(lines, along_lines, cuts, strict=True):
-        here = slice(int(stop) - len(at), int(stop))
-        found[line.label] = at, films[:, here], passes[:, here]
-    return found
+    points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)
 
+    def integrated(model: DepositionModel, path: SprayPath) -> FilmIntegrator:
+        integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
+        integrator.add(path)
+        return integrator
 
-def _along(experiment: Experiment, line: _Line) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Positions along the axis, points near the surface and normals, through all places."""
-    at = line.position_m
-    steps = max(2, int(np.ceil((at[-1] - at[0]) / LINE_STEP_M)) + 1)
-    wanted = np.unique(np.concatenate([np.linspace(at[0], at[-1], steps), at]))
-    along = [
-        np.column_stack([np.interp(wanted, at, column[:, k]) for k in range(3)])
-        for column in (line.places_m, experiment.points.normals[line.members])
+    path = experiment.path
+    films = [integrated(model, path).gauge_um[: len(at)] for model in models]
+    # Of a pass alone the others are kept, with the gun off.
+    passes = [
+        integrated(models[-1], path.with_flow_scaled(path.spray_pass == number)).raw_um[: len(at)]
+        for number in np.unique(path.spray_pass[path.spray_pass >= 0])
     ]
-    return wanted, along[0], along[1]
-
-
-def _gauge_um(experiment: Experiment, points: SurfacePoints, model: DepositionModel) -> np.ndarray:
-    integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
-    integrator.add(experiment.path)
-    return integrator.gauge_um
-
-
-def _single_passes_um(
-    experiment: Experiment, points: SurfacePoints, model: DepositionModel
-) -> Iterator[np.ndarray]:
-    """Paint that arrives from each pass alone: the others are kept, with the gun off."""
-    path: SprayPath = experiment.path
-    integrator = FilmIntegrator(points, model, 'double', experiment.surface.occluder)
-    for number in np.unique(path.spray_pass[path.spray_pass >= 0]):
-        inside = path.spray_pass == number
-        integrator.reset()
-        integrator.add(path.with_flow_scaled(inside))
-        yield integrator.raw_um
+    return at, np.array(films), np.array(passes)

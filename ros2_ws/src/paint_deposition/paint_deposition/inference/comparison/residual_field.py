@@ -13,10 +13,7 @@ SAME_SIDE_COSINE = 0.5
 
 
 def spreading(
-    surface: Surface,
-    positions_m: np.ndarray,
-    normals: np.ndarray,
-    radius_m: float | None = None,
+    surface: Surface, positions_m: np.ndarray, normals: np.ndarray, radius_m: float | None = None
 ) -> csr_matrix:
     """Matrix (V, P) that spreads values at points over the surface around them.
 

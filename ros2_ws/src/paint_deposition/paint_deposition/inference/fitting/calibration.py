@@ -5,7 +5,7 @@ greatest standard deviation start the fit of the 2D model, which goes through th
 as every film, so that door and panel alike can be in a campaign.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -119,15 +119,13 @@ class Calibration:
             'experiments': [
                 {
                     'experiment': experiment.name,
-                    'points': len(residuals),
-                    'measured_mean_um': float(residuals.measured_um.mean()),
-                    'predicted_mean_um': float(residuals.predicted_um.mean()),
-                    'residual_sd_um': residuals.sd_um,
-                    'rmse_um': residuals.rmse_um,
+                    'points': len(own),
+                    'measured_mean_um': float(own.measured_um.mean()),
+                    'predicted_mean_um': float(own.predicted_um.mean()),
+                    'residual_sd_um': own.sd_um,
+                    'rmse_um': own.rmse_um,
                 }
-                for experiment, residuals in zip(
-                    study.campaign.experiments, self.residuals, strict=True
-                )
+                for experiment, own in zip(study.campaign.experiments, self.residuals, strict=True)
             ],
             'collapse': [None if panel is None else panel.to_dict() for panel in self.panels],
             'brushes': brush_figures(self.model, self.parameters),
@@ -190,21 +188,23 @@ def calibrate(
     panels = tuple(_panel_fit(study, number) for number in range(len(campaign.experiments)))
     progress('fitting the pattern')
 
+    found = [panel for panel in panels if panel]
+    starts = [_guessed(model, found)] if found else []
+    if start is not None or not found:
+        starts.append(model)
+
     def best_fit(study: Study) -> Fit:
-        return _best_fit(study, model, panels, given=start is not None, seed=seed)
+        fits = (study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts)
+        return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
     reaches = short_reaches(study.campaign, fit.model)
     moved = shifts(study, fit, reaches, best_fit)
-    values = estimates(fit, moved)
-    pairs = correlations(fit)
-    residuals = study.residuals_by_experiment(fit.predicted_um)
-    warnings = [
-        f'{reach}; the intervals are widened by what the fit changes without the readings at '
-        'the ends'
-        for reach in reaches
-    ]
+    values, pairs = estimates(fit, moved), correlations(fit)
+    widened = 'the intervals are widened by what the fit changes without the readings at the ends'
+    warnings = [f'{reach}; {widened}' for reach in reaches]
     warnings += [*impossible_brushes(fit.model), *_warnings(study, fit, values, pairs)]
+    residuals = study.residuals_by_experiment(fit.predicted_um)
     return Calibration(study, fit, values, pairs, residuals, panels, tuple(warnings), moved)
 
 
@@ -221,33 +221,13 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
     return PanelFit(panel, collapse)
 
 
-def _best_fit(
-    study: Study,
-    model: DepositionModel,
-    panels: tuple[PanelFit | None, ...],
-    given: bool,
-    seed: int,
-) -> Fit:
-    """The better of the fits from the given patterns and from the first panels' collapses."""
-    starts = [model] if given else []
-    guessed = _guessed(model, panels)
-    if guessed is not None:
-        starts.insert(0, guessed)
-    fits = [
-        study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts or [model]
-    ]
-    return min(fits, key=lambda fit: fit.objective)
-
-
-def _guessed(
-    model: DepositionModel, panels: tuple[PanelFit | None, ...]
-) -> DepositionModel | None:
-    """Each pattern from the first panel of its brush; None without any panel."""
-    patterns, found = list(model.patterns), [panel for panel in panels if panel]
-    for panel in reversed(found):
+def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionModel:
+    """Each pattern from the first panel of its brush."""
+    patterns = list(model.patterns)
+    for panel in reversed(panels):
         row = int(model.pattern_rows(np.array([panel.panel.brush]))[0])
         patterns[row] = started_from(model.painting_with(panel.panel.brush), panel).planar
-    return model.with_patterns(patterns) if found else None
+    return model.with_patterns(patterns)
 
 
 def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
@@ -262,21 +242,13 @@ def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
     distance = panel.panel.distance_m + projection.emission_offset_m
     shrink = projection.model_plane_m / distance
     sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
-    planar = model.planar.model_copy(
-        update={
-            'r_m': float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9)),
-            'sigma1_m': sigma,
-            'sigma2_m': sigma,
-        }
-    )
-    return model.model_copy(update={'planar': planar})
+    r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
+    lengths = {'r_m': r, 'sigma1_m': sigma, 'sigma2_m': sigma}
+    return model.model_copy(update={'planar': model.planar.model_copy(update=lengths)})
 
 
 def _warnings(
-    study: Study,
-    fit: Fit,
-    values: tuple[Estimate, ...],
-    pairs: tuple[Correlation, ...],
+    study: Study, fit: Fit, values: tuple[Estimate, ...], pairs: tuple[Correlation, ...]
 ) -> list[str]:
     warnings = list(study.left_out)
     warnings += [] if fit.converged else ['the fit did not converge: its values are not final']

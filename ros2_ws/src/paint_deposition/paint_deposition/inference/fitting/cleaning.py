@@ -3,6 +3,8 @@
 Comparison, diagnosis and calibration all take their readings from here.
 """
 
+from dataclasses import replace
+
 import numpy as np
 
 from paint_deposition.effects.base import Effect
@@ -52,19 +54,17 @@ def clean_and_fit(
     if len(study) < FEWEST or not fit.predicted_um.any():
         return study, fit
     misfit = _misfit(study, fit)
-    found = _outliers(study, fit, misfit)
-    if found:
+    if found := _outliers(study, fit, misfit):
         study = study.without(found)
         fit = _fitted(study, start, starts, seed, known)
         misfit = _misfit(study, fit)
     texture = _texture(study, misfit)
     if texture != study.texture:
-        study = study.textured(texture)
+        study = replace(study, texture=texture)
         fit = _fitted(study, fit.model, 1, seed, known)
     faceted = study.with_facets(fit.model)
     if faceted is not study:
-        study = faceted
-        fit = _fitted(study, fit.model, 1, seed, known)
+        return faceted, _fitted(faceted, fit.model, 1, seed, known)
     return study, fit
 
 
@@ -76,17 +76,13 @@ def _fitted(
 
 
 def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier]:
-    readings, means = study.campaign.readings, study.campaign.means
-    found = find_outliers(misfit, means.repeats == 1)
+    means = study.campaign.means
+    labels = study.campaign.readings.point[means.first]
     return {
-        row: Outlier(
-            str(readings.point[means.first[row]]),
-            float(study.measured_um[row]),
-            float(fit.predicted_um[row] + residual_um),
-            sigma_um,
-        )
-        for row, (residual_um, sigma_um) in found.items()
-    }
+        row: Outlier(str(labels[row]), float(study.measured_um[row]),
+                     float(fit.predicted_um[row] + residual_um), sigma_um)
+        for row, (residual_um, sigma_um) in find_outliers(misfit, means.repeats == 1).items()
+    }  # fmt: skip
 
 
 def _texture(study: Study, misfit: FittedPoints) -> Texture:
@@ -104,11 +100,7 @@ def _texture(study: Study, misfit: FittedPoints) -> Texture:
 def _misfit(study: Study, fit: Fit) -> FittedPoints:
     free = np.hstack([fit.jacobian @ fit.parameters.prior.factor, study.nuisance])
     return FittedPoints(
-        fit.residual * study.sigma_um,
-        fit.predicted_um,
-        study.gauge_um,
-        free * study.sigma_um[:, np.newaxis],
-        study.campaign.experiment_of,
-        study.campaign.positions_m,
-        tuple(study.covariates(fit.model)),
-    )
+        fit.residual * study.sigma_um, fit.predicted_um, study.gauge_um,
+        free * study.sigma_um[:, np.newaxis], study.campaign.experiment_of,
+        study.campaign.positions_m, tuple(study.covariates(fit.model)),
+    )  # fmt: skip

@@ -43,34 +43,23 @@ def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
     predicted_um = Forward(campaign, model.effects).predict_um(model)[campaign.means.owner]
     off_um = campaign.readings.thickness_um - predicted_um
     owner = campaign.experiment_of[campaign.means.owner]
-    cells = Campaign(
-        tuple(
-            _in_cells(part, off_um[owner == k], int(np.ceil(CELLS * len(part) / len(campaign))))
-            for k, part in enumerate(campaign.experiments)
-        )
-    )
+    cells = Campaign(tuple(
+        _in_cells(part, off_um[owner == k], int(np.ceil(CELLS * len(part) / len(campaign))))
+        for k, part in enumerate(campaign.experiments)
+    ))  # fmt: skip
     film_um = Forward(cells, model.effects).predict_um(model) + cells.means.mean_um
-    made = []
-    for k, part in enumerate(cells.experiments):
-        readings = replace(part.readings, thickness_um=film_um[cells.experiment_of == k])
-        made.append(_measured(part, readings))
+    made = (
+        part.with_readings(replace(part.readings, thickness_um=film_um[cells.experiment_of == k]))
+        for k, part in enumerate(cells.experiments)
+    )
     return replace(campaign, experiments=tuple(made))
-
-
-def _measured(part: Experiment, readings: Readings) -> Experiment:
-    return Experiment.of(
-        part.name, part.surface, part.path, readings, part.files, part.settings,
-        part.switched_off, part.frame_id,
-    )  # fmt: skip
 
 
 def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
     """A part with so many cells at the most, and (N,) how far readings are off as the film."""
     readings, points = part.readings, part.measured_points
     kind = np.unique([readings.session, readings.group], axis=1, return_inverse=True)[1].ravel()
-    place_m, normals = (
-        values[part.means.owner] for values in (points.positions_m, points.normals)
-    )
+    place_m, normals = (v[part.means.owner] for v in (points.positions_m, points.normals))
     cell = _cells(place_m, kind, most)
     count, first = np.bincount(cell), np.unique(cell, return_index=True)[1]
 
@@ -89,20 +78,12 @@ def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
         f'{readings.understood or readings.source}; {len(readings)} readings in {len(count)} '
         f'cells, each off its neighbours by {noise_um:.2f} µm'
     )
-    return _measured(
-        part,
-        Readings(
-            mean(place_m),
-            np.bincount(cell, off_um) / count,
-            np.array([f'cell {k + 1}' for k in range(len(count))]),
-            readings.group[first],
-            noise_um / np.sqrt(count),
-            mean(normals),
-            readings.source,
-            readings.session[first],
-            understood,
-        ),
-    )
+    names = np.array([f'cell {k + 1}' for k in range(len(count))])
+    return part.with_readings(Readings(
+        mean(place_m), np.bincount(cell, off_um) / count, names, readings.group[first],
+        noise_um / np.sqrt(count), mean(normals), readings.source, readings.session[first],
+        understood,
+    ))  # fmt: skip
 
 
 def _cells(place_m: np.ndarray, kind: np.ndarray, most: int) -> np.ndarray:

@@ -59,10 +59,9 @@ class Correlation:
 def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
     """Every varied parameter with its uncertainty.
 
-    The covariance is widened where residuals are larger than the noise, and by ``shifts``, see
-    ``scaled_covariance``. Intervals are quantiles
-    of the fit's normal distribution carried over to the parameters, in which a logarithm becomes
-    a ratio and two components of the asymmetry its size and phase.
+    The covariance is ``scaled_covariance``. Intervals are quantiles of the fit's normal
+    distribution carried over to the parameters, in which a logarithm becomes a ratio and two
+    components of the asymmetry its size and phase.
     """
     covariance = scaled_covariance(fit, shifts)
     sigma = np.sqrt(np.diag(_spread(fit, covariance)))
@@ -79,8 +78,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
-        value, sd, start, end = (float(of[k]) for of in (values, sigma, low, high))
-        found.append(Estimate(name, value, sd, start, end, not reason, reason))
+        figures = (float(of[k]) for of in (values, sigma, low, high))
+        found.append(Estimate(name, *figures, not reason, reason))
     return tuple(found)
 
 
@@ -160,14 +159,11 @@ def _pattern_reason(
             return 'parallel passes hardly show the asymmetry along their travel; roll the gun'
         return ''
     if name == 'K3':
-        if not learned[2] and not learned[3]:
-            return 'the asymmetry does not show at these points'
-        if not (learned[2] and learned[3]):
-            return (
-                'parallel passes show only its part across the travel; paint a pass with the '
-                'gun rolled by 90 deg'
-            )
-        return ''
+        return {
+            0: 'the asymmetry does not show at these points',
+            1: 'parallel passes show only its part across the travel; paint a pass with the gun '
+            'rolled by 90 deg',
+        }.get(int(learned[2]) + int(learned[3]), '')
     row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
     if not learned[row]:
         return 'its value rests on what bells usually have'

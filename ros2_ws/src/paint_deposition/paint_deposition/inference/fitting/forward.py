@@ -4,6 +4,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 import numba
 import numpy as np
@@ -45,10 +46,6 @@ class Forward:
         rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)
         threads = min(numba.get_num_threads(), len(self._parts)) if rays > FEW_RAYS else 1
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
-
-    def at(self, campaign: Campaign) -> 'Forward':
-        """The same for the points of another campaign."""
-        return Forward(campaign, self.effects)
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:
         """(P,) gauge readings that the model predicts [um], experiments one after the other."""
@@ -117,19 +114,12 @@ class Terms:
         return np.column_stack([(above - below) / (2.0 * STEP) for above, below in ends])
 
 
-@dataclass(frozen=True)
-class _Stages:
-    """A model taken apart.
+class _Stages(NamedTuple):
+    """A model taken apart."""
 
-    Attributes:
-        arrival: with the effects that act before the film has arrived, for the kernel.
-        effects: all that act.
-        slope: whether one needs the film's slope.
-    """
-
-    arrival: DepositionModel
-    effects: tuple[Effect, ...]
-    slope: bool
+    arrival: DepositionModel  # with the effects that act before the film has arrived
+    effects: tuple[Effect, ...]  # all that act
+    slope: bool  # whether one needs the film's slope
 
 
 def _defines(effect: Effect, names: tuple[str, ...]) -> bool:

@@ -94,14 +94,10 @@ class Fit:
         return float(self.residual @ self.residual)
 
     @property
-    def penalty(self) -> float:
-        """Sum of squared deviations from the prior, whitened."""
-        return float(np.sum(self.parameters.prior.whiten(self.vector) ** 2))
-
-    @property
     def objective(self) -> float:
-        """What the fit minimises: chi-square, nuisance integrated out, plus the penalty."""
-        return self.marginal.chi_square + self.penalty
+        """What the fit minimises: chi-square, nuisance integrated out, and that of the prior."""
+        away = self.parameters.prior.whiten(self.vector)
+        return self.marginal.chi_square + float(np.sum(away**2))
 
 
 def fit_readings(
@@ -139,16 +135,11 @@ def fit_readings(
     best = min(found, key=lambda result: result.cost)
     model = parameters.decode(best.x)
     predicted = forward.predict_um(model)
+    residual = (measured_um - predicted) / sigma_um
+    jacobian = derivatives(forward, parameters, best.x, sigma_um)
+    converged = bool(best.status > 0)
     return Fit(
-        parameters,
-        best.x,
-        model,
-        predicted,
-        (measured_um - predicted) / sigma_um,
-        derivatives(forward, parameters, best.x, sigma_um),
-        bool(best.status > 0),
-        nuisance,
-        remainder,
+        parameters, best.x, model, predicted, residual, jacobian, converged, nuisance, remainder
     )
 
 
@@ -184,24 +175,21 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
         vector[shape] += SPREAD_OF_STARTS * width[shape] * away
         shaped = np.clip(vector, problem.low, problem.high)
         vector = problem.with_best_gains(shaped)
-        tried.append((problem.cost(vector, problem.terms(shaped)), vector))
+        cost = np.sum(problem.residuals(vector, problem.terms(shaped)) ** 2)
+        tried.append((float(cost), vector))
     return [vector for _, vector in sorted(tried, key=lambda pair: pair[0])[:count]]
 
 
 def derivatives(
-    forward: Forward, parameters: FreeParameters, vector: np.ndarray, sigma_um: np.ndarray
-) -> np.ndarray:
+    forward: Forward, parameters: FreeParameters, vector: np.ndarray, sigma_um: np.ndarray,
+    terms: Terms | None = None,
+) -> np.ndarray:  # fmt: skip
     """(P, k) derivative of the predictions by the vector, over the standard deviation.
 
-    Exact by the pattern; by effects it is the difference of two predictions.
+    Exact by the pattern; by effects it is the difference of two predictions. ``terms`` are those
+    of the vector, if they are known.
     """
-    terms = forward.terms(parameters.decode(vector))
-    return _derivatives_um(forward, parameters, vector, terms) / sigma_um[:, np.newaxis]
-
-
-def _derivatives_um(
-    forward: Forward, parameters: FreeParameters, vector: np.ndarray, terms: Terms
-) -> np.ndarray:
+    terms = terms or forward.terms(parameters.decode(vector))
     count = len(parameters.pattern)
     columns = [terms.derivatives_um() @ parameters.pattern.jacobian(vector[:count])]
     _, high = parameters.bounds
@@ -211,21 +199,16 @@ def _derivatives_um(
         moved[k] += step
         change = forward.predict_um(parameters.decode(moved)) - forward.predict_um(terms.model)
         columns.append(change[:, np.newaxis] / step)
-    return np.hstack(columns)
+    return np.hstack(columns) / sigma_um[:, np.newaxis]
 
 
 class _Problem:
     """Residuals and their derivatives for the optimiser; the prior gives further residuals."""
 
     def __init__(
-        self,
-        forward: Forward,
-        measured_um: np.ndarray,
-        sigma_um: np.ndarray,
-        parameters: FreeParameters,
-        nuisance: np.ndarray,
-        remainder: np.ndarray | None,
-    ) -> None:
+        self, forward: Forward, measured_um: np.ndarray, sigma_um: np.ndarray,
+        parameters: FreeParameters, nuisance: np.ndarray, remainder: np.ndarray | None,
+    ) -> None:  # fmt: skip
         self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
         self.parameters = parameters
         # None spares a solve in every step where readings deviate by noise alone.
@@ -243,23 +226,20 @@ class _Problem:
 
     def predict(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
         """(P,) readings [um]; ``terms`` are those of a vector that differs in gains only."""
-        if terms is None:
-            terms = self.terms(vector)
+        terms = terms or self.terms(vector)
         return terms.with_gains_um(self.parameters.decode(vector).patterns)
 
     def whitened(self, columns: np.ndarray) -> np.ndarray:
-        if self.lower is None:
-            return columns
-        return solve_triangular(self.lower, columns, lower=True)
+        return columns if self.lower is None else solve_triangular(self.lower, columns, lower=True)
 
     def residuals(self, vector: np.ndarray, terms: Terms | None = None) -> np.ndarray:
         misfit = self.whitened((self.predict(vector, terms) - self.measured) / self.sigma)
         return np.concatenate([misfit, self.prior.whiten(vector)])
 
     def jacobian(self, vector: np.ndarray) -> np.ndarray:
-        slopes = _derivatives_um(self.forward, self.parameters, vector, self.terms(vector))
-        data = self.whitened(slopes / self.sigma[:, np.newaxis])
-        return np.vstack([data, self.prior.whitening])
+        terms = self.terms(vector)
+        slopes = derivatives(self.forward, self.parameters, vector, self.sigma, terms)
+        return np.vstack([self.whitened(slopes), self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
         """The same with K1s such that the mean film is right: the rest is then close enough."""
@@ -267,11 +247,9 @@ class _Problem:
         weights = self.sigma**-2.0
         most = float(np.sum(weights * predicted**2))
         ratio = float(np.sum(weights * predicted * self.measured)) / most if most > 0 else 1.0
-        scaled = vector.copy()
-        pattern = self.parameters.pattern
-        scaled[[pattern.entries(row)[0] for row in range(pattern.count)]] += np.log(
-            max(ratio, 1e-3)
-        )
+        scaled, pattern = vector.copy(), self.parameters.pattern
+        levels = [pattern.entries(row)[0] for row in range(pattern.count)]
+        scaled[levels] += np.log(max(ratio, 1e-3))
         return np.clip(scaled, self.low, self.high)
 
     def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
@@ -304,19 +282,10 @@ class _Problem:
         found[[COS, SIN]] = solved[0, 2:] / ring[0]
         return np.clip(found, self.low, self.high)
 
-    def cost(self, vector: np.ndarray, terms: Terms) -> float:
-        return float(np.sum(self.residuals(vector, terms) ** 2))
-
     def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
         margin = 1e-9 * (self.high - self.low)
         return least_squares(
-            self.residuals,
-            np.clip(start, self.low + margin, self.high - margin),
-            jac=self.jacobian,
-            bounds=(self.low, self.high),
-            x_scale=self.prior.width,
-            max_nfev=most_steps,
-            ftol=1e-6,
-            xtol=1e-6,
-            gtol=1e-6,
-        )
+            self.residuals, np.clip(start, self.low + margin, self.high - margin),
+            jac=self.jacobian, bounds=(self.low, self.high), x_scale=self.prior.width,
+            max_nfev=most_steps, ftol=1e-6, xtol=1e-6, gtol=1e-6,
+        )  # fmt: skip

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import expit, logsumexp
 
-from paint_deposition.inference.fitting.smooth_fields import field_over_values, fields_over_parts
+from paint_deposition.inference.fitting.smooth_fields import field_over_values, root_of_field
 from paint_deposition.inference.readings.covariates import Covariate
 
 # The film's texture, as a share of it: what is usual, within a factor, and what is considered.
@@ -32,6 +32,8 @@ SHARES = (0.03, 0.1, 0.3)
 COVARIATE_LENGTH, PART_LENGTHS_M = 0.5, (0.1, 0.25)
 # Where the pattern is thin, a field is as large as where the film is this share of the mean.
 THINNEST = 0.2
+# Places on parts so far from each other have nothing in common [m].
+FAR_M = 1e6
 # Directions of a field below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-3
 
@@ -64,13 +66,9 @@ class FittedPoints:
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
-        some: dict[str, Any] = {
-            one.name: getattr(self, one.name)[rows]
-            for one in fields(self)
-            if one.name != 'covariates'
-        }
-        covariates = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
-        return FittedPoints(**some, covariates=covariates)
+        *arrays, covariates = (getattr(self, one.name) for one in fields(self))
+        some = tuple(Covariate(c.name, c.values[rows]) for c in covariates)
+        return FittedPoints(*(array[rows] for array in arrays), some)
 
 
 @dataclass(frozen=True)
@@ -94,24 +92,15 @@ class Scatter:
     @staticmethod
     def of(misfit: FittedPoints) -> 'Scatter':
         """Compute all models."""
-        fields = list(_fields(misfit))
         log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
-        weights, expected, sigmas = [], [], []
-        for field, log_share in fields:
+        found = []
+        for field, log_share in _fields(misfit):
             directions = np.hstack([misfit.free_um, field])
             for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
                 variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
                 likelihood, mean, sigma = _left_out(misfit.residual_um, variance, directions)
-                weights.append(likelihood + log_share + log_texture)
-                expected.append(mean)
-                sigmas.append(sigma)
-        return Scatter(
-            np.array(weights),
-            np.tile(TEXTURES, len(fields)),
-            np.array(expected),
-            np.array(sigmas),
-            misfit.residual_um,
-        )
+                found.append((likelihood + log_share + log_texture, texture, mean, sigma))
+        return Scatter(*map(np.array, zip(*found, strict=True)), misfit.residual_um)
 
     @property
     def texture_share(self) -> float:
@@ -160,12 +149,9 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
 
     Nothing; a field over the part; over one covariate; over all of them at once.
     """
-    film = np.hypot(
-        misfit.predicted_um, THINNEST * np.mean(misfit.predicted_um)
-    )[:, np.newaxis]  # fmt: skip
-    over_part = fields_over_parts(
-        misfit.experiment_of, misfit.positions_m, PART_LENGTHS_M, NEGLIGIBLE
-    )
+    film = np.hypot(misfit.predicted_um, THINNEST * np.mean(misfit.predicted_um))[:, np.newaxis]
+    apart = np.column_stack([misfit.positions_m, FAR_M * misfit.experiment_of])
+    over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in PART_LENGTHS_M]
     scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
     over = [field_over_values(values, COVARIATE_LENGTH, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
@@ -204,8 +190,8 @@ class Outlier:
     @property
     def guess_um(self) -> float | None:
         """What was probably read: a decimal point or two digits are in the wrong place."""
-        meant = [value for value in _miswritten(self.thickness_um) if self._fits(value)]
-        return min(meant, key=lambda value: abs(value - self.expected_um), default=None)
+        guess = min(_miswritten(self.thickness_um), key=lambda v: abs(v - self.expected_um))
+        return guess if abs(guess - self.expected_um) < NEAR * self.sigma_um else None
 
     def __str__(self) -> str:
         meant = '' if self.guess_um is None else f' ({self.guess_um:.4g}?)'
@@ -219,9 +205,6 @@ class Outlier:
         """As results name it."""
         names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um')
         return {name: getattr(self, name) for name in names}
-
-    def _fits(self, value: float) -> bool:
-        return abs(value - self.expected_um) < NEAR * self.sigma_um
 
 
 def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[float, float]]:

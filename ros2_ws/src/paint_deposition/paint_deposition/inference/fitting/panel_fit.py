@@ -6,6 +6,7 @@ fat edges have it, then makes a pattern far too wide, with intervals that know n
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
@@ -53,7 +54,7 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
     scale = panel.scale_m
     faster = panel.speed_m_per_s[0] / panel.speed_m_per_s
     places = panel.places_m / scale
-    area = max(float(measured_um.mean()) * 1.0, 1e-3)
+    area = max(float(measured_um.mean()), 1e-3)
 
     def film(x: np.ndarray) -> np.ndarray:
         gains, centres, sigmas = x[:3] * area, np.array([x[3], -x[4], 0.0]), np.exp(x[5:])
@@ -67,15 +68,11 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
         least_squares(
             lambda x: (film(x) - measured_um) / sigma_um,
             [1.0, 1.0, 1.0, radius, radius, *np.log([sigma, sigma, 1.5 * sigma])],
-            bounds=(low, high),
-            loss='soft_l1',
-            f_scale=ROBUST_AT,
-            x_scale=[1.0, 1.0, 1.0, 0.2, 0.2, 0.5, 0.5, 0.5],
-            max_nfev=60,
+            bounds=(low, high), loss='soft_l1', f_scale=ROBUST_AT,
+            x_scale=[1.0, 1.0, 1.0, 0.2, 0.2, 0.5, 0.5, 0.5], max_nfev=60,
         )
-        for radius in RADII
-        for sigma in SIGMAS
-    ]
+        for radius, sigma in product(RADII, SIGMAS)
+    ]  # fmt: skip
     best = min(found, key=lambda result: result.cost).x
     gain = best[:3] * area * scale
     sigma = np.exp(best[5:]) * scale
@@ -112,11 +109,6 @@ class Reach:
     beyond: tuple[float, float]
     needed_m: float
 
-    @property
-    def is_enough(self) -> bool:
-        """Whether both edges of the pattern were measured."""
-        return max(self.beyond) <= MOST_BEYOND
-
     def __str__(self) -> str:
         return (
             f'{self.name}: the readings end {self.ends_m[0]:.2f} and {self.ends_m[1]:.2f} m to '
@@ -133,19 +125,13 @@ def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[Reach, ..
     Of a brush there are none if one of its panels shows both edges, or where no part is a flat
     panel.
     """
-    panels = [(k, Panel.of(one)) for k, one in enumerate(campaign.experiments)]
     by_brush: dict[int, list[Reach]] = {}
-    for k, panel in panels:
-        if panel is not None:
-            of_brush = model.painting_with(panel.brush)
-            reach = _reach(k, campaign.experiments[k].name, panel, of_brush)
+    for k, one in enumerate(campaign.experiments):
+        if panel := Panel.of(one):
+            reach = _reach(k, one.name, panel, model.painting_with(panel.brush))
             by_brush.setdefault(panel.brush, []).append(reach)
-    return tuple(
-        reach
-        for found in by_brush.values()
-        if not any(reach.is_enough for reach in found)
-        for reach in found
-    )
+    short = (f for f in by_brush.values() if min(max(r.beyond) for r in f) > MOST_BEYOND)
+    return tuple(reach for found in short for reach in found)
 
 
 def shifts(
@@ -172,11 +158,10 @@ def shifts(
 
 
 def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reach:
-    best = None
+    reaches = []
     low, high = panel.across_m.min(), panel.across_m.max()
-    for line, speed, mirrored in zip(
-        panel.passes_m, panel.speed_m_per_s, panel.mirrored, strict=True
-    ):
+    passes = zip(panel.passes_m, panel.speed_m_per_s, panel.mirrored, strict=True)
+    for line, speed, mirrored in passes:
         collapse = sampled_collapse(
             model, speed, standoff_m=panel.distance_m, travel_rad=panel.travel_rad, turned=mirrored
         )
@@ -185,11 +170,8 @@ def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reac
         below, above = np.interp([low - line, high - line], x, landed, left=0.0, right=1.0)
         beyond = float(below), float(1.0 - above)
         ends = np.interp([MOST_BEYOND, 1.0 - MOST_BEYOND], landed, x)
-        reach = Reach(
-            number, name, panel.across_m, (float(line - low), float(high - line)), beyond,
-            float(np.abs(ends).max()),
-        )  # fmt: skip
-        if best is None or max(reach.beyond) < max(best.beyond):
-            best = reach
-    assert best is not None  # a panel has a pass
-    return best
+        to_ends = float(line - low), float(high - line)
+        reaches.append(
+            Reach(number, name, panel.across_m, to_ends, beyond, float(np.abs(ends).max()))
+        )
+    return min(reaches, key=lambda reach: max(reach.beyond))

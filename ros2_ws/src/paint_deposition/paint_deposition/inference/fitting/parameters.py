@@ -78,13 +78,12 @@ class EffectParameter:
     def of(effect: Effect, name: str) -> 'EffectParameter':
         """The entry of an effect's parameter."""
         info = effect.parameters()[name]
-        is_shape = info['role'] == 'shape'
-        low, high = info['low'], info['high']
-        unit = np.log(high / low) / SHAPE_DEVIATIONS if is_shape else info['typical']
-        coordinate = effect.coordinates()[name]
+        is_shape, low, high = info['role'] == 'shape', info['low'], info['high']
         return EffectParameter(
-            effect.id, name, info['neutral'], low, high, unit, is_shape, coordinate
-        )
+            effect.id, name, info['neutral'], low, high,
+            np.log(high / low) / SHAPE_DEVIATIONS if is_shape else info['typical'], is_shape,
+            effect.coordinates()[name],
+        )  # fmt: skip
 
     @property
     def offset(self) -> float:
@@ -99,12 +98,8 @@ class EffectParameter:
 
     def decode(self, entry: np.ndarray) -> np.ndarray:
         """Values for entries, kept within the bounds; arrays of any shape."""
-        entry = np.asarray(entry, dtype=float)
-        value = (
-            self.neutral * np.exp(self.unit * entry)
-            if self.is_shape
-            else self.neutral + self.unit * entry
-        )
+        away = self.unit * np.asarray(entry, dtype=float)
+        value = self.neutral * np.exp(away) if self.is_shape else self.neutral + away
         return np.clip(value, self.low, self.high)
 
 
@@ -172,12 +167,10 @@ class FreeParameters:
     @property
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
         """Lower and upper bounds of the vector."""
-        ends = [(c.low, c.high) for c in self.pattern.coordinates]
-        for entry in self.of_effects:
-            first, second = sorted((entry.encode(entry.low), entry.encode(entry.high)))
-            ends.append((first, second))
-        low, high = zip(*ends, strict=True)
-        return np.array(low), np.array(high)
+        ends = [[c.low, c.high] for c in self.pattern.coordinates]
+        ends += [sorted((e.encode(e.low), e.encode(e.high))) for e in self.of_effects]
+        low, high = np.array(ends).T
+        return low, high
 
     def are_physical(self, vectors: np.ndarray) -> np.ndarray:
         """(n,) bool, whether vectors (n, k) lie within the bounds, K3 <= 1 among them."""
@@ -189,9 +182,9 @@ class FreeParameters:
     @property
     def weak_prior(self) -> Prior:
         """Of the vector where nothing is known of this bell."""
-        centre = [c.centre for c in self.pattern.coordinates] + [0.0] * len(self.varied)
-        width = [c.width for c in self.pattern.coordinates] + [1.0] * len(self.varied)
-        return Prior(np.array(centre), np.diag(width))
+        of_pattern = [(c.centre, c.width) for c in self.pattern.coordinates]
+        centre, width = np.array(of_pattern + [(0.0, 1.0)] * len(self.varied)).T
+        return Prior(centre, np.diag(width))
 
     @cached_property
     def prior(self) -> Prior:
@@ -205,17 +198,13 @@ class FreeParameters:
         centre, covariance = weak.centre.copy(), np.diag(weak.width**2)
         scale = self.scale[own]
         centre[own] = (known.centre[of_known] - self.offset[own]) / scale
+        of_effects = EFFECT_BETWEEN_JOBS**2 * np.eye(len(self.varied))
+        between_jobs = block_diag(self.pattern.between_jobs, of_effects)
         covariance[np.ix_(own, own)] = (
             known.matrix[np.ix_(of_known, of_known)] / np.outer(scale, scale)
-            + self._between_jobs[np.ix_(own, own)]
+            + between_jobs[np.ix_(own, own)]
         )  # fmt: skip
         return Prior(centre, np.linalg.cholesky(covariance))
-
-    @property
-    def _between_jobs(self) -> np.ndarray:
-        """(k, k) covariance of the entries between jobs."""
-        of_effects = EFFECT_BETWEEN_JOBS**2 * np.eye(len(self.varied))
-        return block_diag(self.pattern.between_jobs, of_effects)
 
     def encode(self, model: DepositionModel) -> np.ndarray:
         """The vector of a model that has the varied effects, kept inside the bounds."""
@@ -226,10 +215,8 @@ class FreeParameters:
     def values(self, vectors: np.ndarray) -> np.ndarray:
         """(n, k) parameters in the model's units, pattern first, for vectors (n, k)."""
         count = len(self.pattern)
-        amounts = [
-            entry.decode(column)
-            for entry, column in zip(self.of_effects, vectors[:, count:].T, strict=True)
-        ]
+        columns = zip(self.of_effects, vectors[:, count:].T, strict=True)
+        amounts = [entry.decode(column) for entry, column in columns]
         return np.column_stack([self.pattern.values(vectors[:, :count]), *amounts])
 
     def decode(self, vector: np.ndarray) -> DepositionModel:

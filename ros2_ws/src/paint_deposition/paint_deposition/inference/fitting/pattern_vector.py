@@ -136,35 +136,26 @@ class PatternVector:
     def encode(self, patterns: Sequence[PlanarPattern]) -> list[float]:
         """The entries of these patterns."""
         found: list[float] = []
-        first = patterns[0]
         for row, p in enumerate(patterns):
             asymmetry = [p.K3 * np.cos(p.phi_rad), p.K3 * np.sin(p.phi_rad)]
             if row:
-                asymmetry = [np.log(max(p.K3, LEAST_K3) / max(first.K3, LEAST_K3))]
-            found += [
-                np.log(p.K1_cm3_per_s), p.K2, *asymmetry, p.r_m, np.log(p.sigma1_m),
-                np.log(p.sigma2_m),
-            ]  # fmt: skip
+                asymmetry = [np.log(max(p.K3, LEAST_K3) / max(patterns[0].K3, LEAST_K3))]
+            widths = np.log(p.sigma1_m), np.log(p.sigma2_m)
+            found += [np.log(p.K1_cm3_per_s), p.K2, *asymmetry, p.r_m, *widths]
         return found
 
     def values(self, vectors: np.ndarray) -> np.ndarray:
         """(n, 7 B) parameters in the model's units, see ``names``, for vectors (n, k)."""
-        log_k1, k2, cos, sin, r, log_sigma1, log_sigma2 = np.moveaxis(
-            self.of_patterns(vectors), 2, 0
-        )
+        of = np.moveaxis(self.of_patterns(vectors), 2, 0)
+        log_k1, k2, cos, sin, r, log_sigma1, log_sigma2 = of
         k3, phi = np.minimum(np.hypot(cos, sin), 1.0), np.arctan2(sin, cos)
         columns = [np.exp(log_k1), k2, k3, phi, r, np.exp(log_sigma1), np.exp(log_sigma2)]
         return np.stack(columns, axis=2).reshape(len(vectors), -1)
 
     def patterns(self, values: Sequence[float]) -> list[PlanarPattern]:
         """The patterns of parameters (7 B,)."""
-        size = len(PATTERN_NAMES)
-        return [
-            PlanarPattern(
-                **dict(zip(PATTERN_NAMES, values[size * k : size * (k + 1)], strict=True))
-            )
-            for k in range(self.count)
-        ]
+        each = np.reshape(values, (self.count, -1)).tolist()
+        return [PlanarPattern(**dict(zip(PATTERN_NAMES, own, strict=True))) for own in each]
 
 
 def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:

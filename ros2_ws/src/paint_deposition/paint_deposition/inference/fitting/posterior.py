@@ -21,17 +21,14 @@ OTHER_SETTING = 0.05
 def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> Posterior:
     """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is."""
     parameters = fit.parameters
-    names, scale = parameters.coordinates, parameters.scale
-    mean = parameters.offset + scale * fit.vector
+    scale = parameters.scale
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
-    rows = 0.5 * (covariance + covariance.T)
     known = parameters.known.readings if parameters.known else ()
-    return Posterior(
-        mean=dict(zip(names, map(float, mean), strict=True)),
-        covariance=dict(zip(names, rows.tolist(), strict=True)),
-        readings=(*known, *fingerprints(campaign)),
+    return Posterior.of(
+        parameters.coordinates, parameters.offset + scale * fit.vector,
+        0.5 * (covariance + covariance.T), readings=(*known, *fingerprints(campaign)),
         process=campaign.settings,
-    )
+    )  # fmt: skip
 
 
 def of_brushes(
@@ -56,10 +53,7 @@ def of_brushes(
     width = np.array([c.width for c in kept.coordinates])
     covariance = kept.in_common(width) + np.diag(deviations**2)
     names = [c.name for c in kept.coordinates]
-    return Posterior(
-        mean=dict(zip(names, map(float, kept.encode(start.patterns)), strict=True)),
-        covariance=dict(zip(names, covariance.tolist(), strict=True)),
-    )
+    return Posterior.of(names, np.array(kept.encode(start.patterns)), covariance)
 
 
 def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Posterior:
@@ -74,10 +68,7 @@ def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Post
     order = [known.names.index(name) for name in (*names, *of_effects)]
     matrix = linear @ known.matrix[np.ix_(order, order)] @ linear.T
     new = [*(c.name for c in kept.coordinates), *of_effects]
-    return known.model_copy(update={
-        'mean': dict(zip(new, mean.tolist(), strict=True)),
-        'covariance': dict(zip(new, matrix.tolist(), strict=True)),
-    })  # fmt: skip
+    return Posterior.of(new, mean, matrix, readings=known.readings, process=known.process)
 
 
 def usable(

@@ -64,8 +64,7 @@ class Amount:
         return abs(self.value) > NOTABLE * self.sd
 
     def __str__(self) -> str:
-        amount = f'{self.value:+.2f} ± {self.sd:.2f} {self.unit}'
-        return f'{self.kind} of {self.of}: {amount}'
+        return f'{self.kind} of {self.of}: {self.value:+.2f} ± {self.sd:.2f} {self.unit}'
 
 
 def random_effects(
@@ -113,10 +112,8 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
         rows = slice(first, first + count)
         values = kind.mixing @ mean[rows]
         deviations = np.sqrt(np.diag(kind.mixing @ covariance[rows, rows] @ kind.mixing.T))
-        found += [
-            Amount(kind.kind, name, float(value), float(deviation), kind.unit)
-            for name, value, deviation in zip(kind.names, values, deviations, strict=True)
-        ]
+        for name, value, sd in zip(kind.names, values, deviations, strict=True):
+            found.append(Amount(kind.kind, name, float(value), float(sd), kind.unit))
         first += count
     return tuple(found)
 

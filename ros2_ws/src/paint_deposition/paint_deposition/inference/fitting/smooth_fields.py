@@ -1,16 +1,15 @@
 """Smooth random fields over parts and covariates, as square roots of their covariances."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.distance import cdist
 
-# Places on parts so far from each other have nothing in common [m].
-FAR_M = 1e6
 # Roots that are kept: while models change, most places and lengths stay.
 ROOTS_KEPT = 128
+Correlation = Callable[[ArrayLike], np.ndarray]
 
 
 def smooth(away: ArrayLike) -> np.ndarray:
@@ -25,10 +24,7 @@ def with_edges(away: ArrayLike) -> np.ndarray:
 
 
 def root_of_field(
-    places: np.ndarray,
-    length: float,
-    negligible: float,
-    correlation: Callable[[ArrayLike], np.ndarray] = smooth,
+    places: np.ndarray, length: float, negligible: float, correlation: Correlation = smooth
 ) -> np.ndarray:
     """(N, n) square root of the covariance of a field of unit variance; not to be changed.
 
@@ -43,12 +39,9 @@ def root_of_field(
 
 @lru_cache(ROOTS_KEPT)
 def _root(
-    places: bytes,
-    shape: tuple[int, int],
-    length: float,
-    negligible: float,
-    correlation: Callable[[ArrayLike], np.ndarray],
-) -> np.ndarray:
+    places: bytes, shape: tuple[int, int], length: float, negligible: float,
+    correlation: Correlation,
+) -> np.ndarray:  # fmt: skip
     at = np.frombuffer(places).reshape(shape)
     values, vectors = np.linalg.eigh(correlation(cdist(at, at) / length))
     kept = values > negligible * values[-1]
@@ -60,16 +53,3 @@ def _root(
 def field_over_values(values: np.ndarray, length: float, negligible: float) -> np.ndarray:
     """(P, n) root of a field of unit variance over values (P,), with a length of correlation."""
     return root_of_field(values[:, np.newaxis], length, negligible)
-
-
-def fields_over_parts(
-    owner: np.ndarray, positions_m: np.ndarray, lengths_m: Iterable[float], negligible: float
-) -> list[np.ndarray]:
-    """Roots (P, n) of fields of unit variance over each part; parts share no field.
-
-    Args:
-        owner: (P,) part of each point. positions_m: (P, 3) [m].
-        negligible: as in ``root_of_field``.
-    """
-    apart = np.column_stack([positions_m, FAR_M * owner])
-    return [root_of_field(apart, length, negligible) for length in lengths_m]

@@ -58,8 +58,6 @@ class Study:
     Attributes:
         campaign: the experiments.
         forward: predicts the P points.
-        measured_um: (P,) means over repeats [um].
-        sigma_um: (P,) their standard deviations, with the film's texture [um].
         noise: of single readings.
         texture: of the film.
         outliers: single readings that were left out, see ``clean_and_fit``.
@@ -68,8 +66,6 @@ class Study:
 
     campaign: Campaign
     forward: Forward
-    measured_um: np.ndarray
-    sigma_um: np.ndarray
     noise: GaugeNoise
     texture: Texture = Texture()
     outliers: tuple[Outlier, ...] = ()
@@ -88,15 +84,19 @@ class Study:
         for experiment in campaign.experiments:
             check_unit(experiment.readings)
         noise = gauge_noise(campaign.readings)
-        campaign, noise = campaign.without(noise.gross), noise.without_gross()
-        mean_um, texture = campaign.means.mean_um, Texture()
-        sigma_um = _sigma_um(campaign, noise, texture, None)
-        return Study(campaign, Forward(campaign, effects), mean_um, sigma_um, noise, texture)
+        campaign = campaign.without(noise.gross)
+        return Study(campaign, Forward(campaign, effects), noise.select(~noise.gross))
 
-    def textured(self, texture: Texture) -> 'Study':
-        """The same with another texture."""
-        sigma_um = _sigma_um(self.campaign, self.noise, texture, self.facet_um)
-        return replace(self, texture=texture, sigma_um=sigma_um)
+    @property
+    def measured_um(self) -> np.ndarray:
+        """(P,) means over repeats [um]."""
+        return self.campaign.means.mean_um
+
+    @cached_property
+    def sigma_um(self) -> np.ndarray:
+        """(P,) standard deviation of the points: gauge, texture, what is not known of facets."""
+        facets_um = 0.0 if self.facet_um is None else FACETS_OFF * self.facet_um
+        return np.hypot(np.hypot(self.gauge_um, self.texture.share * self.measured_um), facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
         """The same with what facets cost under a model, if it shows beside the noise.
@@ -104,21 +104,14 @@ class Study:
         How much of it is true is fitted for each part: it is one of the nuisance directions. What
         it does not follow is noise of its own.
         """
-        facet_um = np.concatenate(
-            [
-                facet_errors_um(e.surface, e.measured_points, e.path, model)
-                for e in self.campaign.experiments
-            ]
-        )
+        parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
+        facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
         if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
             return self
-        sigma_um = _sigma_um(self.campaign, self.noise, self.texture, facet_um)
-        return replace(self, sigma_um=sigma_um, facet_um=facet_um)
+        return replace(self, facet_um=facet_um)
 
     def without(self, outliers: dict[int, Outlier]) -> 'Study':
         """The same without some points, by their row."""
-        if not outliers:
-            return self
         kept = ~np.isin(np.arange(len(self)), list(outliers))
         return replace(self.of_points(kept), outliers=tuple(outliers.values()))
 
@@ -130,35 +123,27 @@ class Study:
         """
         left_out = ~kept[self.campaign.means.owner]
         campaign = self.campaign.without(left_out)
-        noise = self.noise.select(~left_out)
+        forward = Forward(campaign, self.forward.effects)
         facet_um = None if self.facet_um is None else self.facet_um[kept]
-        return Study(
-            campaign, self.forward.at(campaign), campaign.means.mean_um,
-            _sigma_um(campaign, noise, self.texture, facet_um), noise, self.texture, self.outliers,
-            facet_um,
-        )  # fmt: skip
+        noise = self.noise.select(~left_out)
+        return Study(campaign, forward, noise, self.texture, self.outliers, facet_um)
 
     @property
     def gauge_um(self) -> np.ndarray:
         """(P,) standard deviation of the points from the gauge alone, without texture [um]."""
-        return _of_means(self.noise, self.campaign)
+        means = self.campaign.means
+        return np.sqrt(np.bincount(means.owner, self.noise.sigma_um**2)) / means.repeats
 
     def __len__(self) -> int:
         return len(self.measured_um)
 
     def fit(
-        self,
-        parameters: FreeParameters,
-        starts: int = 1,
-        seed: int = 0,
-        nuisance: np.ndarray | None = None,
-        remainder: np.ndarray | None = None,
-    ) -> Fit:
+        self, parameters: FreeParameters, starts: int = 1, seed: int = 0,
+        nuisance: np.ndarray | None = None, remainder: np.ndarray | None = None,
+    ) -> Fit:  # fmt: skip
         """Fit these parameters to the points; see ``fit_readings``."""
-        return fit_readings(
-            self.forward, self.measured_um, self.sigma_um, parameters, starts, seed, nuisance,
-            remainder,
-        )  # fmt: skip
+        data = self.forward, self.measured_um, self.sigma_um
+        return fit_readings(*data, parameters, starts, seed, nuisance, remainder)
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].
@@ -181,16 +166,12 @@ class Study:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks on the readings for the user."""
-        assumed = (
+        notes = [] if self.noise.source != 'assumed' else [
             'The noise of the gauge was assumed (0.7 µm and 1 %); take 6 or more repeats for '
-            'p-values that can be trusted.',
-        )
-        return (
-            *(assumed if self.noise.source == 'assumed' else ()),
-            *(() if self.texture.source == 'assumed' else (str(self.texture),)),
-            *self._facet_notes,
-            *self.left_out,
-        )
+            'p-values that can be trusted.'
+        ]  # fmt: skip
+        notes += [] if self.texture.source == 'assumed' else [str(self.texture)]
+        return (*notes, *self._facet_notes, *self.left_out)
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -230,11 +211,11 @@ class Study:
         if self.facet_um is None:
             return {}
         owner, over_noise = self.campaign.experiment_of, self.facet_um / self.sigma_um
-        found = {
-            experiment.name: np.where(owner == number, over_noise, 0.0)
+        return {
+            experiment.name: direction
             for number, experiment in enumerate(self.campaign.experiments)
+            if (direction := np.where(owner == number, over_noise, 0.0)).any()
         }
-        return {name: direction for name, direction in found.items() if direction.any()}
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
@@ -293,16 +274,3 @@ class Study:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""
         means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
         return np.round(means).astype(int)
-
-
-def _sigma_um(
-    campaign: Campaign, noise: GaugeNoise, texture: Texture, facet_um: np.ndarray | None
-) -> np.ndarray:
-    """(P,) standard deviation of the points: gauge, texture, and what is not known of facets."""
-    sigma_um = np.hypot(_of_means(noise, campaign), texture.share * campaign.means.mean_um)
-    return sigma_um if facet_um is None else np.hypot(sigma_um, FACETS_OFF * facet_um)
-
-
-def _of_means(noise: GaugeNoise, campaign: Campaign) -> np.ndarray:
-    means = campaign.means
-    return np.sqrt(np.bincount(means.owner, noise.sigma_um**2)) / means.repeats

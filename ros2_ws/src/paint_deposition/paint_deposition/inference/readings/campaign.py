@@ -56,15 +56,10 @@ class Experiment:
 
     @staticmethod
     def of(
-        name: str,
-        surface: Surface,
-        path: SprayPath,
-        readings: Readings,
-        files: dict[str, str] | None = None,
-        settings: Mapping[str, float] | None = None,
-        switched_off: frozenset[str] = frozenset(),
-        frame_id: str = '',
-    ) -> 'Experiment':
+        name: str, surface: Surface, path: SprayPath, readings: Readings,
+        files: dict[str, str] | None = None, settings: Mapping[str, float] | None = None,
+        switched_off: frozenset[str] = frozenset(), frame_id: str = '',
+    ) -> 'Experiment':  # fmt: skip
         """Match readings to the surface; those without groups get the rows or columns found.
 
         Raises:
@@ -87,6 +82,13 @@ class Experiment:
             settings or {}, switched_off, frame_id,
         )  # fmt: skip
 
+    def with_readings(self, readings: Readings) -> 'Experiment':
+        """The same part with other readings; raises what ``of`` does."""
+        return Experiment.of(
+            self.name, self.surface, self.path, readings, self.files, self.settings,
+            self.switched_off, self.frame_id,
+        )  # fmt: skip
+
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The same part without some of the readings (N,) that were used.
 
@@ -102,11 +104,7 @@ class Experiment:
             )
         used = self.used.copy()
         used[used] = ~left_out
-        kept = Experiment.of(
-            self.name, self.surface, self.path, self.taken.select(used), self.files,
-            self.settings, self.switched_off, self.frame_id,
-        )  # fmt: skip
-        return replace(kept, taken=self.taken, used=used)
+        return replace(self.with_readings(self.taken.select(used)), taken=self.taken, used=used)
 
     def __len__(self) -> int:
         return len(self.means.mean_um)
@@ -166,14 +164,13 @@ class Campaign:
     tolerance_um: float | None = None
 
     def __repr__(self) -> str:
-        names = ', '.join(experiment.name for experiment in self.experiments)
+        names = ', '.join(e.name for e in self.experiments)
         return f'Campaign({len(self.readings)} readings on {names})'
 
     def __post_init__(self) -> None:
         names = [experiment.name for experiment in self.experiments]
-        for name in names:
-            if names.count(name) > 1:
-                raise ReadingsError(f"two experiments are called '{name}'; rename one")
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise ReadingsError(f"two experiments are called '{twice[0]}'; rename one")
 
     def __len__(self) -> int:
         return len(self.means.mean_um)
@@ -229,7 +226,7 @@ class Campaign:
     def notes(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
         return tuple(
-            f'{experiment.name}: {line}'
-            for experiment in self.experiments
-            for line in left_out_lines(experiment.taken, experiment.used)
+            f'{e.name}: {line}'
+            for e in self.experiments
+            for line in left_out_lines(e.taken, e.used)
         )

@@ -94,13 +94,11 @@ class Rays:
         (M, 1) what the path is like, (M, P) how a ray lands, (1, P) what the surface is like.
         """
         points, path = self.experiment.measured_points, self.experiment.path.select(self.rows)
-        of_path = {name: values[:, np.newaxis] for name, values in along_path(path).items()}
-        of_points = {name: values()[np.newaxis] for name, values in at_points(points).items()}
         return {
             'incidence_deg': np.degrees(np.arccos(np.clip(self.cos_incidence, -1.0, 1.0))),
             'standoff_ratio': self.standoff_ratio,
-            **of_path,
-            **of_points,
+            **{name: values[:, np.newaxis] for name, values in along_path(path).items()},
+            **{name: values()[np.newaxis] for name, values in at_points(points).items()},
             'tool_x_m': self.x_m,
             'tool_y_m': self.y_m,
             'film_um': self.share.sum(axis=0)[np.newaxis],

@@ -39,17 +39,16 @@ def usual_noise_um(thickness_um: np.ndarray) -> np.ndarray:
 def gross_outliers(readings: Readings) -> np.ndarray:
     """(N,) whether a reading contradicts the others at its point.
 
-    Of three or more readings at a point, those far from their median are outliers. Where no
-    majority is left, as with two that disagree, nothing says which one is wrong, and all of them
-    are outliers. The scale is pooled over all points; readings with a stated noise have a scale
-    of their own.
+    Of three or more readings at a point, those far from their median are outliers; where no
+    majority is left, as with two that disagree, all of them. The scale is pooled over all points;
+    readings with a stated noise have a scale of their own.
     """
-    thickness, stated = readings.thickness_um, readings.sigma_um
-    owner, gross = PointMeans.of(readings).owner, np.zeros(len(thickness), dtype=bool)
+    stated, gross = readings.sigma_um, np.zeros(len(readings), dtype=bool)
     for pool in (np.isnan(stated), np.isfinite(stated)):
         if pool.any():
-            _, compact = np.unique(owner[pool], return_inverse=True)
-            gross[pool] = _Repeats(thickness[pool], stated[pool], compact).gross()
+            own = readings.select(pool)
+            repeats = _Repeats(own.thickness_um, own.sigma_um, PointMeans.of(own).owner)
+            gross[pool] = repeats.gross()
     return gross
 
 
@@ -151,10 +150,6 @@ class GaugeNoise:
         """Root mean square over the readings [um]."""
         return root_mean_square(self.sigma_um)
 
-    def without_gross(self) -> 'GaugeNoise':
-        """The noise of the readings that are no gross outliers."""
-        return self.select(~self.gross)
-
     def select(self, rows: np.ndarray) -> 'GaugeNoise':
         """The noise of some of the readings, by mask or indices."""
         return replace(self, sigma_um=self.sigma_um[rows], gross=self.gross[rows])
@@ -177,9 +172,8 @@ def gauge_noise(readings: Readings) -> GaugeNoise:
     film = means.mean_um[means.owner]
     squares = float(np.sum(((counted.thickness_um - film) / usual_noise_um(film)) ** 2))
     freedom = len(counted) - len(means.first)
-    if freedom < ENOUGH_REPEATS or squares == 0.0:
-        sigma = np.where(np.isfinite(stated), stated, usual)
-        return GaugeNoise(sigma, 'assumed', ASSUMED_FREEDOM, gross)
-    scaled = usual * np.sqrt(squares / freedom)
+    known = freedom >= ENOUGH_REPEATS and squares > 0.0
+    scaled = usual * np.sqrt(squares / freedom) if known else usual
     sigma = np.where(np.isfinite(stated), stated, scaled)
-    return GaugeNoise(sigma, 'repeats', float(freedom), gross)
+    of = ('repeats', float(freedom)) if known else ('assumed', ASSUMED_FREEDOM)
+    return GaugeNoise(sigma, *of, gross)

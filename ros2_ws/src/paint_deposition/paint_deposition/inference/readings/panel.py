@@ -48,9 +48,7 @@ class Panel:
         positions = experiment.measured_points.positions_m
         outward = normals.mean(axis=0)
         outward /= np.linalg.norm(outward)
-        if (normals @ outward).min() < FLAT_COSINE:
-            return None
-        if len(experiment.brushes) != 1:
+        if (normals @ outward).min() < FLAT_COSINE or len(experiment.brushes) != 1:
             return None
         path = experiment.path.select(experiment.path.flow > 0.0)
         passes = [path.select(path.spray_pass == n) for n in np.unique(path.spray_pass)]
@@ -61,17 +59,15 @@ class Panel:
         travels /= np.linalg.norm(travels, axis=1, keepdims=True)
         travel = travels[0]
         axes = np.array([np.median(p.rotation, axis=0) for p in passes])
-        if np.abs(travels @ travel).min() < PARALLEL_COSINE:
-            return None
-        if (-axes[:, :, 2] @ outward).min() < SQUARE_COSINE:
-            return None
-        across = np.cross(-outward, travel)
+        across, turned = np.cross(-outward, travel), axes[:, :, 0] @ axes[0, :, 0]
         # The first sub-steps of a pass may still be counted with the pass before.
         spread = [np.ptp(np.quantile(p.position_m @ across, INNER)) for p in passes]
-        if max(spread) > STRAIGHT_M:
-            return None
-        turned = axes[:, :, 0] @ axes[0, :, 0]
-        if np.abs(turned).min() < PARALLEL_COSINE:
+        if (
+            np.abs(travels @ travel).min() < PARALLEL_COSINE
+            or (-axes[:, :, 2] @ outward).min() < SQUARE_COSINE
+            or np.abs(turned).min() < PARALLEL_COSINE
+            or max(spread) > STRAIGHT_M
+        ):
             return None
         height = np.mean([np.median(p.position_m @ outward) for p in passes])
         return Panel(
@@ -96,14 +92,13 @@ class Panel:
 
         Passes count as endless; effects on the finished film are left out.
         """
-        film, of_brush = np.zeros(len(across_m)), model.painting_with(self.brush)
-        for line, speed, mirrored in zip(
-            self.passes_m, self.speed_m_per_s, self.mirrored, strict=True
-        ):
-            film += collapse_um(
-                of_brush, across_m - line, speed, self.distance_m, self.travel_rad, turned=mirrored
-            )
-        return film
+        of_brush, at = model.painting_with(self.brush), (self.distance_m, self.travel_rad)
+        passes = zip(self.passes_m, self.speed_m_per_s, self.mirrored, strict=True)
+        films = [
+            collapse_um(of_brush, across_m - line, speed, *at, turned=mirrored)
+            for line, speed, mirrored in passes
+        ]
+        return np.sum(films, axis=0)
 
     @property
     def places_m(self) -> np.ndarray:

@@ -30,38 +30,34 @@ def refuse_off_surface(
     surface: Surface, readings: Readings, means: PointMeans, distance_m: np.ndarray
 ) -> None:
     """Refuse points (P,) that are this far from the surface [m]."""
-    far = np.flatnonzero(distance_m > MAX_DISTANCE_M)
-    if not len(far):
-        if _lie_on_a_spot(surface, readings.positions_m):
-            hint = _hint(surface, readings.positions_m)
-            raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
-        return
-    worst = far[np.argmax(distance_m[far])]
-    where = ', '.join(f'{value:.3f}' for value in readings.positions_m[means.first[worst]])
-    raise ReadingsError(
-        f"{readings.source}: {len(far)} of {len(distance_m)} points lie off the part's surface, "
-        f"point '{readings.point[means.first[worst]]}' at ({where}) m by {distance_m[worst]:.3f} "
-        f'm (limit {MAX_DISTANCE_M:g}); {_hint(surface, readings.positions_m)}'
-    )
+    places_m = readings.positions_m
+    far = np.count_nonzero(distance_m > MAX_DISTANCE_M)
+    if far:
+        worst = int(np.argmax(distance_m))
+        where = ', '.join(f'{value:.3f}' for value in places_m[means.first[worst]])
+        raise ReadingsError(
+            f"{readings.source}: {far} of {len(distance_m)} points lie off the part's surface, "
+            f"point '{readings.point[means.first[worst]]}' at ({where}) m by "
+            f'{distance_m[worst]:.3f} m (limit {MAX_DISTANCE_M:g}); {_hint(surface, places_m)}'
+        )
+    # Readings that huddle on a spot of the part, and fit if they are a thousand times larger.
+    longest = np.ptp(surface.vertices_m, axis=0).max()
+    huddled = len(places_m) > 1 and np.ptp(places_m, axis=0).max() < SPOT * longest
+    if huddled and _fits(surface, 1000.0 * places_m):
+        hint = _hint(surface, places_m)
+        raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
 
 
 def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
     """Refuse points whose normals (P,) are turned this far from the surface's [rad]."""
-    away = np.flatnonzero(angle_rad > MAX_ANGLE_RAD)
-    if len(away):
-        worst = away[np.argmax(angle_rad[away])]
+    away = np.count_nonzero(angle_rad > MAX_ANGLE_RAD)
+    if away:
+        worst = int(np.argmax(angle_rad))
         raise ReadingsError(
-            f'{readings.source}: {len(away)} of {len(angle_rad)} normals point away from the '
+            f'{readings.source}: {away} of {len(angle_rad)} normals point away from the '
             f"surface, point '{readings.point[means.first[worst]]}' by "
             f'{np.degrees(angle_rad[worst]):.0f} deg; give outward normals'
         )
-
-
-def _lie_on_a_spot(surface: Surface, positions_m: np.ndarray) -> bool:
-    """Whether readings (N, 3) [m] huddle on a spot of the part and fit a thousand times larger."""
-    longest = np.ptp(surface.vertices_m, axis=0).max()
-    huddled = len(positions_m) > 1 and np.ptp(positions_m, axis=0).max() < SPOT * longest
-    return bool(huddled) and _fits(surface, 1000.0 * positions_m)
 
 
 def _hint(surface: Surface, positions_m: np.ndarray) -> str:
@@ -74,9 +70,8 @@ def _hint(surface: Surface, positions_m: np.ndarray) -> str:
     distance = surface.locate(positions_m).distance_m
     if np.median(distance) < NEAR_M:
         return f'{boxes}; most points lie on the part: check these'
-    extents = np.ptp(positions_m, axis=0), np.ptp(vertices, axis=0)
-    fits = bool((np.sort(extents[0]) <= (1.0 + ALIKE) * np.sort(extents[1]) + NEAR_M).all())
-    if fits:
+    sides, part = (np.sort(np.ptp(each, axis=0)) for each in (positions_m, vertices))
+    if np.all(sides <= (1.0 + ALIKE) * part + NEAR_M):
         return f'{boxes}; they look like positions in another frame: give them in the mesh frame'
     return f'{boxes}; give positions in the mesh frame, in metres, or name their unit with unit:'
 

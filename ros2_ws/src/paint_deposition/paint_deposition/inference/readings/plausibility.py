@@ -13,7 +13,7 @@ from paint_deposition.inference.readings.readings import Readings
 
 # The pattern has seven parameters, and a fit needs a few points more.
 FEWEST_POINTS = 10
-UM_PER_MIL, UM_PER_MM = 25.4, 1000.0
+UNITS = {'mils': 25.4, 'mm': 1000.0}  # um in each
 # No paint film is thinner than this everywhere; such numbers are mils or millimetres.
 THINNEST_FILM_UM = 3.0
 THINNEST_MILS = 0.15
@@ -40,10 +40,10 @@ def check_unit(readings: Readings) -> None:
     """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
     if highest < THINNEST_FILM_UM:
-        unit, factor = ('mils', UM_PER_MIL) if highest > THINNEST_MILS else ('mm', UM_PER_MM)
+        unit = 'mils' if highest > THINNEST_MILS else 'mm'
         raise ReadingsError(
             f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
-            f'multiply by {factor:g}'
+            f'multiply by {UNITS[unit]:g}'
         )
 
 
@@ -61,7 +61,20 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
             f"{readings.source}: point '{readings.point[worst]}' reads {film[worst]:g} µm; film "
             'is not negative, zero the gauge on bare metal'
         )
-    _refuse_mixed_units(readings)
+    film = np.sort(film[film > 0.0])
+    if len(film) < 2:
+        return
+    ratio = film[1:] / film[:-1]
+    cut = int(np.argmax(ratio))
+    low, high = film[: cut + 1], film[cut + 1 :]
+    # Readings beside the pattern are small, too, but they differ among themselves.
+    apart = ratio[cut] >= LEAST_GAP and low.max() <= LEAST_GAP * low.min()
+    if not apart or np.median(high) < THINNEST_FILM_UM:
+        return
+    factor = float(np.median(high) / np.median(low))
+    for unit, exact in UNITS.items():
+        if exact / UNIT_SLACK < factor < exact * UNIT_SLACK:
+            raise _other_unit(readings, low, high, unit)
 
 
 def check_panel(
@@ -103,37 +116,19 @@ def check_units_beside(
     """
     thick = (expected_um > THINNEST_FILM_UM) & (measured_um > 0.0)
     ratio = np.where(thick, expected_um, 1.0) / np.where(thick, measured_um, 1.0)
-    for unit, exact in (('mils', UM_PER_MIL), ('mm', UM_PER_MM)):
+    for unit, exact in UNITS.items():
         strange = (ratio > exact / UNIT_SLACK) & (ratio < exact * UNIT_SLACK)
         if strange.any():
-            raise _other_unit(readings, measured_um[strange], expected_um[strange], unit, exact)
-
-
-def _refuse_mixed_units(readings: Readings) -> None:
-    film = np.sort(readings.thickness_um[readings.thickness_um > 0.0])
-    if len(film) < 2:
-        return
-    ratio = film[1:] / film[:-1]
-    cut = int(np.argmax(ratio))
-    if ratio[cut] < LEAST_GAP:
-        return
-    low, high = film[: cut + 1], film[cut + 1 :]
-    factor = float(np.median(high) / np.median(low))
-    # Readings beside the pattern are small, too, but they differ among themselves.
-    if np.median(high) < THINNEST_FILM_UM or low.max() > LEAST_GAP * low.min():
-        return
-    for unit, exact in (('mils', UM_PER_MIL), ('mm', UM_PER_MM)):
-        if exact / UNIT_SLACK < factor < exact * UNIT_SLACK:
-            raise _other_unit(readings, low, high, unit, exact)
+            raise _other_unit(readings, measured_um[strange], expected_um[strange], unit)
 
 
 def _other_unit(
-    readings: Readings, strange: np.ndarray, others_um: np.ndarray, unit: str, factor: float
+    readings: Readings, strange: np.ndarray, others_um: np.ndarray, unit: str
 ) -> ReadingsError:
     return ReadingsError(
         f'{readings.source}: {len(strange)} of the readings are about {np.median(strange):.3g} '
         f'where {np.median(others_um):.3g} µm is expected; they look like {unit}, multiply '
-        f'them by {factor:g}'
+        f'them by {UNITS[unit]:g}'
     )
 
 

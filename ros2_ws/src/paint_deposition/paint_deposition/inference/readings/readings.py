@@ -51,16 +51,10 @@ class Readings:
     def of(positions_m: ArrayLike, thickness_um: Sized, **columns: Any) -> 'Readings':
         """Readings with defaults for the columns not given: every one a point of its own."""
         count = len(thickness_um)
-        defaults = {
-            'point': np.array([f'{k + 1}' for k in range(count)]),
-            'group': np.full(count, ''),
-            'sigma_um': np.full(count, np.nan),
-        }
-        return Readings(
-            np.asarray(positions_m, dtype=float),
-            np.asarray(thickness_um, dtype=float),
-            **(defaults | columns),
-        )
+        defaults = {'point': np.array([f'{k + 1}' for k in range(count)]),
+                    'group': np.full(count, ''), 'sigma_um': np.full(count, np.nan)}  # fmt: skip
+        positions, film = (np.asarray(each, dtype=float) for each in (positions_m, thickness_um))
+        return Readings(positions, film, **(defaults | columns))
 
     @staticmethod
     def joined(parts: Mapping[str, 'Readings']) -> 'Readings':
@@ -69,26 +63,19 @@ class Readings:
         So does the session where a part's readings have none. The normals are left out.
         """
         columns = ('positions_m', 'thickness_um', 'group', 'sigma_um')
+        sessions = [np.where(part.session == '', n, part.session) for n, part in parts.items()]
         return Readings(
             point=np.array([f'{name}: {p}' for name, part in parts.items() for p in part.point]),
             source=', '.join(part.source for part in parts.values()),
-            session=np.concatenate(
-                [np.where(part.session == '', name, part.session) for name, part in parts.items()]
-            ),
-            **{
-                column: np.concatenate([getattr(part, column) for part in parts.values()])
-                for column in columns
-            },
+            session=np.concatenate(sessions),
+            **{c: np.concatenate([getattr(p, c) for p in parts.values()]) for c in columns},
         )
 
     def select(self, rows: np.ndarray | slice) -> 'Readings':
         """The chosen rows, by mask or indices."""
         names = ('positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session')
-        columns = {name: getattr(self, name) for name in names}
-        some: dict[str, Any] = {
-            name: None if c is None else c[rows] for name, c in columns.items()
-        }
-        return replace(self, **some)
+        some: dict[str, Any] = {n: getattr(self, n) for n in names}
+        return replace(self, **{n: c if c is None else c[rows] for n, c in some.items()})
 
     @property
     def fingerprint(self) -> str:

@@ -40,11 +40,6 @@ class Residuals:
         return self.measured_um - self.predicted_um
 
     @property
-    def painted(self) -> np.ndarray:
-        """(N,) whether the model predicts paint there."""
-        return self.predicted_um > DEFAULT_PAINTED_ABOVE_UM
-
-    @property
     def bias_um(self) -> float:
         """Mean residual [um]."""
         return float(self.residual_um.mean())
@@ -53,6 +48,11 @@ class Residuals:
     def rmse_um(self) -> float:
         """Root mean square residual [um]."""
         return root_mean_square(self.residual_um)
+
+    @property
+    def painted(self) -> np.ndarray:
+        """(N,) whether the model predicts paint there."""
+        return self.predicted_um > DEFAULT_PAINTED_ABOVE_UM
 
     @property
     def rmse_painted_um(self) -> float:
