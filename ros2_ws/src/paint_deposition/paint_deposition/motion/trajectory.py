@@ -58,8 +58,7 @@ class Trajectory:
         frame_id: frame of the poses, '' where the recording does not say.
         trigger_stamps_ns: (M,) int64 times at which the flow changes; empty: always spraying.
         trigger_flow: (M,) from that time on, relative to the calibrated one; 0 is gun off, as it
-        is
-            before the first of them.
+            is before the first of them.
         trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one.
         trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
             magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.

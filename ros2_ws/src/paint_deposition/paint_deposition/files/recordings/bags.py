@@ -133,7 +133,8 @@ def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
         )
     values = np.array(rows, dtype=float)
     positions, quaternions = map(np.ascontiguousarray, np.split(values, [3], axis=1))
-    trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, *frames)
+    frame_id = next(iter(frames), '')
+    trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, frame_id)
     return trajectory, np.array(log_times, np.int64)
 
 
@@ -196,7 +197,7 @@ def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = Fal
 
 def _state(
     types: Typestore, kind: str, header: Any, flow: float, brush: int, set_points: tuple
-) -> object:
+) -> Any:
     """The gun with flow, relative to the calibrated one, brush and set-points."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
@@ -205,7 +206,7 @@ def _state(
     return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
 
 
-def _placed(types: Typestore, kind: str, place: str, values: Sequence[float]) -> object:
+def _placed(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:
     """A Pose of a Point or a Transform of a Vector3, with its quaternion."""
     make = types.types
     turn = make['geometry_msgs/msg/Quaternion'](*values[3:])

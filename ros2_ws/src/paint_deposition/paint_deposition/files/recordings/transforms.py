@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import networkx as nx
 import numpy as np
@@ -113,7 +114,7 @@ class _Way:
         for edge in self.edges:
             # It takes the scalar of a quaternion first.
             scalar_first = edge.poses[:, [0, 1, 2, 6, 3, 4, 5]]
-            moved = StaticTransform(transform_from_pq(scalar_first[0]))
+            moved: Any = StaticTransform(transform_from_pq(scalar_first[0]))
             if len(edge.stamps_ns) > 1:
                 times_s = (edge.stamps_ns - stamps_ns[0]) * 1e-9
                 moved = NumpyTimeseriesTransform(times_s, scalar_first, time_clipping=True)
@@ -150,8 +151,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
     clock = max(way.moving, key=lambda edge: len(edge.stamps_ns))
     moving = [edge for edge in way.moving if len(edge.stamps_ns) > 1]
-    known = _covered(moving, clock.stamps_ns)
-    stamps = clock.stamps_ns[known]
+    stamps = clock.stamps_ns[_covered(moving, clock.stamps_ns)]
     if len(stamps) < 2:
         raise RecordingError(
             f"{bag.path}: the transforms from '{source}' to '{target}' are never known together"

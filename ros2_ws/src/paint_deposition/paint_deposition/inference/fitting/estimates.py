@@ -78,8 +78,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
         else:
             entry = k - len(pattern.names) + len(pattern)
             reason = '' if learned[entry] else 'its effect hardly shows at these points'
-        figures = (float(of[k]) for of in (values, sigma, low, high))
-        found.append(Estimate(name, *figures, not reason, reason))
+        value, sd, least, most = (float(of[k]) for of in (values, sigma, low, high))
+        found.append(Estimate(name, value, sd, least, most, not reason, reason))
     return tuple(found)
 
 

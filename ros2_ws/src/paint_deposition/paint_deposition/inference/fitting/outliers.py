@@ -11,7 +11,7 @@ closed form (Rasmussen & Williams, Gaussian Processes for Machine Learning, 2006
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -66,9 +66,10 @@ class FittedPoints:
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
-        *arrays, covariates = (getattr(self, one.name) for one in fields(self))
-        some = tuple(Covariate(c.name, c.values[rows]) for c in covariates)
-        return FittedPoints(*(array[rows] for array in arrays), some)
+        names = [one.name for one in fields(self) if one.name != 'covariates']
+        arrays: dict[str, Any] = {name: getattr(self, name)[rows] for name in names}
+        some = tuple(Covariate(c.name, c.values[rows]) for c in self.covariates)
+        return replace(self, covariates=some, **arrays)
 
 
 @dataclass(frozen=True)
@@ -100,7 +101,8 @@ class Scatter:
                 variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
                 likelihood, mean, sigma = _left_out(misfit.residual_um, variance, directions)
                 found.append((likelihood + log_share + log_texture, texture, mean, sigma))
-        return Scatter(*map(np.array, zip(*found, strict=True)), misfit.residual_um)
+        log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
+        return Scatter(log_weight, textures, mean, sigma, misfit.residual_um)
 
     @property
     def texture_share(self) -> float:

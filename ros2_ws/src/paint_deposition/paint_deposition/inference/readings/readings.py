@@ -74,8 +74,9 @@ class Readings:
     def select(self, rows: np.ndarray | slice) -> 'Readings':
         """The chosen rows, by mask or indices."""
         names = ('positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session')
-        some: dict[str, Any] = {n: getattr(self, n) for n in names}
-        return replace(self, **{n: c if c is None else c[rows] for n, c in some.items()})
+        columns = {n: getattr(self, n) for n in names}
+        some: dict[str, Any] = {n: c if c is None else c[rows] for n, c in columns.items()}
+        return replace(self, **some)
 
     @property
     def fingerprint(self) -> str:

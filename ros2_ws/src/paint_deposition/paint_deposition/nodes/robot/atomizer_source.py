@@ -90,7 +90,9 @@ class AtomizerSource(PaintNode):
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
         # The joints and the signals that have no publisher yet.
-        self._missing = {signal.topic: self._take_signals for signal in self._signals.values()}
+        self._missing: dict[str, Callable[..., None]] = {
+            signal.topic: self._take_signals for signal in self._signals.values()
+        }
         self._motion = self._motion_of_robot()
         self._values: dict[str, float] = {}
         self._published = ''

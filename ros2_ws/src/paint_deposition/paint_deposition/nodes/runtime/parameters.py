@@ -173,8 +173,10 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
 
 def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> ParameterTable:
     """The same rows, none of which can change while the node runs, with the reason."""
-    reason = {'fixed_because': because, 'fixed_while': fixed_while}
-    return {name: replace(row, **reason) for name, row in rows.items()}
+    return {
+        name: replace(row, fixed_because=because, fixed_while=fixed_while)
+        for name, row in rows.items()
+    }
 
 
 def read_to_configure(because: str, **rows: NodeParameter) -> ParameterTable:
