@@ -63,11 +63,7 @@ def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
     motion = replace(weaving(TIMES_S), **CHANGES)
     both = painted(motion, MODEL, precision='double')
     apart = [
-        painted(
-            with_one_brush(motion, n),
-            DepositionModel(planar=planar),
-            precision='double',
-        )
+        painted(with_one_brush(motion, n), DepositionModel(planar=planar), precision='double')
         for n, planar in ((1, NARROW), (2, WIDE))
     ]
     total = sum(one.film_um for one in apart)

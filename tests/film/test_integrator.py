@@ -11,13 +11,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
-from scenes import (
-    LOOKING_DOWN,
-    lying_plane,
-    stamps_ns,
-    straight_pass,
-    weaving,
-)
+from scenes import LOOKING_DOWN, lying_plane, stamps_ns, straight_pass, weaving
 
 MODEL = DepositionModel()
 # All of it lands within 0.3 m of the axis at the standoffs used here.
@@ -104,11 +98,7 @@ def exact():
 
 @pytest.mark.parametrize(
     ('trajectory', 'limit'),
-    [
-        (sampled_evenly(0.02), 1e-3),
-        (sampled_evenly(0.001), 1e-4),
-        (sampled_unevenly(), 1e-3),
-    ],
+    [(sampled_evenly(0.02), 1e-3), (sampled_evenly(0.001), 1e-4), (sampled_unevenly(), 1e-3)],
     ids=['50 Hz', '1 kHz', '1 to 24 ms with repeats'],
 )
 @pytest.mark.parametrize('precision', ['single', 'double'])

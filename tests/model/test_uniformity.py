@@ -10,10 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
-from paint_deposition.model.eq4_eq5_uniformity import (
-    ParallelPasses,
-    variation,
-)
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses, variation
 
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,

@@ -75,17 +75,13 @@ RESIDUAL_PALETTE = _palette(COOLWARM, (0, 150, 136), (255, 160, 0))
 
 @dataclass(frozen=True)
 class ColourScale:
-    """Which value has which colour.
+    """Which value has which colour."""
 
-    Attributes:
-        low, high: ends of the map, in the unit of the values; below and above are the palette's
-            under and over colours.
-        palette: (259, 4) uint8 RGBA.
-    """
-
+    # Ends of the map, in the unit of the values; below and above are the palette's under and over
+    # colours.
     low: float
     high: float
-    palette: np.ndarray
+    palette: np.ndarray  # (259, 4) uint8 RGBA
 
     def rows(self, values: np.ndarray, shown: np.ndarray) -> np.ndarray:
         """(V,) row of the palette for each value (V,); bare where not ``shown`` (V,) bool."""

@@ -55,17 +55,11 @@ def _threads(rays: int) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Steps:
-    """What the kernel reads of a path.
+    """What the kernel reads of a path."""
 
-    Attributes:
-        rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
-        sight: what is seen on them.
-        brush: (M,) row among the model's patterns of the one that sprays.
-    """
-
-    rows: np.ndarray
-    sight: Sight
-    brush: np.ndarray
+    rows: np.ndarray  # (M, 16) sub-steps that spray, see ``layout.step_rows``
+    sight: Sight  # what is seen on them
+    brush: np.ndarray  # (M,) row among the model's patterns of the one that sprays
 
     def __len__(self) -> int:
         return len(self.rows)

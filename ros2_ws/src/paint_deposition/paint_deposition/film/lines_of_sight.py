@@ -33,17 +33,12 @@ class Obstacle(Protocol):
 
 @dataclass(frozen=True)
 class Sight:
-    """What is seen on the sub-steps of a path.
+    """What is seen on the sub-steps of a path."""
 
-    Attributes:
-        seen: (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
-        first: (S, B) where in ``seen`` the run of a tracing and a block begins.
-        tracing: (M,) row of ``first`` that holds on each sub-step.
-    """
-
+    # (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
     seen: np.ndarray
-    first: np.ndarray
-    tracing: np.ndarray
+    first: np.ndarray  # (S, B) where in ``seen`` the run of a tracing and a block begins
+    tracing: np.ndarray  # (M,) row of ``first`` that holds on each sub-step
 
     def select(self, steps: np.ndarray) -> Sight:
         """On some of the sub-steps."""

@@ -14,15 +14,10 @@ FEWEST_POINTS = 32
 
 @dataclass(frozen=True)
 class ParallelPasses:
-    """Endless parallel passes at an even index.
+    """Endless parallel passes at an even index."""
 
-    Attributes:
-        first: collapse of every other pass, one of them at x = 0.
-        second: collapse of the passes between; the same object if all passes are alike.
-    """
-
-    first: Collapse
-    second: Collapse
+    first: Collapse  # collapse of every other pass, one of them at x = 0
+    second: Collapse  # collapse of the passes between; the same object if all passes are alike
 
     @staticmethod
     def one_way(collapse: Collapse) -> 'ParallelPasses':
@@ -99,15 +94,10 @@ class ParallelPasses:
 
 @dataclass(frozen=True)
 class Variation:
-    """A film between two limits.
+    """A film between two limits."""
 
-    Attributes:
-        mean_um: [um].
-        sigma_n: standard deviation over the mean [1].
-    """
-
-    mean_um: float
-    sigma_n: float
+    mean_um: float  # [um]
+    sigma_n: float  # standard deviation over the mean [1]
 
 
 def variation(passes: list[tuple[Collapse, float]], low_m: float, high_m: float) -> Variation:

@@ -50,17 +50,12 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Edges:
-    """Which half-edges lie on each other.
+    """Which half-edges lie on each other."""
 
-    Attributes:
-        paired: (E, 2) of two triangles with the same winding, in the order of their vertices.
-        clashing: (C, 2) of two triangles of opposite winding.
-        single: (B,) those without a partner, or with several.
-    """
-
+    # (E, 2) of two triangles with the same winding, in the order of their vertices.
     paired: np.ndarray
-    clashing: np.ndarray
-    single: np.ndarray
+    clashing: np.ndarray  # (C, 2) of two triangles of opposite winding
+    single: np.ndarray  # (B,) those without a partner, or with several
 
     @staticmethod
     def of(faces: np.ndarray) -> 'Edges':

@@ -33,21 +33,16 @@ NEAR_EDGES = 8
 
 @dataclass(frozen=True)
 class CurvedEdges:
-    """Middles of the E edges of a mesh at which it is furthest from a curve.
+    """Middles of the E edges of a mesh at which it is furthest from a curve."""
 
-    Attributes:
-        middles_m, normals: (E, 3) as the refined mesh has them [m], and outward unit normals.
-        curved_m, curved_normals: (E, 3) as the curve has them.
-        lengths_m: (E,) of the edges as they were read [m].
-        turns_rad: (E,) by which the normals turn along the edge [rad].
-    """
-
+    # (E, 3) as the refined mesh has them [m], and outward unit normals.
     middles_m: np.ndarray
     normals: np.ndarray
+    # (E, 3) as the curve has them.
     curved_m: np.ndarray
     curved_normals: np.ndarray
-    lengths_m: np.ndarray
-    turns_rad: np.ndarray
+    lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
+    turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
 
     def __len__(self) -> int:
         return len(self.lengths_m)

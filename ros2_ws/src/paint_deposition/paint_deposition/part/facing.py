@@ -14,15 +14,10 @@ MAX_POSES = 2000
 
 @dataclass(frozen=True)
 class Facing:
-    """What the axis of the gun meets first, in poses.
+    """What the axis of the gun meets first, in poses."""
 
-    Attributes:
-        front: poses that look at the outward side.
-        back: poses that look at the other side.
-    """
-
-    front: int
-    back: int
+    front: int  # poses that look at the outward side
+    back: int  # poses that look at the other side
 
 
 def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:

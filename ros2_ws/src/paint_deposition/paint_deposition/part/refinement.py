@@ -15,15 +15,10 @@ SLENDERNESS = 3.0
 
 @dataclass(frozen=True)
 class CutEdges:
-    """Edges cut into equal parts, 2 to some power, so that halving them meets the same points.
+    """Edges cut into equal parts, 2 to some power, so that halving them meets the same points."""
 
-    Attributes:
-        parts: (E,) how many; 1 is uncut.
-        first: (E,) number of the inner vertex next to the edge's first end.
-    """
-
-    parts: np.ndarray
-    first: np.ndarray
+    parts: np.ndarray  # (E,) how many; 1 is uncut
+    first: np.ndarray  # (E,) number of the inner vertex next to the edge's first end
 
     def along(self, edge: np.ndarray, forward: np.ndarray, parts: int) -> np.ndarray:
         """(N, parts - 1) inner vertices of edges of that many parts, ``forward`` or not."""

@@ -27,16 +27,11 @@ SAME_PLACE_M = 1e-6
 
 @dataclass(frozen=True)
 class Face:
-    """A patch of a part.
+    """A patch of a part."""
 
-    Attributes:
-        surface: the patch alone.
-        vertices: (N,) rows of its vertices in the part.
-        seam_distance_m: (N,) straight distance to the nearest other face, inf without one [m].
-    """
-
-    surface: Surface
-    vertices: np.ndarray
+    surface: Surface  # the patch alone
+    vertices: np.ndarray  # (N,) rows of its vertices in the part
+    # (N,) straight distance to the nearest other face, inf without one [m].
     seam_distance_m: np.ndarray
 
     def without_margin(self, margin_m: float) -> 'Face':

@@ -16,11 +16,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq3_collapse import Collapse
-from paint_deposition.model.eq4_eq5_uniformity import (
-    ParallelPasses,
-    Variation,
-    variation,
-)
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses, Variation, variation
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
@@ -42,18 +38,13 @@ class PassSetup:
     A gun that keeps its orientation lays one profile whichever way it travels, so alternating
     passes are as good as one-way ones. Turned by half a turn for every way back it lays the
     mirrored profile, and an asymmetric pattern makes an uneven pair.
-
-    Attributes:
-        standoff_m: TCP to plane [m].
-        travel_rad: direction of the first pass in the tool's x-y frame, from x to y [rad].
-        one_way: every pass runs in the direction of the first; else they alternate.
-        gun_turns: on the way back the gun is turned by half a turn about its axis.
     """
 
-    standoff_m: float
+    standoff_m: float  # TCP to plane [m]
+    # Direction of the first pass in the tool's x-y frame, from x to y [rad].
     travel_rad: float = 0.0
-    one_way: bool = False
-    gun_turns: bool = False
+    one_way: bool = False  # every pass runs in the direction of the first; else they alternate
+    gun_turns: bool = False  # on the way back the gun is turned by half a turn about its axis
 
     @property
     def travel(self) -> str:
@@ -144,18 +135,12 @@ class Minimum:
 
 @dataclass(frozen=True)
 class IndexCurve:
-    """sigma_n over the index of parallel passes.
+    """sigma_n over the index of parallel passes."""
 
-    Attributes:
-        parallel: the passes.
-        index_m: (N,) increasing [m]. sigma_n: (N,).
-        minima: refined local minima inside the range, by index.
-    """
-
-    parallel: ParallelPasses
-    index_m: np.ndarray
-    sigma_n: np.ndarray
-    minima: tuple[Minimum, ...]
+    parallel: ParallelPasses  # the passes
+    index_m: np.ndarray  # (N,) increasing [m]
+    sigma_n: np.ndarray  # (N,)
+    minima: tuple[Minimum, ...]  # refined local minima inside the range, by index
 
     @staticmethod
     def of(parallel: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':

@@ -10,12 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
 from paint_deposition.planning.index_search import passes_to_cover
-from paint_deposition.planning.passes import (
-    PassStyle,
-    plan_passes,
-    planned_moves,
-    trajectory_of,
-)
+from paint_deposition.planning.passes import PassStyle, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.placing import Placing, place_passes, placed
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest

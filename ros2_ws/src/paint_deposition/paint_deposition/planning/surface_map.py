@@ -27,19 +27,13 @@ LIFT_M = 1e-3
 
 @dataclass(frozen=True)
 class PassAxes:
-    """Axes in which passes are laid, seen from the gun's side.
+    """Axes in which passes are laid, seen from the gun's side."""
 
-    Attributes:
-        origin_m: (3,) middle of the part.
-        travel: (3,) unit vector of the first pass's direction.
-        across: (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
-        outward: (3,) unit vector from the part to the gun.
-    """
-
-    origin_m: np.ndarray
-    travel: np.ndarray
+    origin_m: np.ndarray  # (3,) middle of the part
+    travel: np.ndarray  # (3,) unit vector of the first pass's direction
+    # (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
     across: np.ndarray
-    outward: np.ndarray
+    outward: np.ndarray  # (3,) unit vector from the part to the gun
 
     def coordinates_m(self, points_m: np.ndarray) -> np.ndarray:
         """(N, 3) distances along travel, across and outward [m]."""

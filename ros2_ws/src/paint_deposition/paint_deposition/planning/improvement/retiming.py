@@ -11,12 +11,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import FilmAtPoints, stratified_sample
 from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
 from paint_deposition.planning.improvement.programme import Opening, Programme
-from paint_deposition.planning.improvement.quadratic_program import (
-    WORDS,
-    Density,
-    Problem,
-    solved,
-)
+from paint_deposition.planning.improvement.quadratic_program import WORDS, Density, Problem, solved
 from paint_deposition.planning.requests import ImproveRequest
 
 # Nodes per width of the pattern, within bounds.
@@ -37,34 +32,24 @@ CHECKS = 20
 
 @dataclass(frozen=True)
 class BindingLimit:
-    """A limit that keeps the film from being more even.
+    """A limit that keeps the film from being more even."""
 
-    Attributes:
-        name: of the limit, in words. sigma_n: what it would be without this limit alone.
-    """
-
-    name: str
-    sigma_n: float
+    name: str  # of the limit, in words
+    sigma_n: float  # what it would be without this limit alone
 
 
 @dataclass(frozen=True)
 class Retiming:
-    """A programme with new times and openings.
+    """A programme with new times and openings."""
 
-    Attributes:
-        given: the programme as it was; programme: the new one.
-        target_um: mean film aimed at.
-        binding: names of all limits that bind.
-        binding_limits: those of them that cost evenness, the strongest first.
-        sigma_n_of_path: the most even film of any densities of paint along this path, without
-            limits and without weights for paint, time and smoothness.
-    """
-
-    given: Programme
-    programme: Programme
-    target_um: float
-    binding: tuple[str, ...]
+    given: Programme  # the programme as it was
+    programme: Programme  # the new one
+    target_um: float  # mean film aimed at
+    binding: tuple[str, ...]  # names of all limits that bind
+    # Those of them that cost evenness, the strongest first.
     binding_limits: tuple[BindingLimit, ...]
+    # The most even film of any densities of paint along this path, without limits and without
+    # weights for paint, time and smoothness.
     sigma_n_of_path: float
 
 
