@@ -166,7 +166,7 @@ output(
 output(
     'recommendation',
     'index_m sigma_n tolerance mean_um speed_m_per_s target_um cycle_time_s width_m length_m '
-    'sigma_n_over_width half_width_m travel_rad standoff_m',
+    'half_width_m travel_rad standoff_m',
     index_range_m=Pair, windows_m=list[Pair], minima=list[figures('index_m sigma_n')],
     passes=int | None, index_drift_m=list | None, standoff_drift_m=list | None, notes=Words,
     travel=str, gun_turns=bool, assumption=str,

@@ -46,19 +46,6 @@ def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
     )
 
 
-@pytest.mark.parametrize(('number', 'planar'), [(1, NARROW), (2, WIDE)])
-def test_what_each_brush_emits_is_on_the_plane(number, planar):
-    """1 um m^2 is 1 cm^3: the film summed over the plane is that brush's K1 times its time."""
-    ends = (-0.3, 0.0, 0.25), (0.3, 0.0, 0.25)
-    trigger = switched(stamps_ns([0.3337, 1.5]), (0.8, number), (0.0, 0))
-    motion = straight_pass(np.arange(0.0, 2.0, 0.02), *ends, **trigger)
-    points = lying_plane(1.2, 161)
-    film = painted(motion, MODEL, points, 'double')
-    emitted = planar.K1_cm3_per_s * 0.8 * (1.5 - 0.3337)
-    assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
-    assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
-
-
 def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
     motion = replace(weaving(TIMES_S), **CHANGES)
     both = painted(motion, MODEL, precision='double')
@@ -84,8 +71,9 @@ def test_one_brush_is_its_pattern_to_the_last_bit(number):
     assert np.array_equal(painted(motion, DepositionModel()).film_um, plain.film_um)
 
 
-@pytest.mark.parametrize('effect', [None, TriggerLag(rise_s=0.05, fall_s=0.08)])
-@pytest.mark.parametrize('batch', [3, 10])
+@pytest.mark.parametrize(
+    ('batch', 'effect'), [(3, None), (10, TriggerLag(rise_s=0.05, fall_s=0.08))]
+)
 def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
     model = MODEL.with_effect(effect) if effect else MODEL
     motion = replace(weaving(TIMES_S), **CHANGES)

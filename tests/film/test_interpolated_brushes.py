@@ -103,17 +103,11 @@ def test_a_film_that_another_model_goes_on_with_keeps_the_set_points():
     assert film.up_to_date().film_um.sum() > 2.5 * before.sum()
 
 
-def test_the_set_points_of_a_calibrated_brush_are_that_brush_to_the_last_bit():
-    by_number = motion((1.0, 1, UNTOLD), (0.0, 0, UNTOLD))
-    assert np.array_equal(
-        offline_um(motion((1.0, 0, AT_FIRST), (0.0, 0, UNTOLD))), offline_um(by_number)
-    )
-
-
-def test_a_number_counts_more_than_set_points():
-    by_number = motion((1.0, 2, UNTOLD), (0.0, 0, UNTOLD))
-    told = motion((1.0, 2, OUTSIDE), (0.0, 0, UNTOLD))
-    assert np.array_equal(offline_um(told), offline_um(by_number))
+@pytest.mark.parametrize(('told', 'number'), [((0, AT_FIRST), 1), ((2, OUTSIDE), 2)])
+def test_a_number_or_the_set_points_of_a_calibrated_brush_are_that_brush(told, number):
+    """To the last bit; a number counts more than set-points beside it."""
+    by_number = offline_um(motion((1.0, number, UNTOLD), (0.0, 0, UNTOLD)))
+    assert np.array_equal(offline_um(motion((1.0, *told), (0.0, 0, UNTOLD))), by_number)
 
 
 @pytest.mark.parametrize(

@@ -23,7 +23,7 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from scenes import LOOKING_DOWN, stamps_ns
 
-EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '25'))
+EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '10'))
 many = settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow])
 # Of each way in which a law can act: on the flux, on the path, with what lies ahead.
 LAWS = [

@@ -46,7 +46,7 @@ def film_um(points, path, model, precision='single'):
     return integrator.raw_um
 
 
-@pytest.mark.parametrize('precision', ['single', 'double'])
+@pytest.mark.parametrize('precision', ['double', 'single'])
 @pytest.mark.parametrize('projection', PROJECTIONS.values(), ids=PROJECTIONS)
 @pytest.mark.parametrize('planar', PATTERNS.values(), ids=PATTERNS)
 def test_it_computes_eqs_1_and_2(planar, projection, precision):

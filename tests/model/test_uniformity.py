@@ -10,7 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
-from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses, variation
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,
@@ -43,14 +43,6 @@ def test_sigma_n_matches_adaptive_quadrature(index_m):
     assert ParallelPasses.one_way(EQ3).sigma_n(index_m) == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize('index_m', INDICES_M)
-def test_many_passes_give_the_figures_of_endless_ones(index_m):
-    passes = [(EQ3, k * index_m) for k in range(-15, 16)]
-    film = variation(passes, -0.5 * index_m, 0.5 * index_m)
-    assert film.sigma_n == pytest.approx(ParallelPasses.one_way(EQ3).sigma_n(index_m), abs=1e-9)
-    assert film.mean_um == pytest.approx(EQ3.area_um_m / index_m, rel=1e-12)
-
-
 def test_single_gaussian_has_its_known_sigma_n():
     """One Gaussian: sigma_n^2 = 2 sum exp(-(2 pi k sigma / index)^2)."""
     sigma, index = 0.12, 0.4
@@ -61,11 +53,6 @@ def test_single_gaussian_has_its_known_sigma_n():
     k = np.arange(1, 20)
     expected = math.sqrt(2.0 * np.sum(np.exp(-((2.0 * math.pi * k * sigma / index) ** 2))))
     assert ParallelPasses.one_way(one).sigma_n(index) == pytest.approx(expected, rel=1e-8)
-
-
-def test_dense_passes_are_even_and_distant_ones_are_not():
-    assert ParallelPasses.one_way(EQ3).sigma_n(0.05) < 1e-9
-    assert ParallelPasses.one_way(EQ3).sigma_n(3.0) > 1.0
 
 
 @pytest.mark.parametrize(
@@ -97,12 +84,3 @@ def test_alternating_mirrored_passes():
     np.testing.assert_allclose(raster.thickness_um(index, x), by_hand, rtol=1e-12)
     assert raster.sigma_n(index) == pytest.approx(by_hand.std() / by_hand.mean(), rel=1e-9)
     assert raster.sigma_n(index) > 1.01 * ParallelPasses.one_way(EQ3).sigma_n(index)
-
-
-def test_three_passes_are_even_inside_and_not_to_their_ends():
-    index = 0.577
-    pass_ = sampled_collapse(DepositionModel(), 0.2)
-    passes = [(pass_, k * index) for k in (-1, 0, 1)]
-    inside = variation(passes, -0.5 * index, 0.5 * index)
-    assert inside.sigma_n == pytest.approx(ParallelPasses.one_way(pass_).sigma_n(index), rel=0.05)
-    assert variation(passes, -2.0 * index, 2.0 * index).sigma_n > 3.0 * inside.sigma_n

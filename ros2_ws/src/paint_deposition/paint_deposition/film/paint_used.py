@@ -73,11 +73,7 @@ class PaintUsed:
         return on_part_cm3 / self.solids_cm3 if self.solids_cm3 else math.nan
 
     def figures(self, mean_um: float, on_part_cm3: float) -> dict[str, Any]:
-        """By name; None is not known.
-
-        Args:
-            mean_um: mean dry film [um]. on_part_cm3: solids on the part.
-        """
+        """By name, for a mean dry film [um] and the solids on the part; None is not known."""
         known = {
             'wet_cm3': self.wet_cm3,
             'mass_g': self.mass_g,

@@ -76,15 +76,10 @@ def film_statistics(
     target_um: float = 0.0,
     target_tolerance_um: float = 0.0,
 ) -> FilmStatistics:
-    """Sum a film up.
+    """Sum up a film (V,) [um] by the area (V,) that each vertex stands for; 1 um on 1 m2 is 1 cm3.
 
-    Args:
-        film_um: (V,) film at the vertices [um].
-        area_m2: (V,) area that each vertex stands for [m2]; 1 um on 1 m2 is 1 cm3.
-        emitted_cm3: solids that a part which catches everything would get, K1 times the time
-            sprayed [cm3].
-        painted_above_um: film that counts as painted [um].
-        target_um, target_tolerance_um: target band [um]; target 0 is none.
+    ``emitted_cm3`` are the solids that a part which catches everything would get, K1 times the
+    time sprayed. A target of 0 is none.
     """
     painted = film_um > painted_above_um
     film, area = film_um[painted], area_m2[painted]

@@ -150,17 +150,8 @@ def refine(
     An edge is halved for both its triangles at once, so no cracks open, and a triangle only ever
     together with its own longest edge, which keeps every angle above half the smallest one given
     (Rivara, Mesh refinement processes based on the generalized bisection of simplices, 1984);
-    slivers are cut across instead. Normals go along and are interpolated, so that a coarse
-    triangulation of a curved surface keeps the normals of the curve.
-
-    Args:
-        vertices_m: (V, 3) [m].
-        normals: (V, 3) unit.
-        faces: (F, 3).
-        max_edge_length_m: [m].
-
-    Returns:
-        Vertices, unit normals and faces of the refined mesh.
+    slivers are cut across instead. Unit normals (V, 3) go along and are interpolated, so that a
+    coarse triangulation of a curved surface keeps the normals of the curve.
 
     Raises:
         MeshError: it would have more than MAX_TRIANGLES triangles.

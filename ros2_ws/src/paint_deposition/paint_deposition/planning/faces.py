@@ -87,14 +87,9 @@ def blend(
 ) -> tuple[float, tuple[FacePasses, ...], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
-    Returns the margin, by how much each face is sprayed less far than its seams [m], the passes of
-    the faces, each at its speed, and sigma_n without margin, each face for itself.
-
-    Args:
-        surface: the part. model: what the gun sprays. request: for each face.
-        faces: of the part.
-        area_m2: (V,) of the surface that is to be even, 0 elsewhere [m2].
-        progress: called with what is done and its share, 0 to 1.
+    ``area_m2`` (V,) is of the surface that is to be even, 0 elsewhere. Returned are the margin, by
+    how much each face is sprayed less far than its seams [m], the passes of the faces, each at its
+    speed, and sigma_n without margin, each face for itself.
     """
     overspray_m, tried = 0.0, []
     for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
@@ -186,12 +181,7 @@ def motion_over(
 ) -> tuple[Trajectory, tuple[Move, ...]]:
     """The timed motion that sprays one face after the other, and the moves of a robot program.
 
-    Between the faces the gun is drawn back along its axis.
-
-    Args:
-        faces: in running order.
-        frame_id: of the poses.
-        is_clear: whether a way from face to face keeps clear of the part.
+    Between the faces the gun is drawn back along its axis until the way ``is_clear``.
     """
     parts: list[Trajectory] = []
     moves: list[Move] = []

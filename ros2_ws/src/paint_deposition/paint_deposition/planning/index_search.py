@@ -15,8 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.eq3_collapse import Collapse
-from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses, Variation, variation
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
@@ -92,29 +91,13 @@ def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) ->
     most = math.ceil((width_m + 2.0 * reach) / index_m) + 2
     for count in range(max(1, math.floor(width_m / index_m)), most):
         film = np.zeros(len(across))
-        for collapse, line_m in _laid_evenly(parallel, index_m, count):
-            film += collapse.thickness_um(across - line_m)
+        for number, line_m in enumerate((np.arange(count) - 0.5 * (count - 1)) * index_m):
+            film += (parallel.second if number % 2 else parallel.first).thickness_um(
+                across - line_m
+            )
         if film.min() >= enough:
             return count
     return most
-
-
-def variation_over_width(
-    parallel: ParallelPasses, index_m: float, passes: int, width_m: float
-) -> Variation:
-    """Mean and sigma_n over the whole width, its edges included, of so many passes."""
-    return variation(_laid_evenly(parallel, index_m, passes), -0.5 * width_m, 0.5 * width_m)
-
-
-def _laid_evenly(
-    parallel: ParallelPasses, index_m: float, passes: int
-) -> list[tuple[Collapse, float]]:
-    """Collapse and line of each pass, about the middle."""
-    lines = (np.arange(passes) - 0.5 * (passes - 1)) * index_m
-    return [
-        (parallel.second if number % 2 else parallel.first, float(line))
-        for number, line in enumerate(lines)
-    ]
 
 
 def cycle_time_s(

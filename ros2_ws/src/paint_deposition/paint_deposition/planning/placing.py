@@ -42,10 +42,7 @@ def place_passes(
 ) -> Placing:
     """The most even placing with the fewest passes that come near the best, or the tolerance.
 
-    Args:
-        films: of single passes.
-        extent_m: ends of the part across the passes [m].
-        index_range_m: least and greatest index; equal ends fix it.
+    ``extent_m``: ends of the part across the passes; ``index_range_m``: equal ends fix the index.
 
     Raises:
         PlanError: no placing keeps to the tolerance; names the closest.

@@ -102,12 +102,7 @@ def plan(
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Plan:
-    """Plan passes and simulate their film.
-
-    Args:
-        surface: the part. model: what the gun sprays.
-        frame_id: frame of the poses.
-        progress: called with what is done and its share, 0 to 1.
+    """Plan passes and simulate their film; ``progress`` gets what is done and its share, 0 to 1.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.

@@ -64,17 +64,11 @@ def retime_for_evenness(
 ) -> Retiming:
     """Choose speeds, flows and triggers along the path of a programme.
 
-    The film at points spread evenly over the target region is linear in the density of paint
-    along the path: a quadratic program gives the best one. Effects that depend on speed, time or
-    film are followed by solving again about the film of the last solution.
-
-    Args:
-        surface: the part. target_region: (V,) bool, vertices whose film counts.
-        programme: as given.
-        models: equally likely ones; the first is the best known.
-        request: what is wanted and allowed.
-        progress: called with what is done and its share, 0 to 1.
-        explained: find out which limits cost evenness, and how even the path could be.
+    The film at points spread evenly over the target region, (V,) bool, is linear in the density of
+    paint along the path: a quadratic program gives the best one. Effects that depend on speed,
+    time or film are followed by solving again about the film of the last solution. The models are
+    equally likely, the first is the best known. ``explained`` finds out which limits cost
+    evenness, and how even the path could be.
 
     Raises:
         PlanError: the limits contradict each other.
