@@ -20,7 +20,7 @@ from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from scenes import lying_plane, stamps_ns, weaving
+from scenes import lying_plane, painted, stamps_ns, weaving
 
 SET_POINTS = {1: (70.0, 200.0), 2: (50.0, 320.0)}
 CHARGE = SetPointPower(setting='voltage_kv', at=70.0, exponent=2.0)
@@ -52,9 +52,7 @@ def brushed(*effects: Effect) -> DepositionModel:
 
 
 def film_um(model: DepositionModel, path: SprayPath) -> np.ndarray:
-    integrator = FilmIntegrator(lying_plane(), model, 'double')
-    integrator.add(path)
-    return integrator.film_um
+    return painted(lying_plane(), path, model, 'double').film_um
 
 
 def amplitudes(number: int) -> tuple[Effect, ...]:

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import scenes
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
@@ -21,10 +20,7 @@ NARROW = DepositionModel(
 
 
 def painted(points, motion, model=MODEL, precision='double'):
-    path = motion if isinstance(motion, SprayPath) else spray_path(motion, 0.25)[0]
-    integrator = FilmIntegrator(points, model, precision)
-    integrator.add(path)
-    return integrator
+    return scenes.painted(points, motion, model, precision)
 
 
 def largest_error(film, expected):

@@ -47,18 +47,6 @@ def test_flux_by_hand():
     assert ring.flux_um_per_s(0.0, -0.1) == pytest.approx(0.5 * top)
 
 
-@pytest.mark.parametrize('phi_rad', [0.0, 0.6, -2.0, 3.0])
-def test_asymmetry_is_strongest_a_quarter_turn_after_phi(phi_rad):
-    pattern = PlanarPattern(K3=0.4, phi_rad=phi_rad)
-    angle = np.linspace(-math.pi, math.pi, 721)
-    f = pattern.f(np.cos(angle), np.sin(angle))
-    strongest = angle[f.argmax()]
-    assert math.cos(strongest - phi_rad - 0.5 * math.pi) == pytest.approx(1.0, abs=1e-4)
-    assert (f.min(), f.max()) == (pytest.approx(0.6, abs=1e-4), pytest.approx(1.4, abs=1e-4))
-    # Not one value is lost on the whole turn: f integrates out against anything round.
-    assert f[:-1].mean() == pytest.approx(1.0, abs=1e-12)
-
-
 @pytest.mark.parametrize(('K2', 'K3'), [(0.0, 0.2), (0.15, 1.0), (1.0, 0.0)])
 @pytest.mark.parametrize(('r_m', 'sigma_m'), [(0.0, 0.09), (0.02, 0.09), (0.22, 0.02)])
 def test_the_whole_pattern_is_k1(K2, K3, r_m, sigma_m):

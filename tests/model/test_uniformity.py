@@ -65,15 +65,6 @@ def test_ring_pattern_is_most_even_near_its_half_width(index_m, percent):
     assert 100.0 * raster.sigma_n(index_m) == pytest.approx(percent, abs=0.06)
 
 
-@pytest.mark.parametrize('index_m', INDICES_M)
-def test_sigma_n_of_the_2d_model_matches_dense_quadrature(index_m):
-    pass_ = sampled_collapse(DepositionModel(), 0.2)
-    dense = ParallelPasses.one_way(pass_).thickness_um(index_m, np.arange(20000) / 20000 * index_m)
-    expected = dense.std() / dense.mean()
-    assert ParallelPasses.one_way(pass_).sigma_n(index_m) == pytest.approx(expected, abs=1e-6)
-    assert dense.mean() == pytest.approx(ParallelPasses.one_way(pass_).mean_um(index_m), rel=1e-6)
-
-
 def test_alternating_mirrored_passes():
     raster = ParallelPasses(EQ3, MIRRORED)
     index = 0.5

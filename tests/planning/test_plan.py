@@ -8,15 +8,14 @@ import pytest
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.films import evenness
 from paint_deposition.planning.placing import place_passes
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
 from planning.test_surface_map import sheet
+from scenes import painted
 
 pytestmark = pytest.mark.slow
 
@@ -36,15 +35,8 @@ def planned(bowed):
     return plan(bowed, NARROW, PlanRequest(target_um=20.0), 'part')
 
 
-def film_of(surface, model, trajectory):
-    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model)
-    integrator.add(path)
-    return integrator.film_um
-
-
 def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
-    film = film_of(bowed, NARROW, planned.trajectory)
+    film = painted(bowed.points(), planned.trajectory, NARROW).film_um
     np.testing.assert_allclose(planned.film_um, film, rtol=1e-5)
     mean, sigma_n = evenness(film, bowed.vertex_areas_m2)
     assert mean == pytest.approx(20.0, rel=3e-3)
@@ -107,7 +99,7 @@ def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
     recorded = read_trajectory(tmp_path / 'trajectory', state_topic='atomizer/state')
     np.testing.assert_array_equal(recorded.stamps_ns, planned.trajectory.stamps_ns)
     np.testing.assert_allclose(recorded.positions_m, planned.trajectory.positions_m)
-    film = film_of(bowed, NARROW, recorded)
+    film = painted(bowed.points(), recorded, NARROW).film_um
     np.testing.assert_allclose(film, planned.film_um, rtol=1e-5)
     content = json.loads((tmp_path / 'plan.json').read_text())
     assert content['passes'] == len(planned.passes)

@@ -16,20 +16,15 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 
 @dataclass(frozen=True)
 class PaintUsed:
-    """What left the gun; NaN where it is not known of a brush that sprayed.
+    """What left the gun; NaN where it is not known of a brush that sprayed."""
 
-    Attributes:
-        spraying_s: time sprayed by number of the brush, weighted by the flow.
-        emitted_cm3: solids that a part which catches everything would get.
-        wet_cm3, mass_g: paint as it is sprayed.
-        solids_cm3: solids in it.
-    """
-
+    # Time sprayed by number of the brush, weighted by the flow.
     spraying_s: Mapping[int, float] = field(default_factory=dict)
-    emitted_cm3: float = 0.0
+    emitted_cm3: float = 0.0  # solids that a part which catches everything would get
+    # Paint as it is sprayed.
     wet_cm3: float = 0.0
     mass_g: float = 0.0
-    solids_cm3: float = 0.0
+    solids_cm3: float = 0.0  # solids in it
 
     @staticmethod
     def of(model: DepositionModel, path: SprayPath) -> 'PaintUsed':

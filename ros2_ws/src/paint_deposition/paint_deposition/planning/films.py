@@ -79,14 +79,14 @@ class PlannedFilm:
     surface: Surface
     model: DepositionModel
     request: PlanRequest
-    painted: np.ndarray
-    passes: tuple[PlannedPass, ...]
-    trajectory: Trajectory
-    moves: tuple[Move, ...]
-    film_um: np.ndarray
+    painted: np.ndarray  # (V,) bool, the side or the faces that are painted
+    passes: tuple[PlannedPass, ...]  # in running order
+    trajectory: Trajectory  # their timed poses and trigger
+    moves: tuple[Move, ...]  # of a robot program along them
+    film_um: np.ndarray  # (V,) on the refined part
     paint: PaintUsed
-    statistics: FilmStatistics
-    sigma_n: float
+    statistics: FilmStatistics  # of the film on the painted part
+    sigma_n: float  # standard deviation over mean there, bare metal included
 
     @property
     def mean_um(self) -> float:
