@@ -103,9 +103,11 @@ def test_a_target_is_met_and_paint_used_is_flow_times_time(panel, even):
 
 @pytest.mark.slow
 def test_paint_that_is_dear_is_kept_off_the_air(panel, even):
-    dear = pd.improve(panel, even.trajectory, NARROW, paint_weight=0.02)
-    assert dear.after.paint_cm3 < 0.93 * dear.before.paint_cm3
-    assert dear.after.mean_um == pytest.approx(dear.before.mean_um, rel=0.01)
+    free, dear = (
+        pd.improve(panel, even.trajectory, NARROW, paint_weight=weight) for weight in (0.0, 0.02)
+    )
+    assert dear.after.paint_cm3 < 0.93 * free.after.paint_cm3
+    assert dear.after.mean_um == pytest.approx(free.after.mean_um, rel=0.01)
     assert any(change.opens_earlier_m < -0.01 for change in dear.changes)
     assert 'later' in dear.changes[0].sentence
 
@@ -156,7 +158,7 @@ def test_no_weights_reach_below_the_most_even_film_of_the_path(panel, even, leve
     free = pd.improve(
         panel, even.trajectory, SKEWED, paint_weight=0.0, smoothness=0.0, speed_max_m_per_s=3.0
     )
-    assert free.after.sigma_n < levelled.after.sigma_n
+    assert free.after.sigma_n < 1.001 * levelled.after.sigma_n
     assert levelled.sigma_n_of_path < 1.02 * free.after.sigma_n
     assert levelled.sigma_n_of_path <= levelled.after.sigma_n
 
