@@ -3,6 +3,11 @@
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 
@@ -60,3 +65,42 @@ def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
 def rotation_matrix(quaternion=LOOKING_DOWN) -> np.ndarray:
     """Tool axes as columns."""
     return Rotation.from_quat(quaternion).as_matrix()
+
+
+def painted(
+    points: SurfacePoints, motion: Trajectory | SprayPath, model=None, precision='single'
+) -> FilmIntegrator:
+    """The integrator after a motion, cut into sub-steps as the model asks, or a path."""
+    model = model or DepositionModel()
+    path = motion
+    if isinstance(motion, Trajectory):
+        path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
+    integrator = FilmIntegrator(points, model, precision)
+    integrator.add(path)
+    return integrator
+
+
+def poses(motion: Trajectory, rows: slice) -> PoseBatch:
+    """Some poses as they come in."""
+    return PoseBatch(
+        motion.stamps_ns[rows], motion.positions_m[rows], motion.quaternions_xyzw[rows]
+    )
+
+
+def changes_of(motion: Trajectory) -> list[TriggerChange]:
+    """The changes of its trigger, with brush and set-points."""
+    return [
+        TriggerChange(*told, motion.set_points_of(row)) for row, told in enumerate(motion.triggers)
+    ]
+
+
+def events(
+    motion: Trajectory, batch: int, delay_s: float = 0.0
+) -> list[PoseBatch | TriggerChange]:
+    """The motion as it comes in: batches of poses, each change of the trigger so much late."""
+    coming = [
+        (int(motion.stamps_ns[k]), poses(motion, slice(k, k + batch)))
+        for k in range(0, len(motion), batch)
+    ]
+    coming += [(one.stamp_ns + round(delay_s * 1e9), one) for one in changes_of(motion)]
+    return [event for _, event in sorted(coming, key=lambda item: item[0])]

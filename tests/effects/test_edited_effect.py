@@ -74,8 +74,9 @@ def run(tmp_path: Path):
 
 
 @pytest.mark.slow
-def test_what_is_edited_between_runs_counts_in_the_next(run):
+def test_what_is_edited_between_runs_counts_in_the_next_and_what_is_not_is_found_again(run):
+    """Also where a release of Numba keeps compiled code by other rules than the name."""
     assert run() == (pytest.approx(1.0 + 2.0 * 0.25), 0)
-    assert run(gain=4.0) == (pytest.approx(1.0 + 4.0 * 0.25), 0)
+    assert run() == (pytest.approx(1.0 + 2.0 * 0.25), 1)
     # In a file of its own that the effect's file imports.
     assert run(lift=0.75) == (pytest.approx(1.0 + 2.0 * 0.75), 0)

@@ -16,13 +16,11 @@ from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from scenes import lying_plane, stamps_ns, weaving
+from scenes import lying_plane, painted, stamps_ns, weaving
 
 SET_POINTS = {1: (70.0, 200.0), 2: (50.0, 320.0)}
 CHARGE = SetPointPower(setting='voltage_kv', at=70.0, exponent=2.0)
@@ -54,9 +52,7 @@ def brushed(*effects: Effect) -> DepositionModel:
 
 
 def film_um(model: DepositionModel, path: SprayPath) -> np.ndarray:
-    integrator = FilmIntegrator(lying_plane(), model, 'double')
-    integrator.add(path)
-    return integrator.film_um
+    return painted(lying_plane(), path, model, 'double').film_um
 
 
 def amplitudes(number: int) -> tuple[Effect, ...]:
@@ -80,21 +76,6 @@ def test_each_brush_paints_with_the_effects_at_its_own_set_points():
     # What one amplitude for both would be off by.
     plain = film_um(brushed(*(e.model_copy(update={'follows': ()}) for e in FOLLOWING)), PATH)
     assert np.abs(together - plain).max() > 0.02 * total.max()
-
-
-def test_the_live_film_follows_set_points_as_the_offline_film_does():
-    model = brushed(*FOLLOWING)
-    columns = MOTION.stamps_ns, MOTION.positions_m, MOTION.quaternions_xyzw
-    film = LiveFilm(lying_plane(), model, precision='double')
-    events = [(stamp, TriggerChange(stamp, *gun)) for stamp, *gun in MOTION.triggers]
-    events += [
-        (int(MOTION.stamps_ns[k]), PoseBatch(*(column[k : k + 7] for column in columns)))
-        for k in range(0, len(MOTION), 7)
-    ]
-    for _, event in sorted(events, key=lambda item: item[0]):
-        film.follow([event])
-    path, _ = spray_path(MOTION, 0.25, model.max_step_m)
-    assert np.array_equal(film.up_to_date().film_um, film_um(model, path))
 
 
 def test_a_fit_varies_the_amplitude_and_keeps_the_power():
@@ -141,12 +122,3 @@ def test_what_cannot_follow_is_refused(model, words, tmp_path):
         read_model(tmp_path / 'model.yaml')
     with pytest.raises(ModelError, match=words):
         FilmIntegrator(lying_plane(), model)
-
-
-def test_a_strange_set_point_is_refused(tmp_path):
-    (tmp_path / 'model.yaml').write_text(
-        'effects: [{id: air_drift, shift_down_m: 0.02, '
-        'follows: [{setting: voltage, at: 70, exponent: 1}]}]\n'
-    )
-    with pytest.raises(ModelError, match='voltage'):
-        read_model(tmp_path / 'model.yaml')

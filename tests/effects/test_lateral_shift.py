@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
-from booth import LOOKING_ALONG_Y, MODEL, STANDOFF_M, painted, panel, path_of, serpentine, spot
+from booth import LOOKING_ALONG_Y, MODEL, painted, panel, serpentine, spot
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.part_misalignment import PartMisalignment
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.effects.library.tcp_tilt import TcpTilt
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -98,18 +96,6 @@ def test_misalignment_is_the_part_moved():
     np.testing.assert_allclose(film, expected, atol=1e-10 * expected.max())
 
 
-def film_on(surface: Surface) -> np.ndarray:
-    """A smooth hill of 30 um in the middle, nothing at the edges."""
-    x, _, z = surface.vertices_m.T
-    return 30.0 * np.exp(-(x**2 + z**2) / (2.0 * 0.08**2))
-
-
-def test_sag_keeps_the_volume():
-    points, film = panel().points(), film_on(panel())
-    sagged = Sag(run_m=0.01).on_film(film, points)
-    assert sagged @ points.area_m2 == pytest.approx(film @ points.area_m2, rel=1e-6)
-
-
 def test_sag_follows_the_closed_form_of_a_thin_film_on_a_wall():
     points = panel(0.5, 0.01).points()
     z = points.positions_m[:, 2]
@@ -120,28 +106,3 @@ def test_sag_follows_the_closed_form_of_a_thin_film_on_a_wall():
     inside = np.abs(z) < 0.48  # at the ends the slope is one-sided
     moved_um = np.abs(expected - film).max()
     np.testing.assert_allclose(sagged[inside], expected[inside], atol=0.04 * moved_um)
-
-
-def test_an_even_film_and_a_lying_panel_do_not_sag():
-    points = panel().points()
-    even = np.full(len(points), 30.0)
-    np.testing.assert_allclose(Sag(run_m=0.03).on_film(even, points), even, rtol=1e-12)
-    lying = Surface.from_triangles(
-        panel().vertices_m, panel().faces, 0.04, down=np.array([0.0, 1.0, 0.0])
-    )
-    film = film_on(lying)
-    np.testing.assert_allclose(Sag(run_m=0.03).on_film(film, lying.points()), film, atol=1e-12)
-
-
-def test_sag_at_readings_is_that_of_the_surface():
-    surface = panel(0.25, 0.004)
-    wanted = np.array([[0.02, 0.0, 0.052], [-0.1, 0.0, -0.06], [0.0, 0.0, 0.112]])
-    rows = cKDTree(surface.vertices_m).query(wanted)[1]
-    motion, sag = spot(standoff_m=STANDOFF_M), Sag(run_m=0.004)
-    stencil = surface.at(surface.vertices_m[rows], stencil_m=0.004)
-    gauge = FilmIntegrator(stencil, MODEL.with_effect(sag), 'double')
-    gauge.add(path_of(motion))
-    on_surface = painted(surface, motion, sag).film_um[rows]
-    np.testing.assert_allclose(gauge.film_um[:3], on_surface, rtol=5e-3)
-    plain = painted(surface, motion).film_um[rows]
-    assert abs(on_surface - plain)[0] > 0.05 * on_surface[0]

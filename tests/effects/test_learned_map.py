@@ -32,21 +32,14 @@ def h_at(*places: tuple[float, float]) -> np.ndarray:
     return grid_on(PANEL).weights(np.array(places, dtype=float)) @ GRID.ravel()
 
 
-def test_at_its_knots_it_has_its_values_row_by_row_from_the_lowest():
+def test_it_has_its_values_row_by_row_from_the_lowest_linear_between_and_neutral_beyond():
     knots = [(x, y) for y in (-0.1, 0.1) for x in (-0.3, 0.0, 0.3)]
     np.testing.assert_allclose(h_at(*knots), GRID.ravel(), atol=1e-12)
-
-
-def test_between_its_knots_it_is_linear_along_each_side():
     assert h_at((-0.15, -0.1)) == pytest.approx(GRID[0, :2].mean())
-    assert h_at((0.0, 0.05)) == pytest.approx(0.25 * GRID[0, 1] + 0.75 * GRID[1, 1])
     assert h_at((0.15, 0.0)) == pytest.approx(GRID[:, 1:].mean())
-
-
-def test_one_step_beyond_its_knots_it_is_neutral():
+    assert h_at((0.45, 0.1)) == pytest.approx(0.5 * GRID[1, 2])
     beyond = [(-0.6, 0.0), (0.6, 0.0), (0.0, 0.3), (0.0, -0.3), (9.0, 9.0)]
     np.testing.assert_allclose(h_at(*beyond), 0.0, atol=1e-12)
-    assert h_at((0.45, 0.1)) == pytest.approx(0.5 * GRID[1, 2])
 
 
 def test_places_are_to_the_right_of_the_centre_and_above_it_as_the_gun_sees_the_part():
@@ -71,8 +64,7 @@ def test_another_part_is_left_alone(surface):
     assert on_part().on_film(film_um, points) is film_um
 
 
-@pytest.mark.parametrize('kind', ['factor', 'addition'])
-@pytest.mark.parametrize('count', [1, 2, 60])
+@pytest.mark.parametrize(('kind', 'count'), [('factor', 1), ('addition', 60)])
 def test_few_points_are_changed_as_they_are_among_many(kind, count):
     """To the bit: readings are predicted by themselves, the film of a part as a whole."""
     points, random = door().points(), np.random.default_rng(count)

@@ -1,5 +1,7 @@
 """A positive parameter does what its description says, a negative one the opposite."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
@@ -8,6 +10,7 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.part.points import SurfacePoints
 
 X, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+Figure = Callable[[np.ndarray, SurfacePoints], float]
 
 
 def volume(film_um: np.ndarray, points: SurfacePoints) -> float:
@@ -18,33 +21,17 @@ def centroid_m(film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
     return (film_um * points.area_m2) @ points.positions_m / volume(film_um, points)
 
 
-def rightward(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return float(centroid_m(film_um, points) @ X)
+def along(axis: np.ndarray) -> Figure:
+    return lambda film_um, points: float(centroid_m(film_um, points) @ axis)
 
 
-def downward(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return float(-centroid_m(film_um, points) @ UP)
-
-
-def upward(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return -downward(film_um, points)
-
-
-def leftward(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return -rightward(film_um, points)
+def negative(figure: Figure) -> Figure:
+    return lambda film_um, points: -figure(film_um, points)
 
 
 def width(film_um: np.ndarray, points: SurfacePoints) -> float:
     offsets = points.positions_m - centroid_m(film_um, points)
     return float((film_um * points.area_m2) @ (offsets**2).sum(axis=1) / volume(film_um, points))
-
-
-def narrowness(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return -width(film_um, points)
-
-
-def loss(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return -volume(film_um, points)
 
 
 def on_ridges(film_um: np.ndarray, points: SurfacePoints) -> float:
@@ -55,6 +42,8 @@ def off_valleys(film_um: np.ndarray, points: SurfacePoints) -> float:
     return -float(film_um[points.curvature_per_m > 1.0].sum())
 
 
+rightward, leftward, upward, downward = along(X), along(-X), along(UP), along(-UP)
+narrowness, loss = negative(width), negative(volume)
 FAR, NEAR = spot(standoff_m=0.32), spot(standoff_m=0.2)
 ASIDE = spot(x_m=0.2)
 PASS = serpentine((0.0,), half_width_m=0.4, opens_at_m=0.25)

@@ -17,9 +17,9 @@ from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
-from scenes import lying_plane, stamps_ns, straight_pass, weaving
+from scenes import events, lying_plane, painted, stamps_ns, straight_pass, weaving
 
 MODEL = two_brushes()
 TIMES_S = np.arange(0.0, 4.0, 0.004)
@@ -30,15 +30,6 @@ CHANGES = switched(
 )  # fmt: skip
 
 
-def painted(
-    motion: Trajectory, model: DepositionModel, points=None, precision='single', step_m=None
-):
-    path, _ = spray_path(motion, 0.25, step_m or model.max_step_m, model.needs_whole_strokes)
-    integrator = FilmIntegrator(points or lying_plane(), model, precision)
-    integrator.add(path)
-    return integrator
-
-
 def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
     """The same with the gun open while this brush is chosen only."""
     return replace(
@@ -46,24 +37,12 @@ def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
     )
 
 
-@pytest.mark.parametrize(('number', 'planar'), [(1, NARROW), (2, WIDE)])
-def test_what_each_brush_emits_is_on_the_plane(number, planar):
-    """1 um m^2 is 1 cm^3: the film summed over the plane is that brush's K1 times its time."""
-    ends = (-0.3, 0.0, 0.25), (0.3, 0.0, 0.25)
-    trigger = switched(stamps_ns([0.3337, 1.5]), (0.8, number), (0.0, 0))
-    motion = straight_pass(np.arange(0.0, 2.0, 0.02), *ends, **trigger)
-    points = lying_plane(1.2, 161)
-    film = painted(motion, MODEL, points, 'double')
-    emitted = planar.K1_cm3_per_s * 0.8 * (1.5 - 0.3337)
-    assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
-    assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
-
-
 def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
     motion = replace(weaving(TIMES_S), **CHANGES)
-    both = painted(motion, MODEL, precision='double')
+    both = painted(lying_plane(), motion, MODEL, precision='double')
     apart = [
         painted(
+            lying_plane(),
             with_one_brush(motion, n),
             DepositionModel(planar=planar),
             precision='double',
@@ -81,26 +60,23 @@ def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
 def test_one_brush_is_its_pattern_to_the_last_bit(number):
     brush = {'trigger_brush': np.where(CHANGES['trigger_flow'] > 0.0, number, 0)}
     motion = replace(weaving(TIMES_S), **{**CHANGES, **brush})
-    plain = painted(replace(motion, trigger_brush=np.empty(0, np.int64)), DepositionModel())
+    plain = painted(
+        lying_plane(), replace(motion, trigger_brush=np.empty(0, np.int64)), DepositionModel()
+    )
     one = DepositionModel.of_brushes([Brush(number=5, planar=DepositionModel().planar)])
-    assert np.array_equal(painted(motion, one).film_um, plain.film_um)
+    assert np.array_equal(painted(lying_plane(), motion, one).film_um, plain.film_um)
     # A cell that numbers its only brush needs no other model.
-    assert np.array_equal(painted(motion, DepositionModel()).film_um, plain.film_um)
+    assert np.array_equal(painted(lying_plane(), motion, DepositionModel()).film_um, plain.film_um)
 
 
-@pytest.mark.parametrize('effect', [None, TriggerLag(rise_s=0.05, fall_s=0.08)])
-@pytest.mark.parametrize('batch', [3, 10])
+@pytest.mark.parametrize(
+    ('batch', 'effect'), [(3, None), (10, TriggerLag(rise_s=0.05, fall_s=0.08))]
+)
 def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
     model = MODEL.with_effect(effect) if effect else MODEL
     motion = replace(weaving(TIMES_S), **CHANGES)
-    columns = motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw
-    events = [
-        (int(motion.stamps_ns[k]), PoseBatch(*(column[k : k + batch] for column in columns)))
-        for k in range(0, len(motion), batch)
-    ]
-    events += [(stamp, TriggerChange(stamp, *gun)) for stamp, *gun in motion.triggers]
-    film, expected = LiveFilm(lying_plane(), model), painted(motion, model)
-    for _, event in sorted(events, key=lambda item: item[0]):
+    film, expected = LiveFilm(lying_plane(), model), painted(lying_plane(), motion, model)
+    for event in events(motion, batch):
         film.follow([event])
     assert np.array_equal(film.up_to_date().film_um, expected.film_um)
     assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)

@@ -37,12 +37,6 @@ def test_under_over_and_bare_stand_out():
     assert np.all(rgba[:, 3] == 255)
 
 
-def test_the_map_is_spread_evenly():
-    scale = film_scale(np.empty(0), 0.0, 256.0)
-    values = np.arange(256) + 0.5
-    assert np.array_equal(scale.rows(values, values > -1), np.arange(256))
-
-
 @pytest.mark.parametrize(
     ('value', 'rounded'), [(0, 1), (0.97, 1), (1, 1), (33, 40), (100, 100), (101, 150), (6.1, 8)]
 )

@@ -4,20 +4,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import scenes
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
-from scenes import (
-    LOOKING_DOWN,
-    lying_plane,
-    stamps_ns,
-    straight_pass,
-    weaving,
-)
+from scenes import LOOKING_DOWN, lying_plane, stamps_ns, straight_pass, weaving
 
 MODEL = DepositionModel()
 # All of it lands within 0.3 m of the axis at the standoffs used here.
@@ -27,10 +20,7 @@ NARROW = DepositionModel(
 
 
 def painted(points, motion, model=MODEL, precision='double'):
-    path = motion if isinstance(motion, SprayPath) else spray_path(motion, 0.25)[0]
-    integrator = FilmIntegrator(points, model, precision)
-    integrator.add(path)
-    return integrator
+    return scenes.painted(points, motion, model, precision)
 
 
 def largest_error(film, expected):
@@ -54,22 +44,6 @@ def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
     emitted = 1.3 * 0.8 * (1.5 - 0.3337)
     assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
     assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
-
-
-@pytest.mark.slow
-def test_a_long_pass_is_the_flux_integrated_along_it():
-    """Every line across the pass has the same film: the flux summed along the direction."""
-    speed = 1.2 / 4.0 / 4.0
-    trajectory = straight_pass(np.arange(0.0, 16.001, 0.01), (-0.6, 0, 0.25), (0.6, 0, 0.25))
-    y = np.linspace(-0.2, 0.2, 21)
-    points = SurfacePoints(
-        np.stack([0 * y, y, 0 * y], axis=1), np.tile([0.0, 0.0, 1.0], (len(y), 1))
-    )
-    film = painted(points, trajectory, NARROW).film_um
-    x = np.linspace(-0.5, 0.5, 100_001)
-    flux = NARROW.planar.flux_um_per_s(x, y[:, np.newaxis])
-    expected = np.trapezoid(flux, x, axis=1)[::-1] / speed  # tool y is the world's -y
-    assert largest_error(film, expected) < 2e-5
 
 
 # The weaving way at 0.3 m/s with a tool that sways, as a robot's log may show it.
@@ -104,11 +78,7 @@ def exact():
 
 @pytest.mark.parametrize(
     ('trajectory', 'limit'),
-    [
-        (sampled_evenly(0.02), 1e-3),
-        (sampled_evenly(0.001), 1e-4),
-        (sampled_unevenly(), 1e-3),
-    ],
+    [(sampled_evenly(0.02), 1e-3), (sampled_evenly(0.001), 1e-4), (sampled_unevenly(), 1e-3)],
     ids=['50 Hz', '1 kHz', '1 to 24 ms with repeats'],
 )
 @pytest.mark.parametrize('precision', ['single', 'double'])
@@ -180,15 +150,6 @@ def test_moving_part_and_gun_together_changes_nothing():
     assert largest_error(painted(moved, moved_log).film_um, still) < 1e-9
     single = painted(moved, moved_log, precision='single').film_um
     assert largest_error(single, still) < 2e-6
-
-
-def test_progress_names_the_sub_steps_done():
-    path, _ = spray_path(straight_pass(np.arange(0.0, 200.0, 0.05)))
-    seen = []
-    FilmIntegrator(lying_plane(count=5), MODEL).add(path, seen.append)
-    assert len(seen) > 1
-    assert seen == sorted(seen)
-    assert seen[-1] == len(path)
 
 
 def test_the_gun_is_off_in_a_gap():

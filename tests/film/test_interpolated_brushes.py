@@ -17,7 +17,7 @@ from paint_deposition.model.brush import BETWEEN, MOST_BETWEEN, Brush, BrushLaw,
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
-from scenes import lying_plane, stamps_ns, weaving
+from scenes import changes_of, events, lying_plane, painted, stamps_ns, weaving
 
 MODEL = two_brushes()
 MIDDLE, NEARER = (280.0, 0.0, 41_000.0, 0.0), (220.0, 0.0, 47_500.0, 0.0)
@@ -38,27 +38,7 @@ def motion(*changes: tuple[float, int, tuple[float, ...]]) -> Trajectory:
 def offline_um(given: Trajectory, model: DepositionModel = MODEL) -> np.ndarray:
     numbered, known = with_interpolated_brushes(given, model)
     known.require_brushes(numbered.brushes)
-    path, _ = spray_path(numbered, 0.25, known.max_step_m)
-    integrator = FilmIntegrator(lying_plane(), known)
-    integrator.add(path)
-    return integrator.film_um
-
-
-def changes_of(given: Trajectory) -> list[TriggerChange]:
-    return [
-        TriggerChange(*told, given.set_points_of(row)) for row, told in enumerate(given.triggers)
-    ]
-
-
-def follow(film: LiveFilm, given: Trajectory) -> None:
-    columns = given.stamps_ns, given.positions_m, given.quaternions_xyzw
-    events = [(change.stamp_ns, change) for change in changes_of(given)]
-    events += [
-        (int(given.stamps_ns[k]), PoseBatch(*(column[k : k + 10] for column in columns)))
-        for k in range(0, len(given), 10)
-    ]
-    for _, event in sorted(events, key=lambda item: item[0]):
-        film.follow([event])
+    return painted(lying_plane(), numbered, known).film_um
 
 
 CHANGING = motion(
@@ -83,14 +63,15 @@ def test_set_points_paint_as_a_brush_that_is_interpolated_at_them():
 
 def test_the_live_film_between_brushes_is_the_offline_film_to_the_last_bit():
     film = LiveFilm(lying_plane(), MODEL)
-    follow(film, CHANGING)
+    for event in events(CHANGING, 10):
+        film.follow([event])
     assert np.array_equal(film.up_to_date().film_um, offline_um(CHANGING))
 
 
 def test_a_film_that_another_model_goes_on_with_keeps_the_set_points():
     """As after a new model file: the motion so far is another model's, the rest the new one's."""
     film = LiveFilm(lying_plane(), MODEL)
-    follow(film, motion((1.0, 0, MIDDLE)))
+    film.follow(events(motion((1.0, 0, MIDDLE)), 10))
     wider = MODEL.with_patterns(
         p.model_copy(update={'K1_cm3_per_s': 2.0 * p.K1_cm3_per_s}) for p in MODEL.patterns
     )
@@ -103,17 +84,11 @@ def test_a_film_that_another_model_goes_on_with_keeps_the_set_points():
     assert film.up_to_date().film_um.sum() > 2.5 * before.sum()
 
 
-def test_the_set_points_of_a_calibrated_brush_are_that_brush_to_the_last_bit():
-    by_number = motion((1.0, 1, UNTOLD), (0.0, 0, UNTOLD))
-    assert np.array_equal(
-        offline_um(motion((1.0, 0, AT_FIRST), (0.0, 0, UNTOLD))), offline_um(by_number)
-    )
-
-
-def test_a_number_counts_more_than_set_points():
-    by_number = motion((1.0, 2, UNTOLD), (0.0, 0, UNTOLD))
-    told = motion((1.0, 2, OUTSIDE), (0.0, 0, UNTOLD))
-    assert np.array_equal(offline_um(told), offline_um(by_number))
+@pytest.mark.parametrize(('told', 'number'), [((0, AT_FIRST), 1), ((2, OUTSIDE), 2)])
+def test_a_number_or_the_set_points_of_a_calibrated_brush_are_that_brush(told, number):
+    """To the last bit; a number counts more than set-points beside it."""
+    by_number = offline_um(motion((1.0, number, UNTOLD), (0.0, 0, UNTOLD)))
+    assert np.array_equal(offline_um(motion((1.0, *told), (0.0, 0, UNTOLD))), by_number)
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import scenes
 from brushes import NARROW, WIDE, switched
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
@@ -26,8 +27,7 @@ def painted(*brushes: Brush) -> tuple[FilmIntegrator, float, float]:
         **switched(stamps_ns([0.5, 1.5, 3.5]), (0.5, 1), (1.0, 2), (0.0, 0)),
     )
     points = lying_plane(1.5, 101)
-    film = FilmIntegrator(points, DepositionModel.of_brushes(brushes), 'double')
-    film.add(spray_path(motion)[0])
+    film = scenes.painted(points, motion, DepositionModel.of_brushes(brushes), 'double')
     return film, float(film.film_um.mean()), float(points.area_m2 @ film.film_um)
 
 

@@ -1,6 +1,6 @@
 """Whatever is painted with whatever: no film below zero, no paint from nowhere, live as offline.
 
-`make numbers` tries 10,000 parts, paths and models; PAINT_EXAMPLES says how many here.
+`make numbers` tries 10,000 paths and models; PAINT_EXAMPLES says how many here.
 """
 
 import os
@@ -13,23 +13,20 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.points import SurfacePoints
-from scenes import LOOKING_DOWN, stamps_ns
+from scenes import LOOKING_DOWN, lying_plane, painted, poses, stamps_ns
 
-EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '25'))
+EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '10'))
 many = settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow])
 # Of each way in which a law can act: on the flux, on the path, with what lies ahead.
 LAWS = [
     (), ('incidence_attraction',), ('trigger_lag', 'air_drift'), ('corner_slowdown',),
 ]  # fmt: skip
-HALF_M, COUNT = 0.7, 72
+PLANE = lying_plane(0.7, 72)
 
 
 @st.composite
@@ -72,42 +69,16 @@ def motions(draw) -> Trajectory:
     )  # fmt: skip
 
 
-@st.composite
-def parts(draw) -> SurfacePoints:
-    """A wavy sheet below the gun, with the area of each point."""
-    line = np.linspace(-HALF_M, HALF_M, COUNT)
-    x, y = (grid.ravel() for grid in np.meshgrid(line, line))
-    height, wave = draw(st.floats(0.0, 0.02)), draw(st.floats(3.0, 8.0))
-    z = height * np.sin(wave * x) * np.cos(wave * y)
-    slope_x = height * wave * np.cos(wave * x) * np.cos(wave * y)
-    slope_y = -height * wave * np.sin(wave * x) * np.sin(wave * y)
-    steep = np.sqrt(1.0 + slope_x**2 + slope_y**2)
-    normals = np.stack([-slope_x, -slope_y, np.ones(len(x))], axis=1) / steep[:, np.newaxis]
-    return SurfacePoints(
-        np.stack([x, y, z], axis=1), normals, area_m2=steep * (line[1] - line[0]) ** 2,
-        down=(0.0, -1.0, 0.0),
-    )  # fmt: skip
-
-
-def offline(points: SurfacePoints, motion: Trajectory, model: DepositionModel) -> FilmIntegrator:
-    path, _ = spray_path(
-        motion, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
-    )
-    integrator = FilmIntegrator(points, model, 'double')
-    integrator.add(path)
-    return integrator
-
-
 @pytest.mark.slow
 @many
-@given(points=parts(), motion=motions(), model=models())
-def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, model):
-    film = offline(points, motion, model)
+@given(motion=motions(), model=models())
+def test_a_film_is_never_negative_and_holds_what_was_sprayed(motion, model):
+    film = painted(PLANE, motion, model, 'double')
     assert (film.film_um >= 0.0).all()
     assert np.isfinite(film.film_um).all()
-    landed_cm3 = float(film.film_um @ points.area_m2)
+    landed_cm3 = float(film.film_um @ PLANE.area_m2)
     if not model.effects:
-        # All of the narrow pattern meets the sheet; what is off is the sum over its points.
+        # All of the narrow pattern meets the plane; what is off is the sum over its points.
         assert abs(landed_cm3 - film.emitted_cm3) <= 0.01 * film.emitted_cm3
     else:
         assert landed_cm3 <= 1.3 * film.emitted_cm3
@@ -116,19 +87,17 @@ def test_a_film_is_never_negative_and_holds_what_was_sprayed(points, motion, mod
 @pytest.mark.slow
 @many
 @given(
-    points=parts(), motion=motions(), model=models(),
+    motion=motions(), model=models(),
     sizes=st.lists(st.integers(1, 60), min_size=1, max_size=5),
 )  # fmt: skip
-def test_the_live_film_is_the_offline_film_to_the_last_bit(points, motion, model, sizes):
-    expected = offline(points, motion, model)
-    film = LiveFilm(points, model, precision='double')
+def test_the_live_film_is_the_offline_film_to_the_last_bit(motion, model, sizes):
+    expected = painted(PLANE, motion, model, 'double')
+    film = LiveFilm(PLANE, model, precision='double')
     states = list(zip(motion.trigger_stamps_ns.tolist(), motion.trigger_flow, strict=True))
     start = turn = 0
     while start < len(motion):
         rows = slice(start, start + sizes[turn % len(sizes)])
-        batch = PoseBatch(
-            motion.stamps_ns[rows], motion.positions_m[rows], motion.quaternions_xyzw[rows]
-        )
+        batch = poses(motion, rows)
         while states and states[0][0] <= batch.stamps_ns[-1]:
             film.add_trigger(TriggerChange(states[0][0], float(states.pop(0)[1])))
         film.add_poses(batch)

@@ -8,22 +8,14 @@ import pytest
 from paint_deposition.film.statistics import film_statistics
 
 
-def test_even_film_is_its_own_mean():
-    area = np.array([0.1, 0.3, 0.6])
-    stats = film_statistics(np.full(3, 40.0), area, emitted_cm3=50.0)
-    assert stats.mean_um == pytest.approx(40.0, rel=1e-12)
-    assert stats.std_dev_um == pytest.approx(0.0, abs=1e-12)
-    assert stats.coverage == 1.0
-    # 40 um on 1 m2 is 40 cm3.
-    assert stats.painted_volume_cm3 == pytest.approx(40.0, rel=1e-12)
-    assert stats.capture_fraction == pytest.approx(0.8, rel=1e-12)
-
-
 def test_area_weighs_not_the_number_of_vertices():
     film = np.array([10.0, 10.0, 10.0, 30.0])
     area = np.array([0.1, 0.1, 0.1, 0.3])
-    stats = film_statistics(film, area, emitted_cm3=1.0)
+    stats = film_statistics(film, area, emitted_cm3=15.0)
     assert stats.mean_um == pytest.approx(20.0, rel=1e-12)
+    # 20 um on 0.6 m2 are 12 cm3.
+    assert stats.painted_volume_cm3 == pytest.approx(12.0, rel=1e-12)
+    assert stats.capture_fraction == pytest.approx(0.8, rel=1e-12)
     assert stats.std_dev_um == pytest.approx(10.0, rel=1e-12)
     assert (stats.min_um, stats.max_um) == (10.0, 30.0)
 

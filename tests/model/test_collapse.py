@@ -9,7 +9,6 @@ from scipy.integrate import quad
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse, line_integral_um_m_per_s
 from patterns import PATTERNS
 
-ACROSS_M = np.linspace(-0.7, 0.7, 57)
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,
     r1_m=0.22, r2_m=0.2, sigma1_m=0.09, sigma2_m=0.1, sigma3_m=0.15,
@@ -34,20 +33,12 @@ def test_eq3_is_the_papers_formula():
 def test_eq3_area_is_a_third_of_the_gains():
     area, _ = quad(EQ3.thickness_um, -2.0, 2.0, epsabs=1e-12, points=[0.0])
     assert pytest.approx(area, rel=1e-10) == EQ3.area_um_m
-
-
-def test_eq3_scaled_is_that_much_thicker():
     assert EQ3.scaled(3.0).area_um_m == pytest.approx(3.0 * EQ3.area_um_m)
-
-
-def test_eq3_is_negligible_beyond_its_reach():
-    peak = EQ3.thickness_um(ACROSS_M).max()
-    for sign in (-1.0, 1.0):
-        assert EQ3.thickness_um(sign * EQ3.reach_m) < 1e-8 * peak
+    assert EQ3.thickness_um(EQ3.reach_m) < 1e-8 * EQ3.thickness_um(0.0)
 
 
 @pytest.mark.parametrize('name', PATTERNS)
-@pytest.mark.parametrize('travel_rad', [0.0, 0.9, 2.5])
+@pytest.mark.parametrize('travel_rad', [0.0, 2.5])
 def test_line_integral_matches_adaptive_quadrature_of_eq1(name, travel_rad):
     planar = PATTERNS[name]
     along = np.array([math.cos(travel_rad), math.sin(travel_rad)])

@@ -11,7 +11,6 @@ from scipy.integrate import quad
 
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
-RINGS = [(0.0, 0.09), (0.02, 0.09), (0.09, 0.09), (0.22, 0.09), (0.22, 0.02), (1.0, 0.005)]
 PATTERNS = st.builds(
     PlanarPattern,
     K1_cm3_per_s=st.floats(0.01, 100.0),
@@ -22,30 +21,6 @@ PATTERNS = st.builds(
     sigma1_m=st.floats(0.005, 1.0),
     sigma2_m=st.floats(0.005, 1.0),
 )
-
-
-def over_the_plane(density, radius_m, width_m):
-    """Integral of a radially symmetric density [1/m^2] that changes near radius and centre."""
-    points = sorted({min(max(radius_m + k * width_m, 0.0), radius_m + 12 * width_m)
-                     for k in range(-12, 13, 2)})  # fmt: skip
-    far = radius_m + 40 * width_m
-    return sum(
-        quad(lambda rho: 2.0 * math.pi * rho * density(rho, 0.0), a, b, epsabs=1e-13)[0]
-        for a, b in zip([0.0, *points], [*points, far], strict=True)
-        if b > a
-    )
-
-
-@pytest.mark.parametrize(('r_m', 'sigma_m'), RINGS)
-def test_g1_integrates_to_one(r_m, sigma_m):
-    pattern = PlanarPattern(r_m=r_m, sigma1_m=sigma_m)
-    assert over_the_plane(pattern.g1, r_m, sigma_m) == pytest.approx(1.0, abs=1e-11)
-
-
-@pytest.mark.parametrize('sigma_m', [0.005, 0.15, 1.0])
-def test_g2_integrates_to_one(sigma_m):
-    pattern = PlanarPattern(sigma2_m=sigma_m)
-    assert over_the_plane(pattern.g2, 0.0, sigma_m) == pytest.approx(1.0, abs=1e-11)
 
 
 def test_gamma_by_hand():
@@ -72,21 +47,8 @@ def test_flux_by_hand():
     assert ring.flux_um_per_s(0.0, -0.1) == pytest.approx(0.5 * top)
 
 
-@pytest.mark.parametrize('phi_rad', [0.0, 0.6, -2.0, 3.0])
-def test_asymmetry_is_strongest_a_quarter_turn_after_phi(phi_rad):
-    pattern = PlanarPattern(K3=0.4, phi_rad=phi_rad)
-    angle = np.linspace(-math.pi, math.pi, 721)
-    f = pattern.f(np.cos(angle), np.sin(angle))
-    strongest = angle[f.argmax()]
-    assert math.cos(strongest - phi_rad - 0.5 * math.pi) == pytest.approx(1.0, abs=1e-4)
-    assert (f.min(), f.max()) == (pytest.approx(0.6, abs=1e-4), pytest.approx(1.4, abs=1e-4))
-    # Not one value is lost on the whole turn: f integrates out against anything round.
-    assert f[:-1].mean() == pytest.approx(1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize('K2', [0.0, 0.15, 1.0])
-@pytest.mark.parametrize('K3', [0.0, 0.2, 1.0])
-@pytest.mark.parametrize(('r_m', 'sigma_m'), [(0.0, 0.09), (0.1, 0.09), (0.22, 0.09)])
+@pytest.mark.parametrize(('K2', 'K3'), [(0.0, 0.2), (0.15, 1.0), (1.0, 0.0)])
+@pytest.mark.parametrize(('r_m', 'sigma_m'), [(0.0, 0.09), (0.02, 0.09), (0.22, 0.02)])
 def test_the_whole_pattern_is_k1(K2, K3, r_m, sigma_m):
     pattern = PlanarPattern(K1_cm3_per_s=1.7, K2=K2, K3=K3, r_m=r_m, sigma1_m=sigma_m)
     node, weight = np.polynomial.legendre.leggauss(300)

@@ -9,7 +9,6 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import NEAREST_M, Projection
@@ -63,14 +62,6 @@ def test_a_slanting_element_by_hand():
     assert got[0] == pytest.approx(0.421875 * PLANAR.flux_um_per_s(0.225, 0.0), rel=1e-11)
 
 
-@pytest.mark.parametrize('angle_deg', [0, 30, 60, 89])
-def test_on_the_axis_tilting_costs_the_cosine(angle_deg):
-    plain = PlanarPattern(K3=0.0)
-    angle = math.radians(angle_deg)
-    got = flux([0, 0, 0], [math.sin(angle), 0, math.cos(angle)], [0, 0, 0.25], planar=plain)
-    assert got[0] == pytest.approx(math.cos(angle) * plain.flux_um_per_s(0, 0), rel=1e-11)
-
-
 def disc(radius_m, count=240, angles=180):
     """Distances t and angles over a disc with weights, smooth functions to rounding."""
     node, weight = np.polynomial.legendre.leggauss(count)
@@ -89,15 +80,6 @@ def plane(tilt_rad):
     return positions, normals, weight * t
 
 
-def cylinder(radius_m):
-    """Patch around the crest of a cylinder along x; concave toward the gun if radius < 0."""
-    t, angle, weight = disc(0.5 * math.pi * abs(radius_m))
-    x, turn = t * np.cos(angle), t * np.sin(angle) / radius_m
-    positions = np.stack([x, radius_m * np.sin(turn), radius_m * (np.cos(turn) - 1.0)], axis=1)
-    normals = np.stack([0.0 * x, np.sin(turn), np.cos(turn)], axis=1)
-    return positions, normals, weight * t
-
-
 def sphere(radius_m, standoff_m):
     """Cap of a sphere as far as it is seen from the emission point."""
     seen = math.acos(radius_m / (radius_m + standoff_m + PROJECTION.emission_offset_m))
@@ -110,16 +92,6 @@ def sphere(radius_m, standoff_m):
 @pytest.mark.parametrize('tilt_deg', [0, 15, -30, 45])
 def test_a_plane_however_tilted_takes_all(standoff_m, tilt_deg):
     positions, normals, area = plane(math.radians(tilt_deg))
-    got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
-    assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
-
-
-@pytest.mark.parametrize('standoff_m', STANDOFFS_M)
-@pytest.mark.parametrize('radius_m', [0.6, 2.0, -1.2])
-def test_a_cylinder_takes_all(standoff_m, radius_m):
-    positions, normals, area = cylinder(radius_m)
-    if radius_m < 0.0:  # the gun stands inside: what is behind it is not lit
-        assert standoff_m + PROJECTION.emission_offset_m < abs(radius_m)
     got = flux(positions, normals, [0, 0, standoff_m], planar=NARROW)
     assert area @ got == pytest.approx(NARROW.K1_cm3_per_s, rel=2e-5)
 
@@ -178,13 +150,3 @@ def test_an_emission_point_before_the_bell_has_no_pole():
     got = flux(points, np.tile([0, 0, 1], (5, 1)), [0, 0, 0.25], projection=ahead)
     assert got[:4].tolist() == [0, 0, 0, 0]
     assert got[4] > 0.0
-
-
-def test_the_model_joins_them():
-    model = DepositionModel(planar=NARROW, projection=PROJECTION)
-    assert model.reach_m == NARROW.radius_of_flux_m(1e-6)
-    assert max(model.shadows) == 0.0
-    assert DepositionModel(effects=(Occlusion(strength=0.7),)).shadows[0] == 0.7
-    assert not model.needs_whole_strokes
-    assert model.max_step_m == pytest.approx(0.0025)
-    assert DepositionModel().max_step_m == pytest.approx(0.008)

@@ -10,10 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
-from paint_deposition.model.eq4_eq5_uniformity import (
-    ParallelPasses,
-    variation,
-)
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 EQ3 = ThreeGaussianCollapse(
     K1_um_m=9.0, K2_um_m=6.0, K3_um_m=8.0,
@@ -46,14 +43,6 @@ def test_sigma_n_matches_adaptive_quadrature(index_m):
     assert ParallelPasses.one_way(EQ3).sigma_n(index_m) == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize('index_m', INDICES_M)
-def test_many_passes_give_the_figures_of_endless_ones(index_m):
-    passes = [(EQ3, k * index_m) for k in range(-15, 16)]
-    film = variation(passes, -0.5 * index_m, 0.5 * index_m)
-    assert film.sigma_n == pytest.approx(ParallelPasses.one_way(EQ3).sigma_n(index_m), abs=1e-9)
-    assert film.mean_um == pytest.approx(EQ3.area_um_m / index_m, rel=1e-12)
-
-
 def test_single_gaussian_has_its_known_sigma_n():
     """One Gaussian: sigma_n^2 = 2 sum exp(-(2 pi k sigma / index)^2)."""
     sigma, index = 0.12, 0.4
@@ -66,11 +55,6 @@ def test_single_gaussian_has_its_known_sigma_n():
     assert ParallelPasses.one_way(one).sigma_n(index) == pytest.approx(expected, rel=1e-8)
 
 
-def test_dense_passes_are_even_and_distant_ones_are_not():
-    assert ParallelPasses.one_way(EQ3).sigma_n(0.05) < 1e-9
-    assert ParallelPasses.one_way(EQ3).sigma_n(3.0) > 1.0
-
-
 @pytest.mark.parametrize(
     ('index_m', 'percent'), [(0.525, 10.8), (0.577, 3.4), (0.600, 4.8), (0.625, 9.2)]
 )
@@ -79,15 +63,6 @@ def test_ring_pattern_is_most_even_near_its_half_width(index_m, percent):
     planar = PlanarPattern(K2=0.15, K3=0.0, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15)
     raster = ParallelPasses.one_way(sampled_collapse(DepositionModel(planar=planar), 0.2))
     assert 100.0 * raster.sigma_n(index_m) == pytest.approx(percent, abs=0.06)
-
-
-@pytest.mark.parametrize('index_m', INDICES_M)
-def test_sigma_n_of_the_2d_model_matches_dense_quadrature(index_m):
-    pass_ = sampled_collapse(DepositionModel(), 0.2)
-    dense = ParallelPasses.one_way(pass_).thickness_um(index_m, np.arange(20000) / 20000 * index_m)
-    expected = dense.std() / dense.mean()
-    assert ParallelPasses.one_way(pass_).sigma_n(index_m) == pytest.approx(expected, abs=1e-6)
-    assert dense.mean() == pytest.approx(ParallelPasses.one_way(pass_).mean_um(index_m), rel=1e-6)
 
 
 def test_alternating_mirrored_passes():
@@ -100,12 +75,3 @@ def test_alternating_mirrored_passes():
     np.testing.assert_allclose(raster.thickness_um(index, x), by_hand, rtol=1e-12)
     assert raster.sigma_n(index) == pytest.approx(by_hand.std() / by_hand.mean(), rel=1e-9)
     assert raster.sigma_n(index) > 1.01 * ParallelPasses.one_way(EQ3).sigma_n(index)
-
-
-def test_three_passes_are_even_inside_and_not_to_their_ends():
-    index = 0.577
-    pass_ = sampled_collapse(DepositionModel(), 0.2)
-    passes = [(pass_, k * index) for k in (-1, 0, 1)]
-    inside = variation(passes, -0.5 * index, 0.5 * index)
-    assert inside.sigma_n == pytest.approx(ParallelPasses.one_way(pass_).sigma_n(index), rel=0.05)
-    assert variation(passes, -2.0 * index, 2.0 * index).sigma_n > 3.0 * inside.sigma_n

@@ -54,8 +54,10 @@ def assert_same_edge(there: SurfacePoints, alone: SurfacePoints) -> None:
     assert (there.edge_distance_m[~near] > 0.05).all()
 
 
-@pytest.mark.parametrize('thickness_m', [0.003, 0.012, 0.04])
-@pytest.mark.parametrize('side', SIDES)
+@pytest.mark.parametrize(
+    ('side', 'thickness_m'),
+    [('-y', 0.012), ('+x', 0.012), ('+y', 0.003), ('-x', 0.04), ('askew', 0.003)],
+)
 def test_the_outer_surface_of_the_solid_is_the_sheet(side, thickness_m):
     sheet, shell = parts(side, thickness_m)
     alone, there = on_both(sheet, shell)
@@ -66,8 +68,7 @@ def test_the_outer_surface_of_the_solid_is_the_sheet(side, thickness_m):
     assert_same_edge(there, alone)
 
 
-@pytest.mark.parametrize('tilt_deg', [-40.0, 0.0, 15.0, 40.0])
-@pytest.mark.parametrize('poses', [1, 7, 400])
+@pytest.mark.parametrize(('tilt_deg', 'poses'), [(-40.0, 7), (0.0, 1), (40.0, 400)])
 def test_any_motion_in_front_tells_the_same_side_to_the_last_bit(tilt_deg, poses):
     _, shell = parts('+x', 0.012)
     rng = np.random.default_rng(poses)
@@ -82,13 +83,6 @@ def test_any_motion_in_front_tells_the_same_side_to_the_last_bit(tilt_deg, poses
     assert toward_the_gun(shell, eyes, axes) is shell
 
 
-def test_a_rim_cut_straight_through_a_leaning_surface_is_an_edge():
-    sheet, shell = parts('-y', 0.012, drawn_along='y')
-    alone, there = on_both(sheet, shell)
-    np.testing.assert_allclose(there.curvature_per_m, alone.curvature_per_m, atol=1e-6)
-    assert_same_edge(there, alone)
-
-
 def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():
     sheet, shell = parts('+x', 0.003)
     rng = np.random.default_rng(2)
@@ -100,9 +94,7 @@ def test_readings_without_normals_lie_on_the_side_that_the_gun_paints():
     assert np.linalg.norm(place.positions_m - some.positions_m, axis=1).max() < 0.002
 
 
-@pytest.mark.parametrize(
-    ('thickness_m', 'facets'), [(0.002, 6), (0.003, 2), (0.003, 4), (0.003, 12), (0.012, 8)]
-)
+@pytest.mark.parametrize(('thickness_m', 'facets'), [(0.002, 6), (0.003, 2), (0.012, 8)])
 def test_a_round_hem_is_an_edge_and_no_curvature(thickness_m, facets):
     vertices, faces = triangulated(lambda x, z: 0.15 * x**2 + 0.1 * z**2, 0.015, jitter=0.2)
     sheet = Surface.from_triangles(vertices, faces, 0.03)
@@ -113,8 +105,7 @@ def test_a_round_hem_is_an_edge_and_no_curvature(thickness_m, facets):
     assert_same_edge(there, alone)
 
 
-@pytest.mark.parametrize('turn_deg', [20.0, 40.0])
-@pytest.mark.parametrize('radius_m', [0.003, 0.01, 0.03])
+@pytest.mark.parametrize(('turn_deg', 'radius_m'), [(20.0, 0.03), (40.0, 0.003), (40.0, 0.01)])
 def test_a_rounded_line_across_the_door_is_no_hem(turn_deg, radius_m):
     lean = np.radians(0.5 * turn_deg)
     half_m = radius_m * np.sin(lean)

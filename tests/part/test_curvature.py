@@ -8,16 +8,16 @@ def well_inside(points, margin_m=0.04, half_width_m=0.2):
     return np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < half_width_m - margin_m
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize('radius_m', [0.25, 0.5, 2.0, -0.3, -1.0])
-@pytest.mark.parametrize(('spacing_m', 'jitter'), [(0.01, 0.0), (0.02, 0.3)])
+@pytest.mark.parametrize(
+    ('radius_m', 'spacing_m', 'jitter'), [(0.25, 0.01, 0.0), (2.0, 0.02, 0.3), (-0.3, 0.02, 0.3)]
+)
 def test_cylinder(make_surface, cylinder, radius_m, spacing_m, jitter):
     points = make_surface(cylinder(radius_m), spacing_m, jitter=jitter).points()
     inside = points.curvature_per_m[well_inside(points)]
     np.testing.assert_allclose(inside, -1.0 / radius_m, rtol=0.02)
 
 
-@pytest.mark.parametrize('radius_m', [0.4, 1.0, -0.5])
+@pytest.mark.parametrize('radius_m', [0.4, -0.5])
 def test_ball(make_surface, ball, radius_m):
     points = make_surface(ball(radius_m), 0.012, jitter=0.2).points()
     np.testing.assert_allclose(points.curvature_per_m, -2.0 / radius_m, rtol=0.02)

@@ -26,11 +26,6 @@ def test_a_closed_plate_ends_where_it_folds_back():
     assert middle.edge_distance_m[0] == pytest.approx(0.15)
 
 
-def test_a_concave_corner_is_no_edge(make_surface, fold):
-    surface = make_surface(fold(np.radians(-50)), 0.05)
-    assert surface.at([[0.0, 0.0, 0.0]]).edge_distance_m[0] == pytest.approx(0.2, abs=1e-6)
-
-
 @pytest.mark.parametrize('gap_m', [0.0, 1e-4])
 def test_a_seam_between_patches_triangulated_apart_is_no_edge(triangles, flat, gap_m):
     one, one_faces = triangles(flat, 0.05, half_width_m=0.2)

@@ -3,7 +3,6 @@
 import numpy as np
 import pytest
 from tests.surfaces import triangulated
-from trimesh.creation import box
 
 from paint_deposition.part.surface import Surface
 
@@ -39,14 +38,3 @@ def test_the_first_of_all_triangles_that_a_ray_crosses(waves, rays):
         along = crossings(waves, start, way)
         assert face == (np.argmin(along) if np.isfinite(along.min()) else -1)
     assert 0.1 < np.mean(met >= 0) < 0.9
-
-
-def test_no_ray_slips_between_triangles():
-    cube = box((1.0, 1.0, 1.0))
-    surface = Surface.from_triangles(cube.vertices, np.asarray(cube.faces), 0.03)
-    middles = surface.vertices_m[surface.faces[:, [0, 1]]].mean(axis=1)
-    ends = np.concatenate([surface.vertices_m, middles])
-    assert surface.first_faces(np.zeros_like(ends), ends).min() >= 0
-    ways = np.array([[0.0, 0.0, 1.0]])
-    assert surface.first_faces(np.array([[0.499, 0.1, -2.0]]), ways)[0] >= 0
-    assert surface.first_faces(np.array([[0.501, 0.1, -2.0]]), ways)[0] == -1

@@ -1,6 +1,5 @@
 """The sample parts and motions are what the documentation says they are."""
 
-import runpy
 import subprocess
 import sys
 
@@ -15,8 +14,6 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
-from surfaces import triangulated
 
 
 @pytest.fixture(scope='module')
@@ -85,33 +82,3 @@ def test_the_motions_paint_the_front(samples, name, mesh, passes, mean_um):
     film = film_um(surface.points(), trajectory)
     share = surface.vertex_areas_m2 / surface.area_m2
     assert mean_um[0] < film @ share < mean_um[1]
-
-
-def test_film_does_not_depend_on_the_triangulation(samples):
-    """One door triangulated in three ways, and seen as the formula that it was drawn with."""
-    door_depth = runpy.run_path(samples / 'make_door.py')['door_depth']
-
-    def depth(x, z):
-        return door_depth(x, z + 0.45)
-
-    trajectory = motion(samples, 'door_horizontal')
-    lift = np.array([0.0, 0.0, 0.45])
-    x, z = np.random.default_rng(5).uniform(-0.43, 0.43, (2, 400))
-    exact = film_um(by_formula(depth, x, z, lift), trajectory)
-    for spacing_m, jitter, worst_um in [(0.01, 0.35, 0.15), (0.02, 0.0, 0.25), (0.03, 0.35, 0.5)]:
-        vertices, faces = triangulated(depth, spacing_m, half_width_m=0.44, jitter=jitter)
-        surface = Surface.from_triangles(vertices + lift, faces, 0.02)
-        readings = surface.at(np.stack([x, depth(x, z), z], axis=1) + lift)
-        off = film_um(readings, trajectory) - exact
-        assert np.abs(off).max() < worst_um
-        assert np.sqrt(np.mean(off**2)) < 0.25 * worst_um
-
-
-def by_formula(depth, x, z, lift) -> SurfacePoints:
-    h = 1e-5
-    normals = np.stack(
-        [(depth(x + h, z) - depth(x - h, z)) / (2 * h), -np.ones_like(x),
-         (depth(x, z + h) - depth(x, z - h)) / (2 * h)], axis=1
-    )  # fmt: skip
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    return SurfacePoints(np.stack([x, depth(x, z), z], axis=1) + lift, normals)

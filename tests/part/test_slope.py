@@ -15,28 +15,11 @@ def test_exact_for_linear_fields_on_a_standing_plane(make_surface, flat):
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), -5.0)
 
 
-def test_leaning_surface_has_the_sine_of_its_lean(make_surface):
-    lean = np.radians(30)
-    points = make_surface(lambda x, z: z * np.tan(lean), 0.03).points()
-    down_the_surface = np.array([0.0, -np.sin(lean), -np.cos(lean)])
-    expected = np.cos(lean) * np.array([3.0, -2.0, 5.0]) @ down_the_surface
-    np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), expected)
-
-
 def test_level_surface_has_none(triangles, flat):
     vertices, faces = triangles(flat, 0.05)
     lying = vertices[:, [0, 2, 1]] * [1, 1, -1]
     points = Surface.from_triangles(lying, faces, 0.02, down=[0, 0, -1]).points()
     np.testing.assert_allclose(points.slope_per_m @ linear(points.positions_m), 0.0, atol=1e-9)
-
-
-def test_second_order_on_a_curved_surface(make_surface, cylinder):
-    points = make_surface(cylinder(0.5), 0.01).points()
-    inside = np.abs(points.positions_m[:, [0, 2]]).max(axis=1) < 0.18
-    angle = np.arcsin(points.positions_m[:, 2] / 0.5)
-    slope = points.slope_per_m @ np.sin(6.0 * angle)
-    exact = -6.0 / 0.5 * np.cos(6.0 * angle) * np.cos(angle)
-    np.testing.assert_allclose(slope[inside], exact[inside], atol=0.02 * 12.0)
 
 
 def test_readings_get_the_slope_from_their_neighbours(make_surface, cylinder):

@@ -8,9 +8,7 @@ import pytest
 from folded_parts import bumper, hood
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.faces import FacePasses, in_order, motion_over
@@ -18,6 +16,7 @@ from paint_deposition.planning.part_plan import plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
+from scenes import painted
 from surfaces import solid
 
 NARROW = DepositionModel(
@@ -29,13 +28,6 @@ STYLE = PassStyle(standoff_m=0.2, speed_m_per_s=0.3)
 @pytest.fixture(scope='module')
 def planned():
     return plan_faces(bumper(), NARROW, PlanRequest(target_um=20.0), 'part')
-
-
-def film_of(plan, trajectory) -> np.ndarray:
-    path, _ = spray_path(trajectory, max_step_m=plan.model.max_step_m)
-    integrator = FilmIntegrator(plan.surface.points(), plan.model)
-    integrator.add(path)
-    return integrator.film_um
 
 
 def level_pass(y_m: float, begin_m: float = 0.0, end_m: float = 1.0) -> PlannedPass:
@@ -51,7 +43,11 @@ def test_faces_paint_the_whole_part_more_evenly_when_blended(planned):
     assert planned.sigma_n < planned.sigma_n_unblended
     assert planned.sigma_n < 0.6 * planned.sigma_n_unblended
     assert planned.statistics.mean_um == pytest.approx(20.0, rel=0.02)
-    np.testing.assert_allclose(planned.film_um, film_of(planned, planned.trajectory), rtol=1e-4)
+    np.testing.assert_allclose(
+        planned.film_um,
+        painted(planned.surface.points(), planned.trajectory, NARROW).film_um,
+        rtol=1e-4,
+    )
 
 
 @pytest.mark.slow
@@ -65,8 +61,12 @@ def test_the_motion_has_no_jump_and_keeps_clear(planned):
 @pytest.mark.slow
 def test_files_read_back_to_the_same_film(planned, tmp_path):
     write_plan(tmp_path, planned)
-    bag = film_of(planned, read_recording(tmp_path / 'trajectory'))
-    program = film_of(planned, read_recording(tmp_path / 'passes.mod'))
+    bag = painted(
+        planned.surface.points(), read_recording(tmp_path / 'trajectory'), NARROW
+    ).film_um
+    program = painted(
+        planned.surface.points(), read_recording(tmp_path / 'passes.mod'), NARROW
+    ).film_um
     peak = planned.film_um.max()
     assert np.abs(bag - planned.film_um).max() < 1e-3 * peak
     # Zones and acceleration are left out of a program; its moves are straight.

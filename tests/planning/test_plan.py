@@ -7,16 +7,15 @@ import pytest
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.planning.films import evenness
+from paint_deposition.planning.placing import place_passes
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
 from planning.test_surface_map import sheet
+from scenes import painted
 
 pytestmark = pytest.mark.slow
 
@@ -36,15 +35,8 @@ def planned(bowed):
     return plan(bowed, NARROW, PlanRequest(target_um=20.0), 'part')
 
 
-def film_of(surface, model, trajectory):
-    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
-    integrator = FilmIntegrator(surface.points(), model)
-    integrator.add(path)
-    return integrator.film_um
-
-
 def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
-    film = film_of(bowed, NARROW, planned.trajectory)
+    film = painted(bowed.points(), planned.trajectory, NARROW).film_um
     np.testing.assert_allclose(planned.film_um, film, rtol=1e-5)
     mean, sigma_n = evenness(film, bowed.vertex_areas_m2)
     assert mean == pytest.approx(20.0, rel=3e-3)
@@ -52,16 +44,17 @@ def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
     assert planned.statistics.coverage == 1.0
 
 
-def test_placing_beats_the_plane_s_recommendation_on_this_part(planned):
+def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(planned):
     assert planned.sigma_n < 0.97 * planned.plane_on_part.sigma_n
     assert planned.sigma_n == pytest.approx(planned.placing.sigma_n, rel=0.1)
-
-
-def test_neighbouring_indices_are_no_better(bowed, planned):
-    for change in (0.97, 1.03):
-        index = change * planned.placing.index_m
-        other = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_m=index))
-        assert other.placing.sigma_n > 0.97 * planned.placing.sigma_n
+    films, index = planned.line_films, planned.placing.index_m
+    across = tuple(films.surface_map.extent_m[1])
+    for beside in (0.97 * index, 1.03 * index):
+        other = place_passes(films, across, (beside, beside))
+        assert other.index_m == pytest.approx(beside)
+        np.testing.assert_allclose(np.diff(other.lines_m), beside, atol=1e-9)
+        assert other.sigma_n > 0.97 * planned.placing.sigma_n
+    assert 0.22 <= place_passes(films, across, (0.22, 0.3)).index_m <= 0.3
 
 
 def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():
@@ -81,15 +74,6 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     first, last = (vertical.passes[k].positions_m for k in (0, -1))
     assert first[-1, 2] < first[0, 2] - 0.5
     assert last[:, 0].mean() > first[:, 0].mean() + 0.3
-
-
-def test_given_index_is_kept_and_range_respected(bowed):
-    fixed = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_m=0.2))
-    assert fixed.placing.index_m == 0.2
-    lines = [planned.across_m for planned in fixed.passes]
-    np.testing.assert_allclose(np.diff(lines), 0.2, atol=1e-9)
-    ranged = plan(bowed, NARROW, PlanRequest(speed_m_per_s=0.3, index_min_m=0.22, index_max_m=0.3))
-    assert 0.22 <= ranged.placing.index_m <= 0.3
 
 
 @pytest.mark.parametrize(
@@ -115,7 +99,7 @@ def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
     recorded = read_trajectory(tmp_path / 'trajectory', state_topic='atomizer/state')
     np.testing.assert_array_equal(recorded.stamps_ns, planned.trajectory.stamps_ns)
     np.testing.assert_allclose(recorded.positions_m, planned.trajectory.positions_m)
-    film = film_of(bowed, NARROW, recorded)
+    film = painted(bowed.points(), recorded, NARROW).film_um
     np.testing.assert_allclose(film, planned.film_um, rtol=1e-5)
     content = json.loads((tmp_path / 'plan.json').read_text())
     assert content['passes'] == len(planned.passes)
@@ -132,12 +116,3 @@ def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):
     with pytest.raises(Exception, match='no planned bag; move it away'):
         write_plan(tmp_path, planned)
     assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'
-
-
-def test_sample_door_in_either_direction(repository):
-    door = read_mesh(repository / 'ros2_ws/src/paint_deposition/samples/door.stl')
-    for direction in ('horizontal', 'vertical'):
-        result = plan(door, DepositionModel(), PlanRequest(direction=direction, speed_m_per_s=0.3))
-        assert result.sigma_n < 0.13
-        assert result.sigma_n < result.plane_on_part.sigma_n
-        assert result.statistics.coverage == 1.0

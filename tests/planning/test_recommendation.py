@@ -67,11 +67,6 @@ def test_drift_limits_are_where_the_tolerance_breaks():
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
 
 
-def test_with_effects_it_is_not_known_how_far_the_standoff_may_drift():
-    narrow = SYMMETRIC.with_effect(EFFECTS['pattern_spread'](exponent=-0.5))
-    assert recommended(narrow, tolerance=0.05).standoff_drift_m is None
-
-
 def test_mean_film_and_speed_for_a_target():
     answer = recommend(SYMMETRIC, IndexRequest(target_um=20.0))
     assert answer.mean_um == pytest.approx(20.0, rel=1e-9)
@@ -79,15 +74,10 @@ def test_mean_film_and_speed_for_a_target():
     assert answer.speed_m_per_s == pytest.approx(solids / (20.0 * answer.index_m), rel=1e-9)
 
 
-def test_target_beside_a_speed_is_judged_not_followed():
-    answer = recommended(target_um=20.0)
-    assert answer.speed_m_per_s == 0.2
-    assert any('target of 20 µm' in note for note in answer.notes)
-
-
 def test_passes_cover_the_width_to_its_edges():
     width = 1.5
-    answer = recommended(tolerance=0.05, width_m=width)
+    answer = recommended(tolerance=0.05, width_m=width, target_um=20.0)
+    assert any('target of 20 µm would need' in note for note in answer.notes)
     film, fewer = (
         sum(
             answer.collapse.thickness_um(
@@ -102,15 +92,10 @@ def test_passes_cover_the_width_to_its_edges():
     assert fewer.min() < 0.95 * least
     strokes = answer.passes * width + (answer.passes - 1) * answer.index_m
     assert answer.cycle_time_s == pytest.approx(strokes / 0.2)
-
-
-def test_passes_on_a_width_are_nearly_as_even_as_endless_ones():
-    answer = recommended(tolerance=0.05, width_m=2.0)
-    assert answer.sigma_n_over_width == pytest.approx(answer.sigma_n, abs=0.02)
-    x = np.linspace(-1.0, 1.0, 4001)
-    lines = (np.arange(answer.passes) - 0.5 * (answer.passes - 1)) * answer.index_m
-    film = sum(answer.collapse.thickness_um(x - line) for line in lines)
-    assert answer.sigma_n_over_width == pytest.approx(film.std() / film.mean(), rel=2e-3)
+    one_way = recommended(tolerance=0.05, width_m=width, one_way=True)
+    assert one_way.sigma_n == answer.sigma_n
+    assert one_way.cycle_time_s > answer.cycle_time_s
+    assert (one_way.travel, answer.travel) == ('one_way', 'alternating')
 
 
 @pytest.mark.parametrize('turns', [False, True])
@@ -128,14 +113,6 @@ def test_a_simulated_serpentine_is_as_even_as_said(turns):
     assert film.mean() == pytest.approx(answer.mean_um, rel=1e-3)
 
 
-def test_one_way_costs_time_and_not_evenness():
-    there_and_back = recommended(LOPSIDED, width_m=1.0)
-    one_way = recommended(LOPSIDED, width_m=1.0, one_way=True)
-    assert one_way.sigma_n == there_and_back.sigma_n
-    assert one_way.cycle_time_s > there_and_back.cycle_time_s
-    assert (one_way.travel, there_and_back.travel) == ('one_way', 'alternating')
-
-
 def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
     kept, turned = (
         recommended(LOPSIDED, tolerance=0.2, gun_turns=turns) for turns in (False, True)
@@ -148,15 +125,6 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
     other_way = SampledCollapse(-profile.x_m[::-1], profile.film_um[::-1], profile.finest_m)
     mirrored = ParallelPasses(profile, other_way).sigma_n(kept.index_m)
     assert float(note.split()[-1]) == pytest.approx(mirrored, abs=1e-4)
-
-
-def test_direction_of_travel_turns_the_asymmetry():
-    planar = PlanarPattern(K3=0.4, phi_rad=0.0)
-    across, along = (
-        recommended(DepositionModel(planar=planar), travel_rad=angle, tolerance=0.5)
-        for angle in (0.0, math.pi / 2)
-    )
-    assert along.sigma_n < 0.5 * across.sigma_n
 
 
 @pytest.mark.parametrize('scale', [0.2, 4.0])
@@ -183,9 +151,10 @@ def test_window_without_a_minimum_gives_its_middle():
     assert answer.sigma_n < 0.06
 
 
-def test_effects_on_the_finished_film_are_named_as_left_out():
-    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()))
+def test_what_is_not_known_with_effects_is_left_out_and_named():
+    answer = recommended(SYMMETRIC.with_effect(EFFECTS['overspray_fog']()), tolerance=0.05)
     assert any('overspray_fog' in note for note in answer.notes)
+    assert answer.standoff_drift_m is None
 
 
 @pytest.mark.parametrize(

@@ -60,16 +60,6 @@ def test_what_is_finer_than_the_radius_is_smoothed_away_and_what_is_wider_kept()
     assert height[0] - height[100] == pytest.approx(-0.5 * 0.35**2, rel=0.05)
 
 
-def test_past_the_edge_height_and_normal_are_held():
-    surface = sheet(lambda x, z: 0.3 * np.abs(x))
-    surface_map = SurfaceMap(surface, pass_axes(surface), 0.08)
-    out = np.linspace(0.6, 2.0, 30)
-    heights, normals = surface_map.height_m(out, 0.0 * out), surface_map.normals(out, 0.0 * out)
-    assert np.ptp(heights) < 1e-3
-    np.testing.assert_allclose(normals, np.broadcast_to(normals[0], normals.shape), atol=1e-3)
-    assert np.isfinite(heights).all()
-
-
 def test_hidden_and_averted_surface_is_not_painted():
     front, back = sheet(lambda x, z: 0.0 * x), sheet(lambda x, z: 0.0 * x + 0.2, half_m=0.2)
     both = Surface.from_triangles(

@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-import paint_deposition
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
@@ -96,26 +95,10 @@ def _run(path: Path, source: bytes, digest: str) -> ModuleType:
     except Exception as error:
         del sys.modules[module.__name__]
         line = _line_in(error, path)
-        remedy = _new_place(error) or 'correct the file'
         raise ModelError(
-            f'{path}{line}: {type(error).__name__}: {_one_line(error)}; {remedy}'
+            f'{path}{line}: {type(error).__name__}: {_one_line(error)}; correct the file'
         ) from None
     return module
-
-
-def _new_place(error: Exception) -> str | None:
-    """What to import instead, where the file imports a module that lies elsewhere by now."""
-    wanted = re.search(
-        r"named 'paint_deposition\.(?:\w+\.)*(\w+)'|name '(\w+)' from 'paint_deposition",
-        str(error),
-    )
-    if not isinstance(error, ImportError) or wanted is None:
-        return None
-    package = Path(paint_deposition.__file__).parent
-    for found in package.rglob(f'{wanted[1] or wanted[2]}.py'):
-        module = found.relative_to(package.parent).with_suffix('')
-        return f'import {".".join(module.parts)}'
-    return None
 
 
 def _line_in(error: Exception, path: Path) -> str:

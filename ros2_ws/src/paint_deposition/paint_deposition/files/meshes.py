@@ -39,8 +39,8 @@ def read_mesh(
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
-        scale: metres per unit of the file, 0.001 for millimetres; with glTF, 3MF and STEP on top of
-            the unit that they have.
+        scale: metres per unit of the file, 0.001 for millimetres; with glTF, 3MF and STEP on top
+            of the unit that they have.
         max_edge_length_m: longest edge after refinement [m].
         down: gravity in the mesh frame; default: -z, or -y if it is drawn flat at z = 0.
         body: name of the one body to take of several; default: all as one part, with a note.

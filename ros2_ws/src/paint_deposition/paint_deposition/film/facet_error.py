@@ -22,18 +22,13 @@ WANTED, SAFETY = 0.01, 0.5
 
 @dataclass(frozen=True)
 class FacetError:
-    """The worst error of the film from the facets of a mesh.
+    """The worst error of the film from the facets of a mesh."""
 
-    Attributes:
-        share: of the thickest film, 0 on a plane.
-        where_m: (3,) middle of the edge where it is, None without any [m].
-        edge_m: its length as it was read [m]. turn_deg: by which the normals turn along it [deg].
-    """
-
-    share: float
+    share: float  # of the thickest film, 0 on a plane
+    # (3,) middle of the edge where it is, None without any [m].
     where_m: tuple[float, float, float] | None = None
-    edge_m: float = math.nan
-    turn_deg: float = math.nan
+    edge_m: float = math.nan  # its length as it was read [m]
+    turn_deg: float = math.nan  # by which the normals turn along it [deg]
 
     @property
     def warning(self) -> str:

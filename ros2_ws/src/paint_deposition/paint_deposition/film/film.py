@@ -22,25 +22,16 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class GunFilm:
-    """What one of the guns on a part did.
+    """What one of the guns on a part did."""
 
-    Attributes:
-        name: of the gun, '' for the only one.
-        trajectory: its motion as recorded; path: the same cut into sub-steps; counts: its poses.
-        model: its deposition model.
-        geometry: how it ran over the part.
-        painted_volume_cm3: solids that it laid on the part, before effects on the film [cm3].
-        emitted_volume_cm3: solids that a part which catches everything would get of it [cm3].
-    """
-
-    name: str
-    trajectory: Trajectory
-    path: SprayPath
-    counts: PoseCounts
-    model: DepositionModel
-    geometry: SprayGeometry
-    painted_volume_cm3: float
-    emitted_volume_cm3: float
+    name: str  # of the gun, '' for the only one
+    trajectory: Trajectory  # its motion as recorded
+    path: SprayPath  # the same cut into sub-steps
+    counts: PoseCounts  # its poses
+    model: DepositionModel  # its deposition model
+    geometry: SprayGeometry  # how it ran over the part
+    painted_volume_cm3: float  # solids that it laid on the part, before effects on the film [cm3]
+    emitted_volume_cm3: float  # solids that a part which catches everything would get of it [cm3]
 
     def to_dict(self) -> dict[str, Any]:
         """Figures by name."""

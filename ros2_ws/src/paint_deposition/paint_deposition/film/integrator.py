@@ -23,11 +23,12 @@ from paint_deposition.film.layout import (
     step_rows,
     term_constants,
 )
-from paint_deposition.film.lines_of_sight import LinesOfSight, Obstacle, Sight
+from paint_deposition.film.lines_of_sight import LinesOfSight, Sight
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 Precision = Literal['single', 'double']
 # Reach of a pattern that may still become wider [m].
@@ -55,17 +56,11 @@ def _threads(rays: int) -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Steps:
-    """What the kernel reads of a path.
+    """What the kernel reads of a path."""
 
-    Attributes:
-        rows: (M, 16) sub-steps that spray, see ``layout.step_rows``.
-        sight: what is seen on them.
-        brush: (M,) row among the model's patterns of the one that sprays.
-    """
-
-    rows: np.ndarray
-    sight: Sight
-    brush: np.ndarray
+    rows: np.ndarray  # (M, 16) sub-steps that spray, see ``layout.step_rows``
+    sight: Sight  # what is seen on them
+    brush: np.ndarray  # (M,) row among the model's patterns of the one that sprays
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -92,7 +87,7 @@ class FilmIntegrator:
         points: SurfacePoints,
         model: DepositionModel,
         precision: Precision = 'single',
-        occluder: Obstacle | None = None,
+        occluder: Occluder | None = None,
         keep_absent_laws: bool = False,
         parallel: bool = True,
     ) -> None:
@@ -207,32 +202,15 @@ class FilmIntegrator:
         return Steps(rows, sight, brush)
 
     def _run(
-        self,
-        apart: bool,
-        steps: Steps,
-        constants: np.ndarray,
-        film: np.ndarray,
-        recent: np.ndarray,
-        terms: np.ndarray,
-    ) -> None:
+        self, apart: bool, steps: Steps, constants: np.ndarray,
+        film: np.ndarray, recent: np.ndarray, terms: np.ndarray,
+    ) -> None:  # fmt: skip
         blocks = self._blocks
         arguments = (
-            blocks.points,
-            blocks.normals,
-            steps.sight.seen,
-            film,
-            recent,
-            terms,
-            self._done,
-            blocks.spheres,
-            blocks.bounds,
-            steps.rows,
-            steps.sight.first,
-            steps.sight.tracing,
-            steps.brush,
-            constants.astype(self._real),
-            self._parameters,
-        )
+            blocks.points, blocks.normals, steps.sight.seen, film, recent, terms, self._done,
+            blocks.spheres, blocks.bounds, steps.rows, steps.sight.first, steps.sight.tracing,
+            steps.brush, constants.astype(self._real), self._parameters,
+        )  # fmt: skip
         kernel: Any = compile_kernel(*self._variant, apart, self._parallel)
         if not kernel.signatures:
             # Before the lock is taken: it may last seconds, and others paint meanwhile.

@@ -31,11 +31,9 @@ def uses_set_points(model: DepositionModel, brush: int, set_points: Sequence[flo
 def with_set_points(
     model: DepositionModel, set_points: Sequence[float]
 ) -> tuple[DepositionModel, int]:
-    """A model with the brush that set-points stand for, and the number of that brush.
+    """A model of several brushes with the one that set-points stand for, and its number.
 
-    Args:
-        model: with several brushes.
-        set_points: in the order of SETTINGS; those that are not above 0 are not known.
+    Set-points are in the order of SETTINGS; those that are not above 0 are not known.
 
     Raises:
         ModelError: they lie outside the calibrated brushes, or one is missing.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numba import get_num_threads, njit
@@ -14,6 +13,7 @@ from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 # Lines of sight are traced anew after this travel of the emission point [m].
 SIGHT_STEP_M = 0.01
@@ -21,29 +21,14 @@ SIGHT_STEP_M = 0.01
 RAYS_AT_ONCE = 200_000
 
 
-class Obstacle(Protocol):
-    """What can stand between gun and points."""
-
-    def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
-        """Whether nothing lies between (..., 3) eyes and points [m]."""
-
-    def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(V,) sine of the elevation from which on nothing can stand before a point."""
-
-
 @dataclass(frozen=True)
 class Sight:
-    """What is seen on the sub-steps of a path.
+    """What is seen on the sub-steps of a path."""
 
-    Attributes:
-        seen: (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
-        first: (S, B) where in ``seen`` the run of a tracing and a block begins.
-        tracing: (M,) row of ``first`` that holds on each sub-step.
-    """
-
+    # (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
     seen: np.ndarray
-    first: np.ndarray
-    tracing: np.ndarray
+    first: np.ndarray  # (S, B) where in ``seen`` the run of a tracing and a block begins
+    tracing: np.ndarray  # (M,) row of ``first`` that holds on each sub-step
 
     def select(self, steps: np.ndarray) -> Sight:
         """On some of the sub-steps."""
@@ -63,7 +48,7 @@ class LinesOfSight:
     than all of the part, nor any of a block that lies out of the pattern's reach.
     """
 
-    def __init__(self, obstacle: Obstacle, points: SurfacePoints, blocks: Blocks) -> None:
+    def __init__(self, obstacle: Occluder, points: SurfacePoints, blocks: Blocks) -> None:
         self._obstacle, self._blocks = obstacle, blocks
         self._positions_m = points.positions_m[blocks.order]
         self._normals = points.normals[blocks.order]
@@ -79,15 +64,10 @@ class LinesOfSight:
     ) -> tuple[Sight, np.ndarray | None]:
         """Trace from the first origin and then after every SIGHT_STEP_M of travel.
 
-        Args:
-            origins_m: (M, 3) emission points of the sub-steps [m].
-            rows: (M, 16) the same sub-steps as the kernel reads them.
-            brush: (M,) row of ``constants`` for each.
-            constants: (B, 11) of each brush.
-            last_m: (3,) origin of the tracing that held on the sub-step before [m], or None.
-
-        Returns:
-            What is seen, and the origin of the tracing that holds on the last sub-step.
+        Of the sub-steps their emission points (M, 3), their ``rows`` (M, 16) as the kernel reads
+        them, and the row (M,) of each in the brushes' constants (B, 11). ``last_m`` is the origin
+        of the tracing that held on the sub-step before. Returned are what is seen, and the origin
+        of the last tracing.
         """
         traced, tracing = _tracings(origins_m, last_m)
         blocks = self._blocks

@@ -15,7 +15,6 @@ from paint_deposition.film.interpolated_brushes import (
     with_brushes_of,
     with_set_points,
 )
-from paint_deposition.film.lines_of_sight import Obstacle
 from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.pose_stream import (
@@ -27,6 +26,7 @@ from paint_deposition.motion.pose_stream import (
 from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change so much older than the newest pose is from a stream that begins again [ns].
@@ -63,7 +63,7 @@ class LiveFilm:
         model: DepositionModel,
         *,
         precision: Precision = 'single',
-        occluder: Obstacle | None = None,
+        occluder: Occluder | None = None,
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
         trigger_latency_s: float = DEFAULT_TRIGGER_LATENCY_S,
         limit_poses: int = DEFAULT_LIMIT_POSES,

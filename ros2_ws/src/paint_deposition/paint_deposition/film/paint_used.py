@@ -16,20 +16,15 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 
 @dataclass(frozen=True)
 class PaintUsed:
-    """What left the gun; NaN where it is not known of a brush that sprayed.
+    """What left the gun; NaN where it is not known of a brush that sprayed."""
 
-    Attributes:
-        spraying_s: time sprayed by number of the brush, weighted by the flow.
-        emitted_cm3: solids that a part which catches everything would get.
-        wet_cm3, mass_g: paint as it is sprayed.
-        solids_cm3: solids in it.
-    """
-
+    # Time sprayed by number of the brush, weighted by the flow.
     spraying_s: Mapping[int, float] = field(default_factory=dict)
-    emitted_cm3: float = 0.0
+    emitted_cm3: float = 0.0  # solids that a part which catches everything would get
+    # Paint as it is sprayed.
     wet_cm3: float = 0.0
     mass_g: float = 0.0
-    solids_cm3: float = 0.0
+    solids_cm3: float = 0.0  # solids in it
 
     @staticmethod
     def of(model: DepositionModel, path: SprayPath) -> 'PaintUsed':
@@ -73,11 +68,7 @@ class PaintUsed:
         return on_part_cm3 / self.solids_cm3 if self.solids_cm3 else math.nan
 
     def figures(self, mean_um: float, on_part_cm3: float) -> dict[str, Any]:
-        """By name; None is not known.
-
-        Args:
-            mean_um: mean dry film [um]. on_part_cm3: solids on the part.
-        """
+        """By name, for a mean dry film [um] and the solids on the part; None is not known."""
         known = {
             'wet_cm3': self.wet_cm3,
             'mass_g': self.mass_g,

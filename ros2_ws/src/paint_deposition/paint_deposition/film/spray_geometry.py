@@ -192,31 +192,23 @@ RANGE = (0.05, 0.95)
 
 @dataclass(frozen=True)
 class SprayGeometry:
-    """How the gun ran over the part while it sprayed.
+    """How the gun ran over the part while it sprayed."""
 
-    Attributes:
-        passes: that spray for 50 mm or more.
-        speed_m_per_s: median of the TCP's over the paint sprayed [m/s].
-        standoff_m: median distance of the TCP from the nearest surface where the gun is over the
-            part, NaN where it never is [m].
-        standoff_low_m, standoff_high_m: 90 % of that paint leaves between these distances [m].
-        off_normal_deg: median angle between tool z and the way to that surface [deg].
-        paint_over_part: share of the spray's straight rays that meet the outward side of the
-            part, 0 to 1.
-        facet_error: worst error of the film from flat facets of a curved part, as a share of the
-            thickest film; see ``film.facet_error``.
-        warnings: what is odd, a line each, with its likely cause.
-    """
-
-    passes: int
-    speed_m_per_s: float
+    passes: int  # that spray for 50 mm or more
+    speed_m_per_s: float  # median of the TCP's over the paint sprayed [m/s]
+    # Median distance of the TCP from the nearest surface where the gun is over the part, NaN where
+    # it never is [m].
     standoff_m: float
+    # 90 % of that paint leaves between these distances [m].
     standoff_low_m: float
     standoff_high_m: float
-    off_normal_deg: float
+    off_normal_deg: float  # median angle between tool z and the way to that surface [deg]
+    # Share of the spray's straight rays that meet the outward side of the part, 0 to 1.
     paint_over_part: float
+    # Worst error of the film from flat facets of a curved part, as a share of the thickest film;
+    # see ``film.facet_error``.
     facet_error: float
-    warnings: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()  # what is odd, a line each, with its likely cause
 
     @property
     def sentence(self) -> str:

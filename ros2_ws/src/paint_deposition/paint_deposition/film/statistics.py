@@ -17,40 +17,30 @@ CPK_MEANS = (
 class FilmStatistics:
     """What the film on a part amounts to; mean to max are over the painted part of its area.
 
-    Attributes:
-        mean_um: mean film [um].
-        std_dev_um: standard deviation of the film [um].
-        min_um, max_um: least and greatest film [um].
-        coverage: share of the part's area that is painted, 0 to 1.
-        below_target, within_target, above_target: shares of the painted area below, in and above
-            the target band, 0 to 1; NaN without a target.
-        cpk: distance of the mean from the nearer limit of the band over three standard deviations;
-            NaN without a target or a standard deviation.
-        painted_volume_cm3: solids on the whole part, dust included [cm3].
-        capture_fraction: solids on the part over `emitted_volume_cm3`; NaN without any. It is no
-            transfer efficiency: K1 already holds that of a part which catches everything.
-        emitted_volume_cm3: solids that a part which catches everything would get [cm3].
-        area_m2: of the part [m2].
-        painted_above_um: film that counts as painted [um].
-        target_um, target_tolerance_um: the band is target +- tolerance [um]; 0 is no target.
-
-    With nothing painted, mean to max are 0.
+    With nothing painted they are 0.
     """
 
-    mean_um: float
-    std_dev_um: float
+    mean_um: float  # mean film [um]
+    std_dev_um: float  # standard deviation of the film [um]
+    # Least and greatest film [um].
     min_um: float
     max_um: float
-    coverage: float
+    coverage: float  # share of the part's area that is painted, 0 to 1
+    # Shares of the painted area below, in and above the target band, 0 to 1; NaN without a target.
     below_target: float
     within_target: float
     above_target: float
+    # Distance of the mean from the nearer limit of the band over three standard deviations; NaN
+    # without a target or a standard deviation.
     cpk: float
-    painted_volume_cm3: float
+    painted_volume_cm3: float  # solids on the whole part, dust included [cm3]
+    # Solids on the part over `emitted_volume_cm3`; NaN without any. It is no transfer efficiency:
+    # K1 already holds that of a part which catches everything.
     capture_fraction: float
-    emitted_volume_cm3: float
-    area_m2: float
-    painted_above_um: float
+    emitted_volume_cm3: float  # solids that a part which catches everything would get [cm3]
+    area_m2: float  # of the part [m2]
+    painted_above_um: float  # film that counts as painted [um]
+    # The band is target +- tolerance [um]; 0 is no target.
     target_um: float
     target_tolerance_um: float
 
@@ -76,15 +66,10 @@ def film_statistics(
     target_um: float = 0.0,
     target_tolerance_um: float = 0.0,
 ) -> FilmStatistics:
-    """Sum a film up.
+    """Sum up a film (V,) [um] by the area (V,) that each vertex stands for; 1 um on 1 m2 is 1 cm3.
 
-    Args:
-        film_um: (V,) film at the vertices [um].
-        area_m2: (V,) area that each vertex stands for [m2]; 1 um on 1 m2 is 1 cm3.
-        emitted_cm3: solids that a part which catches everything would get, K1 times the time
-            sprayed [cm3].
-        painted_above_um: film that counts as painted [um].
-        target_um, target_tolerance_um: target band [um]; target 0 is none.
+    ``emitted_cm3`` are the solids that a part which catches everything would get, K1 times the
+    time sprayed. A target of 0 is none.
     """
     painted = film_um > painted_above_um
     film, area = film_um[painted], area_m2[painted]

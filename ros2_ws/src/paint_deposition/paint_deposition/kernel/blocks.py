@@ -20,23 +20,16 @@ SPREAD = 8
 
 @dataclass(frozen=True)
 class Blocks:
-    """Points sorted into blocks of neighbours, each within a small sphere.
+    """Points sorted into blocks of neighbours, each within a small sphere."""
 
-    Attributes:
-        order: (V,) row in the caller's order of each sorted point.
-        origin_m: (3,) point that the coordinates are relative to, so that single precision
-            resolves them.
-        points, normals: (3, V) sorted, in the kernel's precision.
-        spheres: (B, 4) centre and radius [m].
-        bounds: (B + 1,) first point of each block.
-    """
-
-    order: np.ndarray
+    order: np.ndarray  # (V,) row in the caller's order of each sorted point
+    # (3,) point that the coordinates are relative to, so that single precision resolves them.
     origin_m: np.ndarray
+    # (3, V) sorted, in the kernel's precision.
     points: np.ndarray
     normals: np.ndarray
-    spheres: np.ndarray
-    bounds: np.ndarray
+    spheres: np.ndarray  # (B, 4) centre and radius [m]
+    bounds: np.ndarray  # (B + 1,) first point of each block
 
     @staticmethod
     def of(

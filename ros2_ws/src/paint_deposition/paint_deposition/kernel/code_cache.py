@@ -71,15 +71,11 @@ def named_for_its_code(
     """Name a function for all that will be compiled with it, for ``numba.njit(cache=True)``.
 
     Numba keeps compiled code in a file for each qualified name and compares only the time of the
-    function's own source file. With this name a change in what the function calls is seen too,
-    and processes that compile different variants at once cannot swap them. What the function
-    calls must be defined before it, and it must not enclose compiled functions: those differ in
-    every process, so that nothing would be found again.
-
-    Args:
-        function: what will be compiled.
-        laws: functions whose code makes it another than others of its name; default: its own.
-        variant: what else makes it another.
+    function's own source file. With this name a change in what the function calls is seen too, and
+    processes that compile different variants at once cannot swap them. What the function calls
+    must be defined before it, and it must not enclose compiled functions: those differ in every
+    process, so that nothing would be found again. ``laws`` are the functions whose code makes it
+    another than others of its name, by default its own; ``variant`` is what else does.
     """
     functions = [function] if laws is None else laws
     function.__qualname__ = f'{function.__qualname__}-{identity(functions, *variant)}'

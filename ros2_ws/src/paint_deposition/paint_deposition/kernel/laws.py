@@ -63,10 +63,7 @@ def _as_real(value: object, real: type) -> object:
 def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:
     """The laws' product as one function (ray, parameters) for compiled code.
 
-    Args:
-        laws: each with how many parameters it takes.
-        real: precision of the kernel.
-        offset: where in the flat parameters those of the first law begin.
+    Each law comes with how many parameters it takes; from ``offset`` on they lie in the flat ones.
     """
     if not laws:
 

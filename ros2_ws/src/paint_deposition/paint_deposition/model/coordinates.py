@@ -11,21 +11,16 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One of them.
+    """One of them."""
 
-    Attributes:
-        name: as in the posterior of a model file.
-        centre, width: mean and standard deviation of a weak prior.
-        low, high: bounds.
-        between_jobs: standard deviation between jobs of one bell at the same settings.
-    """
-
-    name: str
+    name: str  # as in the posterior of a model file
+    # Mean and standard deviation of a weak prior.
     centre: float
     width: float
+    # Bounds.
     low: float
     high: float
-    between_jobs: float
+    between_jobs: float  # standard deviation between jobs of one bell at the same settings
 
 
 # Weak priors: any bell's pattern lies well within two widths. They only keep finite what the

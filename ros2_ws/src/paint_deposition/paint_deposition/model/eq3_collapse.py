@@ -158,11 +158,8 @@ def line_integral_um_m_per_s(
     """(N,) eq. (1) integrated over lines of the model plane [um m/s].
 
     The part of f that is odd along a line integrates to zero. What is left of it is smooth in u
-    with distance along the line = |across| sinh(u), though not in the distance itself.
-
-    Args:
-        across_m: (N,) distances of the lines from the centre, positive along tool z times travel.
-        travel_rad: direction of the lines in the tool's x-y frame.
+    with distance along the line = |across| sinh(u), though not in the distance itself. Distances
+    (N,) of the lines from the centre are positive along tool z times travel.
     """
     p = planar
     across = np.abs(np.atleast_1d(across_m)).astype(float)

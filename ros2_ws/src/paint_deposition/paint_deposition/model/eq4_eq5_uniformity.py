@@ -14,15 +14,10 @@ FEWEST_POINTS = 32
 
 @dataclass(frozen=True)
 class ParallelPasses:
-    """Endless parallel passes at an even index.
+    """Endless parallel passes at an even index."""
 
-    Attributes:
-        first: collapse of every other pass, one of them at x = 0.
-        second: collapse of the passes between; the same object if all passes are alike.
-    """
-
-    first: Collapse
-    second: Collapse
+    first: Collapse  # collapse of every other pass, one of them at x = 0
+    second: Collapse  # collapse of the passes between; the same object if all passes are alike
 
     @staticmethod
     def one_way(collapse: Collapse) -> 'ParallelPasses':
@@ -95,35 +90,3 @@ class ParallelPasses:
         if self.alike:
             return [(self.first, 0.0)]
         return [(self.first, 0.0), (self.second, index_m)]
-
-
-@dataclass(frozen=True)
-class Variation:
-    """A film between two limits.
-
-    Attributes:
-        mean_um: [um].
-        sigma_n: standard deviation over the mean [1].
-    """
-
-    mean_um: float
-    sigma_n: float
-
-
-def variation(passes: list[tuple[Collapse, float]], low_m: float, high_m: float) -> Variation:
-    """Mean and sigma_n of the film of a finite number of passes between two limits.
-
-    Args:
-        passes: each pass's collapse and where its line lies [m].
-        low_m, high_m: limits [m], in the interior for eq. (5) to be approached.
-    """
-    finest = min(collapse.finest_m for collapse, _ in passes)
-    panels = max(1, math.ceil((high_m - low_m) / finest))
-    nodes, weights = np.polynomial.legendre.leggauss(6)
-    edges = np.linspace(low_m, high_m, panels + 1)
-    half = 0.5 * (edges[1] - edges[0])
-    x = (edges[:-1, np.newaxis] + half * (1.0 + nodes)).ravel()
-    weight = np.tile(0.5 * weights / panels, panels)
-    film = np.sum([collapse.thickness_um(x - centre) for collapse, centre in passes], axis=0)
-    mean = float(weight @ film)
-    return Variation(mean, math.sqrt(float(weight @ (film - mean) ** 2)) / mean)

@@ -58,8 +58,8 @@ def split_at_creases(
 ) -> tuple[np.ndarray, np.ndarray]:
     """Give each smooth patch its own vertices along creases and (E,) ``rim_folds``.
 
-    Returns:
-        (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new vertices.
+    Returned are (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new
+    vertices.
     """
     smooth = (np.abs(folds) <= CREASE_RAD) & ~rim
     one, other = edges.paired[smooth].T
@@ -85,9 +85,8 @@ def hem_folds(
 ) -> np.ndarray:
     """(E,) bool: folds of which several in a row turn convexly by at least ``turn_rad``.
 
-    Args:
-        ends_m: (E, 2, 3) each fold's ends [m]. folds_rad: (E,) positive if convex.
-        width_m: (E,) height of the lower of its two triangles [m].
+    Of each its ends (E, 2, 3), its angle, positive if convex, and the height of the lower
+    triangle.
     """
     hem = np.zeros(len(folds_rad), dtype=bool)
     close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > LEAST_RATE_PER_M * width_m)
@@ -119,11 +118,9 @@ def hem_folds(
 def strip_vertices(
     vertices_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray
 ) -> np.ndarray:
-    """(V,) bool: vertices of patches so narrow that they belong to a hem.
+    """(V,) bool: vertices of patches (F, 3) so narrow that they belong to a hem.
 
-    Args:
-        vertices_m: (V, 3) [m]. patches: (F, 3), on vertices that no two smooth patches share.
-        hem_half_edges: (H,) both half-edges of each fold of a hem, as numbered by ``Edges``.
+    No two smooth patches share vertices; of each fold of a hem both half-edges are given.
     """
     if not len(hem_half_edges):
         return np.zeros(len(vertices_m), dtype=bool)

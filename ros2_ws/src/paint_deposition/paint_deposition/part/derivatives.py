@@ -31,13 +31,10 @@ def curvature_per_m(
     the electric field E over a conductor, dE/dn = (k1 + k2) E in this sign: stronger toward convex
     surface. A cylinder's ridge of radius R has -1/R, a ball -2/R, a valley +1/R.
 
-    The divergence is that of a linear function fitted to the normals of the surface within the
-    radius: a fold narrower than it appears smoothed, and the triangulation does not show. Surface
-    round a rim does not count: a sheet drawn with its thickness has the curvature of one without.
-
-    Args:
-        points_m, normals: (N, 3) where it is wanted.
-        surface_m, surface_normals, surface_areas_m2: (S, 3), (S, 3), (S,) samples of the surface.
+    The divergence is that of a linear function fitted to the normals of the surface, given by
+    samples (S, 3) with areas (S,), within the radius: a fold narrower than it appears smoothed,
+    and the triangulation does not show. Surface round a rim does not count: a sheet drawn with its
+    thickness has the curvature of one without.
     """
     result = np.empty(len(points_m))
     for block, i, j, distance_m in near_pairs(points_m, surface_m, radius_m):
@@ -123,14 +120,9 @@ def slope_operator(
 def slope_at_stencil(
     centres_m: np.ndarray, above_m: np.ndarray, below_m: np.ndarray, way: np.ndarray
 ) -> scipy.sparse.csr_matrix:
-    """Slope at n points from a field on (points, neighbours above, neighbours below).
+    """Slope at n points from a field on them, n neighbours above and n below; ``way`` downhill.
 
-    Args:
-        centres_m, above_m, below_m: (n, 3) the points and their neighbours on the surface [m].
-        way: (n, 3) ``downhill`` at the points.
-
-    Returns:
-        Sparse (3 n, 3 n); only the first n rows are not zero [1/m].
+    Sparse (3 n, 3 n); only the first n rows are not zero [1/m].
     """
     count = len(centres_m)
     steepness = np.linalg.norm(way, axis=1)

@@ -20,11 +20,9 @@ SEAM_COSINE = -0.9
 
 
 def half_edges_by_edge(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Sort the half-edges of (F, 3) faces so that those of one edge follow one another.
+    """(3 F,) half-edges by lower vertex, higher vertex and number: an edge's follow each other.
 
-    Returns:
-        (3 F,) half-edges by lower vertex, higher vertex and number, and (E + 1,) where among them
-        those of each edge begin.
+    And (E + 1,) where among them those of each edge begin.
     """
     start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
     key = np.minimum(start, end)
@@ -50,17 +48,12 @@ def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 @dataclass(frozen=True)
 class Edges:
-    """Which half-edges lie on each other.
+    """Which half-edges lie on each other."""
 
-    Attributes:
-        paired: (E, 2) of two triangles with the same winding, in the order of their vertices.
-        clashing: (C, 2) of two triangles of opposite winding.
-        single: (B,) those without a partner, or with several.
-    """
-
+    # (E, 2) of two triangles with the same winding, in the order of their vertices.
     paired: np.ndarray
-    clashing: np.ndarray
-    single: np.ndarray
+    clashing: np.ndarray  # (C, 2) of two triangles of opposite winding
+    single: np.ndarray  # (B,) those without a partner, or with several
 
     @staticmethod
     def of(faces: np.ndarray) -> 'Edges':
@@ -125,11 +118,9 @@ def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
 
 
 def without_seams(segments_m: np.ndarray) -> np.ndarray:
-    """Leave out edges of triangles along which another patch continues the surface.
+    """Leave out edges (B, 2, 3) of triangles along which another patch continues the surface [m].
 
-    Args:
-        segments_m: (B, 2, 3) unpaired edges, each in the sense in which its triangle runs [m]:
-            the two sides of a seam run against each other.
+    Each runs in the sense of its triangle: the two sides of a seam run against each other.
     """
     if not len(segments_m):
         return segments_m

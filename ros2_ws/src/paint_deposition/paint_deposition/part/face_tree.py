@@ -23,19 +23,13 @@ DEPTH = 64
 
 @dataclass(frozen=True)
 class FaceTree:
-    """The faces of a part in a tree of boxes, each cut to the slab that its faces lie in.
+    """The faces of a part in a tree of boxes, each cut to the slab that its faces lie in."""
 
-    Attributes:
-        vertices_m: (V, 3) [m].
-        faces: (F, 3) in the order of the leaves, neighbours together.
-        order: (F,) which of the part's faces each of them is.
-        nodes: (2 L - 1, 11) from the root down; the children of node i are 2 i + 1 and 2 i + 2.
-            Leaf l has the faces from F l / L to F (l + 1) / L.
-    """
-
-    vertices_m: np.ndarray
-    faces: np.ndarray
-    order: np.ndarray
+    vertices_m: np.ndarray  # (V, 3) [m]
+    faces: np.ndarray  # (F, 3) in the order of the leaves, neighbours together
+    order: np.ndarray  # (F,) which of the part's faces each of them is
+    # (2 L - 1, 11) from the root down; the children of node i are 2 i + 1 and 2 i + 2. Leaf l has
+    # the faces from F l / L to F (l + 1) / L.
     nodes: np.ndarray
 
     @staticmethod

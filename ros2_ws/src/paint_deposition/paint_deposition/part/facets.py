@@ -33,21 +33,16 @@ NEAR_EDGES = 8
 
 @dataclass(frozen=True)
 class CurvedEdges:
-    """Middles of the E edges of a mesh at which it is furthest from a curve.
+    """Middles of the E edges of a mesh at which it is furthest from a curve."""
 
-    Attributes:
-        middles_m, normals: (E, 3) as the refined mesh has them [m], and outward unit normals.
-        curved_m, curved_normals: (E, 3) as the curve has them.
-        lengths_m: (E,) of the edges as they were read [m].
-        turns_rad: (E,) by which the normals turn along the edge [rad].
-    """
-
+    # (E, 3) as the refined mesh has them [m], and outward unit normals.
     middles_m: np.ndarray
     normals: np.ndarray
+    # (E, 3) as the curve has them.
     curved_m: np.ndarray
     curved_normals: np.ndarray
-    lengths_m: np.ndarray
-    turns_rad: np.ndarray
+    lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
+    turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
 
     def __len__(self) -> int:
         return len(self.lengths_m)
@@ -59,13 +54,8 @@ class CurvedEdges:
     def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """How far the curve is from the mesh at points on it, and by how much the normals turn.
 
-        What an edge's middle has fades toward its ends: at corners both are right.
-
-        Args:
-            positions_m: (P, 3) on the mesh [m].
-
-        Returns:
-            (P, 3) [m] and (P, 3), to be added to positions and normals.
+        What an edge's middle has fades toward its ends: at corners both are right. (P, 3) each, to
+        be added to positions [m] and normals.
         """
         if not len(self):
             return np.zeros_like(positions_m), np.zeros_like(positions_m)
@@ -80,14 +70,10 @@ class CurvedEdges:
 
     @staticmethod
     def of(vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> 'CurvedEdges':
-        """Find them on the triangles of a file.
+        """Find them on the triangles of a file, whose smooth patches have corners of their own.
 
         Facets that meet at a crease, see ``creases.CREASE_RAD``, have corners and normals of their
         own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
-
-        Args:
-            vertices_m, normals: (V, 3) corners of smooth patches [m], unit normals.
-            faces: (F, 3).
         """
         edges = edges_of(faces)[0]
         error = _bends(vertices_m, normals, edges)[0]

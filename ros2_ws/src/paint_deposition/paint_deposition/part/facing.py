@@ -14,24 +14,14 @@ MAX_POSES = 2000
 
 @dataclass(frozen=True)
 class Facing:
-    """What the axis of the gun meets first, in poses.
+    """What the axis of the gun meets first, in poses."""
 
-    Attributes:
-        front: poses that look at the outward side.
-        back: poses that look at the other side.
-    """
-
-    front: int
-    back: int
+    front: int  # poses that look at the outward side
+    back: int  # poses that look at the other side
 
 
 def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:
-    """Count what the gun looks at.
-
-    Args:
-        positions_m: (N, 3) TCP [m]; long recordings are thinned to MAX_POSES.
-        z_axes: (N, 3) tool z, from the bell to the surface.
-    """
+    """Count what the gun looks at from TCPs (N, 3) [m] along its axis, tool z (N, 3)."""
     return _met(surface, positions_m, z_axes)[0]
 
 
@@ -39,14 +29,9 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     """Turn a part round that is sprayed from behind, and give a closed one its outward side.
 
     Which side of an open surface is outward depends on the program that exported it, and a closed
-    body has a surface on every side; the first gun whose axis meets the part decides.
-
-    Args:
-        motions: (positions_m, z_axes) of each gun, as for ``facing``.
-
-    Returns:
-        The surface itself if it faces the gun; turned and with a note, since it would stay bare,
-        if most poses that look at it look at its back; else with another outward side.
+    body has a surface on every side; the first gun, (positions_m, z_axes), whose axis meets the
+    part decides. The surface itself is returned if it faces the gun; turned and with a note, since
+    it would stay bare, if most poses that look at it look at its back.
     """
     for positions_m, z_axes in motions:
         seen, axes = _met(surface, positions_m, z_axes)

@@ -14,14 +14,9 @@ BEFORE_M = 0.1
 def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points of the surface that lie straight before places on its face.
 
-    The face is the part as the gun sees it, along its mean outward normal.
-
-    Args:
-        from_left_m: (N, 2) from the part's leftmost point and over its lowest [m].
-
-    Returns:
-        Points (N, 3) in the mesh frame [m], nan where there is no surface, and (N,) bool, whether
-        there is.
+    The face is the part as the gun sees it, along its mean outward normal; places (N, 2) are from
+    the part's leftmost point and over its lowest [m]. The points (N, 3) are nan where there is no
+    surface; (N,) bool says whether there is.
     """
     outward, vertices = surface.outward, surface.vertices_m
     right, up, left, low = _face(surface)

@@ -16,18 +16,12 @@ BACK_COSINE = -0.5
 
 @dataclass(frozen=True)
 class Location:
-    """Places on the surface closest to N points.
+    """Places on the surface closest to N points."""
 
-    Attributes:
-        positions_m: (N, 3) the places [m].
-        normals: (N, 3) outward unit normals of the surface there.
-        distance_m: (N,) from the point to the place [m].
-        angle_rad: (N,) between the point's own normal and the surface's, NaN where none was given.
-    """
-
-    positions_m: np.ndarray
-    normals: np.ndarray
-    distance_m: np.ndarray
+    positions_m: np.ndarray  # (N, 3) the places [m]
+    normals: np.ndarray  # (N, 3) outward unit normals of the surface there
+    distance_m: np.ndarray  # (N,) from the point to the place [m]
+    # (N,) between the point's own normal and the surface's, NaN where none was given.
     angle_rad: np.ndarray
 
 

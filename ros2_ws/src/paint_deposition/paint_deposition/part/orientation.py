@@ -51,16 +51,10 @@ def mean_normal(normals: np.ndarray, areas_m2: np.ndarray | None) -> np.ndarray:
 def gravity(
     vertices_m: np.ndarray, normals: np.ndarray, areas_m2: np.ndarray
 ) -> tuple[np.ndarray, str]:
-    """Guess which way is down, and say so where it is a guess.
+    """Guess which way is down, (3,), and a note for the user where it is a guess, else ''.
 
     Down is -z. A part that lies in x-y does so in the booth, a hood or a roof, if it is away from
     the plane z = 0. In that plane it was drawn flat, and hangs: down is -y.
-
-    Args:
-        vertices_m: (V, 3) [m]. normals: (V, 3) outward. areas_m2: (V,).
-
-    Returns:
-        (3,) unit vector, and a note for the user, '' for a part that stands.
     """
     if not _lies(normals, areas_m2):
         return np.array([0.0, 0.0, -1.0]), ''

@@ -15,15 +15,10 @@ SLENDERNESS = 3.0
 
 @dataclass(frozen=True)
 class CutEdges:
-    """Edges cut into equal parts, 2 to some power, so that halving them meets the same points.
+    """Edges cut into equal parts, 2 to some power, so that halving them meets the same points."""
 
-    Attributes:
-        parts: (E,) how many; 1 is uncut.
-        first: (E,) number of the inner vertex next to the edge's first end.
-    """
-
-    parts: np.ndarray
-    first: np.ndarray
+    parts: np.ndarray  # (E,) how many; 1 is uncut
+    first: np.ndarray  # (E,) number of the inner vertex next to the edge's first end
 
     def along(self, edge: np.ndarray, forward: np.ndarray, parts: int) -> np.ndarray:
         """(N, parts - 1) inner vertices of edges of that many parts, ``forward`` or not."""
@@ -155,17 +150,8 @@ def refine(
     An edge is halved for both its triangles at once, so no cracks open, and a triangle only ever
     together with its own longest edge, which keeps every angle above half the smallest one given
     (Rivara, Mesh refinement processes based on the generalized bisection of simplices, 1984);
-    slivers are cut across instead. Normals go along and are interpolated, so that a coarse
-    triangulation of a curved surface keeps the normals of the curve.
-
-    Args:
-        vertices_m: (V, 3) [m].
-        normals: (V, 3) unit.
-        faces: (F, 3).
-        max_edge_length_m: [m].
-
-    Returns:
-        Vertices, unit normals and faces of the refined mesh.
+    slivers are cut across instead. Unit normals (V, 3) go along and are interpolated, so that a
+    coarse triangulation of a curved surface keeps the normals of the curve.
 
     Raises:
         MeshError: it would have more than MAX_TRIANGLES triangles.

@@ -27,16 +27,11 @@ SAME_PLACE_M = 1e-6
 
 @dataclass(frozen=True)
 class Face:
-    """A patch of a part.
+    """A patch of a part."""
 
-    Attributes:
-        surface: the patch alone.
-        vertices: (N,) rows of its vertices in the part.
-        seam_distance_m: (N,) straight distance to the nearest other face, inf without one [m].
-    """
-
-    surface: Surface
-    vertices: np.ndarray
+    surface: Surface  # the patch alone
+    vertices: np.ndarray  # (N,) rows of its vertices in the part
+    # (N,) straight distance to the nearest other face, inf without one [m].
     seam_distance_m: np.ndarray
 
     def without_margin(self, margin_m: float) -> 'Face':
@@ -51,14 +46,10 @@ class Face:
 
 
 def sprayable_faces(surface: Surface, widest_rad: float = WIDEST_RAD) -> tuple[Face, ...]:
-    """Split the outward side of a part, the largest face first.
+    """Split the outward side of a part, an open sheet, the largest face first.
 
     The normals are grouped about as few mean directions as keep them within the angle (k-means on
     the sphere). Connected triangles of one group are a face; small ones go to a neighbour.
-
-    Args:
-        surface: an open sheet, outward where it is painted.
-        widest_rad: greatest angle between a normal and the mean of its face.
     """
     normals = face_normals(surface.vertices_m, surface.faces)
     areas = face_areas_m2(surface.vertices_m, surface.faces)

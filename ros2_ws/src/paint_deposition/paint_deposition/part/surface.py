@@ -193,10 +193,7 @@ class Surface:
             positions = np.concatenate([positions, above.positions_m, below.positions_m])
             outward = np.concatenate([outward, above.normals, below.normals])
         return SurfacePoints(
-            positions,
-            outward,
-            slope_per_m=operator,
-            **self._covariates(positions, outward),
+            positions, outward, slope_per_m=operator, **self._covariates(positions, outward)
         )
 
     def _covariates(self, positions_m: np.ndarray, normals: np.ndarray) -> dict[str, Any]:

@@ -31,24 +31,6 @@ SLACK_SINE, TOUCHING_M = 0.03, 1e-6
 HIGH_SINE = 0.8
 
 
-def horizon_sines(tree: FaceTree, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(N,) sine of the highest elevation at which a point sees any of the part.
-
-    Elevations are those over the plane at right angles to the point's normal (N, 3). A ray that
-    comes to the point from higher up meets nothing on its way. No less than LEAST_SINE, and 1
-    where it is above HIGH_SINE.
-    """
-    found = np.empty(len(points_m))
-    points = np.ascontiguousarray(points_m, dtype=np.float64)
-    upward = np.ascontiguousarray(normals, dtype=np.float64)
-
-    def fill(start: int, stop: int) -> None:
-        _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, start, stop, found)
-
-    shared_among_threads(len(points), fill)
-    return found
-
-
 @njit(cache=True, nogil=True)
 def _edge_sine(ax, ay, az, ah, bx, by, bz, bh):
     """Highest sine of elevation along an edge from a to b, seen from the origin.
@@ -179,15 +161,10 @@ class Occluder:
             return self._built[0]
 
     def sees(self, eyes_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
-        """Whether nothing of the part lies between.
+        """(...,) bool: whether nothing of the part lies between (..., 3) eyes and points on it.
 
-        Args:
-            eyes_m, points_m: (..., 3) eyes, and points on the part, of shapes that go together
-                [m].
-
-        Returns:
-            (...,) bool. A point's own surroundings within CLEARANCE_M do not hide it, nor does
-            surface that is seen from behind: incidence is the projection's business.
+        A point's own surroundings within CLEARANCE_M do not hide it, nor does surface that is seen
+        from behind: incidence is the projection's business.
         """
         eyes, points = np.broadcast_arrays(eyes_m, points_m)
         way = points - eyes
@@ -208,8 +185,21 @@ class Occluder:
         return np.where(met >= 0, self._tree().order[met], -1)
 
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) sine of the elevation above which nothing of the part hides a point."""
-        return horizon_sines(self._tree(), points_m, normals)
+        """(N,) sine of the highest elevation at which a point sees any of the part.
+
+        Elevations are those over the plane at right angles to the point's normal (N, 3). A ray
+        that comes to the point from higher up meets nothing on its way. No less than LEAST_SINE,
+        and 1 where it is above HIGH_SINE.
+        """
+        tree, found = self._tree(), np.empty(len(points_m))
+        points = np.ascontiguousarray(points_m, dtype=np.float64)
+        upward = np.ascontiguousarray(normals, dtype=np.float64)
+
+        def fill(start: int, stop: int) -> None:
+            _fill(points, upward, tree.vertices_m, tree.faces, tree.nodes, start, stop, found)
+
+        shared_among_threads(len(points), fill)
+        return found
 
     def sky_view_factor(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) cosine-weighted share of the hemisphere over each point that the part leaves free.

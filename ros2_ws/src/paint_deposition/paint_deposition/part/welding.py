@@ -11,13 +11,8 @@ WELD_M = 1e-6
 def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Make vertices closer than a micrometre one: STL repeats them for every triangle.
 
-    Args:
-        vertices_m: (V, 3), in single precision if that is how the file has them.
-        faces: (F, 3).
-
-    Returns:
-        Vertices (V, 3) [m], in double precision, in the order in which they first appear, and
-        faces (F, 3) on them.
+    Vertices may be in the file's single precision; returned in double, in the order in which they
+    first appear, with the faces (F, 3) on them.
     """
     order = np.lexsort(vertices_m.T)
     in_order = vertices_m[order]

@@ -20,20 +20,14 @@ ONE_CONTACT_S = 0.5
 
 @dataclass(frozen=True)
 class Contact:
-    """The part within the envelope for a while.
+    """The part within the envelope for a while."""
 
-    Attributes:
-        begin_s, end_s: since the first pose.
-        place_m: (3,) of the part that is deepest inside [m].
-        depth_m: how far it is inside [m].
-        by_gun: whether it meets the gun, not only the cylinder before it.
-    """
-
+    # Since the first pose.
     begin_s: float
     end_s: float
-    place_m: np.ndarray
-    depth_m: float
-    by_gun: bool
+    place_m: np.ndarray  # (3,) of the part that is deepest inside [m]
+    depth_m: float  # how far it is inside [m]
+    by_gun: bool  # whether it meets the gun, not only the cylinder before it
 
     def __str__(self) -> str:
         where = ', '.join(f'{value:.3f}' for value in self.place_m)
@@ -45,10 +39,7 @@ class Contact:
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``contacts`` in a plan."""
-        return {
-            'begin_s': self.begin_s, 'end_s': self.end_s, 'place_m': self.place_m.tolist(),
-            'depth_m': self.depth_m, 'by_gun': self.by_gun,
-        }  # fmt: skip
+        return {**vars(self), 'place_m': self.place_m.tolist()}
 
 
 def contacts(

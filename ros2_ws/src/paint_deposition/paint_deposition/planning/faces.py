@@ -7,9 +7,8 @@ least squares, since the film is linear in it.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise, permutations, product
 
 import numpy as np
 from scipy.optimize import lsq_linear
@@ -39,8 +38,6 @@ MARGINS = (0.0, 0.35, 0.7, 1.0)
 # By how much longer or shorter the gun may stay on a pass than evenness on its face alone asks,
 # and what a change by that much is worth in film, as a share.
 DWELL, RELUCTANCE = (0.5, 2.0), 0.02
-# All orders are tried for so many faces; of more, each time the nearest is next.
-MOST_TRIED = 6
 # Between faces the gun is drawn back so far [m], by the first that keeps it clear of the part.
 RETREATS_M = (0.1, 0.2, 0.4, 0.8)
 
@@ -87,14 +84,9 @@ def blend(
 ) -> tuple[float, tuple[FacePasses, ...], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
-    Returns the margin, by how much each face is sprayed less far than its seams [m], the passes of
-    the faces, each at its speed, and sigma_n without margin, each face for itself.
-
-    Args:
-        surface: the part. model: what the gun sprays. request: for each face.
-        faces: of the part.
-        area_m2: (V,) of the surface that is to be even, 0 elsewhere [m2].
-        progress: called with what is done and its share, 0 to 1.
+    ``area_m2`` (V,) is of the surface that is to be even, 0 elsewhere. Returned are the margin, by
+    how much each face is sprayed less far than its seams [m], the passes of the faces, each at its
+    speed, and sigma_n without margin, each face for itself.
     """
     overspray_m, tried = 0.0, []
     for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
@@ -165,20 +157,31 @@ def _with_dwell(laid: _Laid, dwell: np.ndarray, request: PlanRequest) -> tuple[F
 
 
 def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
-    """The faces with least travel between them; a face may run the other way round.
+    """The faces in that order, each time the nearest next, which has least travel between them.
 
-    Faces whose passes all run one way are not turned.
+    A face may run the other way round, unless its passes all run one way.
     """
-    if len(faces) > MOST_TRIED:
-        return _nearest_next(faces)
     ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
-    tried = (
-        tuple(either[k] for k in order)
-        for either in product(*ways)
-        for order in permutations(range(len(faces)))
-    )
+    tried = [_nearest_next(k, first, ways) for k, own in enumerate(ways) for first in own]
     # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
-    return min(tried, key=lambda order: round(_travel_m(order), 6))
+    return min(tried, key=lambda order: round(sum(map(_travel_m, order, order[1:])), 6))
+
+
+def _nearest_next(
+    number: int, first: FacePasses, ways: Sequence[Sequence[FacePasses]]
+) -> tuple[FacePasses, ...]:
+    order, left = [first], dict(enumerate(ways))
+    del left[number]
+    while left:
+        there = [(_travel_m(order[-1], way), k, way) for k, own in left.items() for way in own]
+        _, nearest, way = min(there, key=lambda one: one[0])
+        order.append(way)
+        del left[nearest]
+    return tuple(order)
+
+
+def _travel_m(before: FacePasses, after: FacePasses) -> float:
+    return float(np.linalg.norm(after.start_m - before.end_m))
 
 
 def motion_over(
@@ -186,12 +189,7 @@ def motion_over(
 ) -> tuple[Trajectory, tuple[Move, ...]]:
     """The timed motion that sprays one face after the other, and the moves of a robot program.
 
-    Between the faces the gun is drawn back along its axis.
-
-    Args:
-        faces: in running order.
-        frame_id: of the poses.
-        is_clear: whether a way from face to face keeps clear of the part.
+    Between the faces the gun is drawn back along its axis until the way ``is_clear``.
     """
     parts: list[Trajectory] = []
     moves: list[Move] = []
@@ -260,20 +258,3 @@ def _reversed(planned: PlannedPass) -> PlannedPass:
         on_m=length - planned.off_m,
         off_m=length - planned.on_m,
     )
-
-
-def _travel_m(faces: Iterable[FacePasses]) -> float:
-    return sum(
-        float(np.linalg.norm(after.start_m - before.end_m)) for before, after in pairwise(faces)
-    )
-
-
-def _nearest_next(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
-    """From the first on, each time the face that begins nearest."""
-    order, left = [faces[0]], list(faces[1:])
-    while left:
-        end_m = order[-1].end_m
-        nearest = min(left, key=lambda face: float(np.linalg.norm(face.start_m - end_m)))
-        order.append(nearest)
-        left = [face for face in left if face is not nearest]
-    return tuple(order)

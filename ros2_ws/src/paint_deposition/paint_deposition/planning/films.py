@@ -74,29 +74,19 @@ def predicted(
 
 @dataclass(frozen=True, kw_only=True)
 class PlannedFilm:
-    """Passes on a part with the film that the model predicts.
-
-    Attributes:
-        surface: the part. model: what the gun sprays. request: as given.
-        painted: (V,) bool, the side or the faces that are painted.
-        passes: in running order. trajectory: their timed poses and trigger.
-        moves: of a robot program along them.
-        film_um: (V,) film on the refined part. paint: that is sprayed.
-        statistics: of the film on the painted part.
-        sigma_n: standard deviation over mean there, bare metal included.
-    """
+    """Passes on a part with the film that the model predicts."""
 
     surface: Surface
     model: DepositionModel
     request: PlanRequest
-    painted: np.ndarray
-    passes: tuple[PlannedPass, ...]
-    trajectory: Trajectory
-    moves: tuple[Move, ...]
-    film_um: np.ndarray
+    painted: np.ndarray  # (V,) bool, the side or the faces that are painted
+    passes: tuple[PlannedPass, ...]  # in running order
+    trajectory: Trajectory  # their timed poses and trigger
+    moves: tuple[Move, ...]  # of a robot program along them
+    film_um: np.ndarray  # (V,) on the refined part
     paint: PaintUsed
-    statistics: FilmStatistics
-    sigma_n: float
+    statistics: FilmStatistics  # of the film on the painted part
+    sigma_n: float  # standard deviation over mean there, bare metal included
 
     @property
     def mean_um(self) -> float:
@@ -162,19 +152,12 @@ def stratified_sample(area_m2: np.ndarray) -> np.ndarray:
 class LineFilms:
     """Film at points spread evenly over the painted side, for passes along many lines.
 
-    Args:
-        surface: the part.
-        surface_map: its smoothed surface.
-        model: shadows and effects on the finished film are left out.
-        style: how passes are run.
-        finest_m: scale on which the film changes across a pass [m].
-        beyond_m: lines are laid this far past the part's edges [m].
-        progress: called with the share done.
+    Shadows and effects on the finished film are left out. ``finest_m`` is the scale on which the
+    film changes across a pass; lines are laid up to ``beyond_m`` past the part's edges.
 
     Attributes:
         lines_m: (L,) the lines, and low_m and high_m their ends [m].
-        rows: (V,) vertices of the part at which films are kept.
-        films_um: (L, V) film of each pass.
+        films_um: (L, V) film of each pass at the part's vertices ``rows`` (V,).
     """
 
     def __init__(
@@ -220,15 +203,7 @@ class LineFilms:
 
 
 class FilmAtPoints:
-    """Films at some points of a part, with the model's effects, the film's own included.
-
-    Args:
-        surface: the part. rows: the vertices at which the film is wanted.
-        model: what the gun sprays.
-
-    Attributes:
-        step_m: longest travel of a sub-step [m].
-    """
+    """Films at vertices of a part, with the model's effects, the film's own included."""
 
     def __init__(self, surface: Surface, rows: np.ndarray, model: DepositionModel) -> None:
         self.model = model

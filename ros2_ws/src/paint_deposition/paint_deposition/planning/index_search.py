@@ -15,12 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.model.eq3_collapse import Collapse
-from paint_deposition.model.eq4_eq5_uniformity import (
-    ParallelPasses,
-    Variation,
-    variation,
-)
+from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
@@ -42,18 +37,13 @@ class PassSetup:
     A gun that keeps its orientation lays one profile whichever way it travels, so alternating
     passes are as good as one-way ones. Turned by half a turn for every way back it lays the
     mirrored profile, and an asymmetric pattern makes an uneven pair.
-
-    Attributes:
-        standoff_m: TCP to plane [m].
-        travel_rad: direction of the first pass in the tool's x-y frame, from x to y [rad].
-        one_way: every pass runs in the direction of the first; else they alternate.
-        gun_turns: on the way back the gun is turned by half a turn about its axis.
     """
 
-    standoff_m: float
+    standoff_m: float  # TCP to plane [m]
+    # Direction of the first pass in the tool's x-y frame, from x to y [rad].
     travel_rad: float = 0.0
-    one_way: bool = False
-    gun_turns: bool = False
+    one_way: bool = False  # every pass runs in the direction of the first; else they alternate
+    gun_turns: bool = False  # on the way back the gun is turned by half a turn about its axis
 
     @property
     def travel(self) -> str:
@@ -101,29 +91,13 @@ def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) ->
     most = math.ceil((width_m + 2.0 * reach) / index_m) + 2
     for count in range(max(1, math.floor(width_m / index_m)), most):
         film = np.zeros(len(across))
-        for collapse, line_m in _laid_evenly(parallel, index_m, count):
-            film += collapse.thickness_um(across - line_m)
+        for number, line_m in enumerate((np.arange(count) - 0.5 * (count - 1)) * index_m):
+            film += (parallel.second if number % 2 else parallel.first).thickness_um(
+                across - line_m
+            )
         if film.min() >= enough:
             return count
     return most
-
-
-def variation_over_width(
-    parallel: ParallelPasses, index_m: float, passes: int, width_m: float
-) -> Variation:
-    """Mean and sigma_n over the whole width, its edges included, of so many passes."""
-    return variation(_laid_evenly(parallel, index_m, passes), -0.5 * width_m, 0.5 * width_m)
-
-
-def _laid_evenly(
-    parallel: ParallelPasses, index_m: float, passes: int
-) -> list[tuple[Collapse, float]]:
-    """Collapse and line of each pass, about the middle."""
-    lines = (np.arange(passes) - 0.5 * (passes - 1)) * index_m
-    return [
-        (parallel.second if number % 2 else parallel.first, float(line))
-        for number, line in enumerate(lines)
-    ]
 
 
 def cycle_time_s(
@@ -144,18 +118,12 @@ class Minimum:
 
 @dataclass(frozen=True)
 class IndexCurve:
-    """sigma_n over the index of parallel passes.
+    """sigma_n over the index of parallel passes."""
 
-    Attributes:
-        parallel: the passes.
-        index_m: (N,) increasing [m]. sigma_n: (N,).
-        minima: refined local minima inside the range, by index.
-    """
-
-    parallel: ParallelPasses
-    index_m: np.ndarray
-    sigma_n: np.ndarray
-    minima: tuple[Minimum, ...]
+    parallel: ParallelPasses  # the passes
+    index_m: np.ndarray  # (N,) increasing [m]
+    sigma_n: np.ndarray  # (N,)
+    minima: tuple[Minimum, ...]  # refined local minima inside the range, by index
 
     @staticmethod
     def of(parallel: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':

@@ -32,10 +32,6 @@ def optimised(
 
     The cost is sigma_n squared, and the weights of the request times the paint sprayed over the
     paint wanted on the part, and the cycle time over that of the plain plan.
-
-    Args:
-        plain: as ``plan`` makes it.
-        progress: called with what is done and its share, 0 to 1.
     """
     request, count = plain.request, len(plain.passes)
     target = request.target_um or plain.mean_um

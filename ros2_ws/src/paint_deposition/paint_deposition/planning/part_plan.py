@@ -87,15 +87,9 @@ def plan_faces(
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
 
-    Args:
-        surface: the part; what faces away from ``request.outward``, if given, stays bare.
-        model: what the gun sprays.
-        request: for each face; to optimise is to choose the speeds along all passes, and where
-            the gun opens and closes, for an even film on all faces together.
-        frame_id: of the poses.
-        widest_rad: greatest angle between a normal of a face and its mean.
-        envelope: of the gun, for the check that it keeps clear of the part.
-        progress: called with what is done and its share, 0 to 1.
+    What faces away from ``request.outward``, if given, stays bare. To optimise is to choose the
+    speeds along all passes, and where the gun opens and closes, for an even film on all faces
+    together. Normals of a face turn from its mean by ``widest_rad`` at the most.
 
     Raises:
         PlanError: a face has no passes, or the film is less even than the tolerance.

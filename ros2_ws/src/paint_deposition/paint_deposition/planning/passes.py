@@ -26,27 +26,16 @@ TURN_RATE_RAD_PER_S = math.radians(90.0)
 
 @dataclass(frozen=True)
 class PassStyle:
-    """How passes are run.
+    """How passes are run."""
 
-    Attributes:
-        standoff_m: TCP to smoothed surface along the gun's axis [m].
-        speed_m_per_s: of the TCP while spraying [m/s].
-        acceleration_m_per_s2: of the robot [m/s^2].
-        overspray_m: the gun opens and closes this far outside the part [m].
-        band_m: the part's ends are looked for this far to both sides of a pass [m].
-        travel_rad: direction of the first pass in the tool's x-y frame [rad].
-        one_way: every pass runs in the direction of the first.
-        brush: number of the brush that sprays; 0 is the only one.
-    """
-
-    standoff_m: float
-    speed_m_per_s: float
-    acceleration_m_per_s2: float = 2.0
-    overspray_m: float = 0.3
-    band_m: float = 0.15
-    travel_rad: float = 0.0
-    one_way: bool = False
-    brush: int = ONLY_BRUSH
+    standoff_m: float  # TCP to smoothed surface along the gun's axis [m]
+    speed_m_per_s: float  # of the TCP while spraying [m/s]
+    acceleration_m_per_s2: float = 2.0  # of the robot [m/s^2]
+    overspray_m: float = 0.3  # the gun opens and closes this far outside the part [m]
+    band_m: float = 0.15  # the part's ends are looked for this far to both sides of a pass [m]
+    travel_rad: float = 0.0  # direction of the first pass in the tool's x-y frame [rad]
+    one_way: bool = False  # every pass runs in the direction of the first
+    brush: int = ONLY_BRUSH  # number of the brush that sprays; 0 is the only one
 
     @property
     def lead_m(self) -> float:
@@ -61,24 +50,16 @@ class PassStyle:
 
 @dataclass(frozen=True)
 class PlannedPass:
-    """One pass, from standstill to standstill.
+    """One pass, from standstill to standstill."""
 
-    Attributes:
-        across_m: where its line lies [m].
-        positions_m: (W, 3) TCP at waypoints, in running order.
-        rotations: (W, 3, 3) tool axes as columns.
-        along_m: (W,) travel of the TCP from the start.
-        on_m, off_m: travel at which the gun opens and closes.
-        style: how it is run.
-    """
-
-    across_m: float
-    positions_m: np.ndarray
-    rotations: np.ndarray
-    along_m: np.ndarray
+    across_m: float  # where its line lies [m]
+    positions_m: np.ndarray  # (W, 3) TCP at waypoints, in running order
+    rotations: np.ndarray  # (W, 3, 3) tool axes as columns
+    along_m: np.ndarray  # (W,) travel of the TCP from the start
+    # Travel at which the gun opens and closes.
     on_m: float
     off_m: float
-    style: PassStyle
+    style: PassStyle  # how it is run
 
     @property
     def speed_m_per_s(self) -> float:

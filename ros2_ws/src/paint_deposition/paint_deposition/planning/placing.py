@@ -15,18 +15,12 @@ SLACK, LEAST_SLACK = 1.05, 0.002
 
 @dataclass(frozen=True)
 class Placing:
-    """Parallel lines on a part.
+    """Parallel lines on a part."""
 
-    Attributes:
-        passes: how many. index_m: distance between neighbours.
-        middle_m: coordinate across of their middle.
-        sigma_n: of their film on the part.
-    """
-
-    passes: int
-    index_m: float
-    middle_m: float
-    sigma_n: float
+    passes: int  # how many
+    index_m: float  # distance between neighbours
+    middle_m: float  # coordinate across of their middle
+    sigma_n: float  # of their film on the part
 
     @property
     def lines_m(self) -> np.ndarray:
@@ -48,10 +42,7 @@ def place_passes(
 ) -> Placing:
     """The most even placing with the fewest passes that come near the best, or the tolerance.
 
-    Args:
-        films: of single passes.
-        extent_m: ends of the part across the passes [m].
-        index_range_m: least and greatest index; equal ends fix it.
+    ``extent_m``: ends of the part across the passes; ``index_range_m``: equal ends fix the index.
 
     Raises:
         PlanError: no placing keeps to the tolerance; names the closest.

@@ -10,12 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
 from paint_deposition.planning.index_search import passes_to_cover
-from paint_deposition.planning.passes import (
-    PassStyle,
-    plan_passes,
-    planned_moves,
-    trajectory_of,
-)
+from paint_deposition.planning.passes import PassStyle, plan_passes, planned_moves, trajectory_of
 from paint_deposition.planning.placing import Placing, place_passes, placed
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
@@ -107,12 +102,7 @@ def plan(
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Plan:
-    """Plan passes and simulate their film.
-
-    Args:
-        surface: the part. model: what the gun sprays.
-        frame_id: frame of the poses.
-        progress: called with what is done and its share, 0 to 1.
+    """Plan passes and simulate their film; ``progress`` gets what is done and its share, 0 to 1.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.

@@ -17,7 +17,6 @@ from paint_deposition.planning.index_search import (
     choose,
     cycle_time_s,
     passes_to_cover,
-    variation_over_width,
 )
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
 
@@ -45,7 +44,6 @@ class Recommendation:
         passes, cycle_time_s: for the width asked for, or None. The time runs from the first
             opening of the gun to its last closing, transfers between passes included.
         width_m, length_m: what they were counted for.
-        sigma_n_over_width: of these passes from edge to edge, or None.
         curve: sigma_n over the range.
         setup: how gun and passes were assumed.
         half_width_m: SB50 of one pass.
@@ -68,7 +66,6 @@ class Recommendation:
     cycle_time_s: float | None
     width_m: float | None
     length_m: float | None
-    sigma_n_over_width: float | None
     curve: IndexCurve
     setup: PassSetup
     half_width_m: float
@@ -152,14 +149,11 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         distance = standoff + model.projection.emission_offset_m
         nearer, further = (distance * (best.index_m / end - 1.0) for end in index_drift[::-1])
         standoff_drift = None if model.effects else (max(nearer, -standoff), further)
-    passes = cycle_time = over_width = None
+    passes = cycle_time = None
     length = request.width_m and (request.length_m or request.width_m)
     if request.width_m is not None and length is not None:
         passes = passes_to_cover(curve.parallel, best.index_m, request.width_m)
         cycle_time = cycle_time_s(passes, length, best.index_m, speed, request.one_way)
-        over_width = variation_over_width(
-            curve.parallel, best.index_m, passes, request.width_m
-        ).sigma_n
     return Recommendation(
         index_m=best.index_m,
         sigma_n=best.sigma_n,
@@ -174,7 +168,6 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         cycle_time_s=cycle_time,
         width_m=request.width_m,
         length_m=length,
-        sigma_n_over_width=over_width,
         curve=curve,
         setup=setup,
         half_width_m=width,
@@ -238,11 +231,7 @@ def _notes(
         otherwise = replace(setup, gun_turns=not setup.gun_turns)
         there = otherwise.parallel_passes(model, speed, SEARCHED).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
-            how = (
-                'keeping its orientation'
-                if setup.gun_turns
-                else 'turned by 180 deg every way back'
-            )
+            how = ('turned by 180 deg every way back', 'keeping its orientation')[setup.gun_turns]
             notes.append(f'with the gun {how} sigma_n there would be {there:.4f}')
     end = curve.best_end
     if best not in curve.minima:

@@ -27,19 +27,13 @@ LIFT_M = 1e-3
 
 @dataclass(frozen=True)
 class PassAxes:
-    """Axes in which passes are laid, seen from the gun's side.
+    """Axes in which passes are laid, seen from the gun's side."""
 
-    Attributes:
-        origin_m: (3,) middle of the part.
-        travel: (3,) unit vector of the first pass's direction.
-        across: (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
-        outward: (3,) unit vector from the part to the gun.
-    """
-
-    origin_m: np.ndarray
-    travel: np.ndarray
+    origin_m: np.ndarray  # (3,) middle of the part
+    travel: np.ndarray  # (3,) unit vector of the first pass's direction
+    # (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
     across: np.ndarray
-    outward: np.ndarray
+    outward: np.ndarray  # (3,) unit vector from the part to the gun
 
     def coordinates_m(self, points_m: np.ndarray) -> np.ndarray:
         """(N, 3) distances along travel, across and outward [m]."""
@@ -58,13 +52,9 @@ class PassAxes:
 def pass_axes(
     surface: Surface, direction: str = 'horizontal', outward: ArrayLike | None = None
 ) -> PassAxes:
-    """Axes for horizontal or vertical passes.
+    """Axes for horizontal passes, to the right as the gun sees it, or vertical ones, downward.
 
-    Args:
-        surface: the part.
-        direction: 'horizontal' (travel to the right as the gun sees it) or 'vertical' (travel
-            downward).
-        outward: from the part to the gun, any length; default: the mean normal.
+    ``outward`` leads from the part to the gun, any length; default: the mean normal.
 
     Raises:
         PlanError: the part has no side to paint from.
@@ -86,13 +76,8 @@ def pass_axes(
 class SurfaceMap:
     """Smoothed height and slope of the painted side over (travel, across).
 
-    About each place a plane is fitted to the surface with Gaussian weights of half the radius.
+    About each place a plane is fitted to the surface with Gaussian weights of half the radius [m].
     Past the part's edges height and slope go over to what they are at the edge.
-
-    Args:
-        surface: the part.
-        axes: where the gun stands.
-        radius_m: what is finer than this is smoothed away [m].
     """
 
     def __init__(self, surface: Surface, axes: PassAxes, radius_m: float) -> None:

@@ -36,26 +36,19 @@ LEAST_PASS_M = 0.05
 
 @dataclass(frozen=True)
 class LaidFilm:
-    """A film on the target region, and what it took.
+    """A film on the target region, and what it took."""
 
-    Attributes:
-        film_um: (V,) at the vertices of the surface.
-        mean_um, sigma_n: mean, and standard deviation over it, weighted by area.
-        min_um, max_um: least and greatest.
-        within: share of the area within the tolerance of the target.
-        paint_cm3: sprayed, as solids that a part which catches everything would get.
-        on_part_cm3: of it on the whole part.
-        spraying_s, cycle_s: time with the gun open, and from the first pose to the last.
-    """
-
-    film_um: np.ndarray
+    film_um: np.ndarray  # (V,) at the vertices of the surface
+    # Mean, and standard deviation over it, weighted by area.
     mean_um: float
     sigma_n: float
+    # Least and greatest.
     min_um: float
     max_um: float
-    within: float
-    paint_cm3: float
-    on_part_cm3: float
+    within: float  # share of the area within the tolerance of the target
+    paint_cm3: float  # sprayed, as solids that a part which catches everything would get
+    on_part_cm3: float  # of it on the whole part
+    # Time with the gun open, and from the first pose to the last.
     spraying_s: float
     cycle_s: float
 
@@ -86,27 +79,21 @@ class LaidFilm:
 
 @dataclass(frozen=True)
 class PassChange:
-    """What changes in a pass, in the robot's terms.
+    """What changes in a pass, in the robot's terms."""
 
-    Attributes:
-        number: of the pass, from 1.
-        speed_m_per_s: mean speeds before and after.
-        slowest_m_per_s, fastest_m_per_s: after.
-        opens_earlier_m, closes_later_m: along the path; negative is the other way; 0 where the
-            pass does not begin or end with the gun.
-        opens_earlier_s, closes_later_s: the same at the speed of the new programme.
-        flow: relative to the calibrated one, before and after.
-    """
-
-    number: int
-    speed_m_per_s: tuple[float, float]
+    number: int  # of the pass, from 1
+    speed_m_per_s: tuple[float, float]  # mean speeds before and after
+    # After.
     slowest_m_per_s: float
     fastest_m_per_s: float
+    # Along the path; negative is the other way; 0 where the pass does not begin or end with the
+    # gun.
     opens_earlier_m: float
     closes_later_m: float
+    # The same at the speed of the new programme.
     opens_earlier_s: float
     closes_later_s: float
-    flow: tuple[float, float]
+    flow: tuple[float, float]  # relative to the calibrated one, before and after
 
     @property
     def sentence(self) -> str:

@@ -19,17 +19,11 @@ STEADY_M = 0.01
 
 @dataclass(frozen=True)
 class Nodes:
-    """Places along the openings; slowness [s/m] is linear between them.
+    """Places along the openings; slowness [s/m] is linear between them."""
 
-    Attributes:
-        travel_m: (n,) length of the path up to each node, opening after opening.
-        opening: (n,) number of its opening.
-        openings: the openings that they belong to.
-    """
-
-    travel_m: np.ndarray
-    opening: np.ndarray
-    openings: tuple[Opening, ...]
+    travel_m: np.ndarray  # (n,) length of the path up to each node, opening after opening
+    opening: np.ndarray  # (n,) number of its opening
+    openings: tuple[Opening, ...]  # the openings that they belong to
 
     @staticmethod
     def of(openings: tuple[Opening, ...], spacing_m: float) -> 'Nodes':

@@ -34,38 +34,25 @@ STEPS = 400
 
 @dataclass(frozen=True)
 class Opening:
-    """A stretch of the path along which the gun is open.
+    """A stretch of the path along which the gun is open."""
 
-    Attributes:
-        on_m, off_m: travel of the TCP at which it opens and closes.
-        flow: relative to the calibrated one.
-        brush: number of the brush; 0 is the only one.
-    """
-
+    # Travel of the TCP at which it opens and closes.
     on_m: float
     off_m: float
-    flow: float
-    brush: int = ONLY_BRUSH
+    flow: float  # relative to the calibrated one
+    brush: int = ONLY_BRUSH  # number of the brush; 0 is the only one
 
 
 @dataclass(frozen=True)
 class Programme:
-    """The path of a motion, how long each piece of it takes, and where the gun is open.
+    """The path of a motion, how long each piece of it takes, and where the gun is open."""
 
-    Attributes:
-        positions_m: (N, 3) TCP at its poses, and quaternions_xyzw (N, 4).
-        travel_m: (N,) length of the path up to each pose.
-        duration_s: (N - 1,) time from each pose to the next.
-        openings: in order, apart from each other.
-        given: the motion that it was made from.
-    """
-
-    positions_m: np.ndarray
+    positions_m: np.ndarray  # (N, 3) TCP at its poses, and quaternions_xyzw (N, 4)
     quaternions_xyzw: np.ndarray
-    travel_m: np.ndarray
-    duration_s: np.ndarray
-    openings: tuple[Opening, ...]
-    given: Trajectory
+    travel_m: np.ndarray  # (N,) length of the path up to each pose
+    duration_s: np.ndarray  # (N - 1,) time from each pose to the next
+    openings: tuple[Opening, ...]  # in order, apart from each other
+    given: Trajectory  # the motion that it was made from
 
     @staticmethod
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':

@@ -52,16 +52,11 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Density:
-    """A solution.
+    """A solution."""
 
-    Attributes:
-        density: (n,) of the paint [s/m]. flow: (m,) of each opening.
-        binding: names of the limits that bind.
-    """
-
-    density: np.ndarray
-    flow: np.ndarray
-    binding: tuple[str, ...] = ()
+    density: np.ndarray  # (n,) of the paint [s/m]
+    flow: np.ndarray  # (m,) of each opening
+    binding: tuple[str, ...] = ()  # names of the limits that bind
 
     def slowness(self, nodes: Nodes) -> np.ndarray:
         """(n,) seconds per metre."""
@@ -70,27 +65,19 @@ class Density:
 
 @dataclass(frozen=True)
 class Problem:
-    """What is to be minimised over densities and flows.
+    """What is to be minimised over densities and flows."""
 
-    Attributes:
-        films: per draw of the model, the best known first, (n, V) film for a density of 1 s/m at
-            each node [um].
-        target_um: film wanted.
-        nodes, bounds: of the path.
-        request: of the user.
-        given_s: paint of the programme [s at the calibrated flow].
-        open_ends: (n,) bool, nodes at which the gun may as well be closed.
-        without: names of limits that are left out.
-    """
-
+    # Per draw of the model, the best known first, (n, V) film for a density of 1 s/m at each node
+    # [um].
     films: Sequence[np.ndarray]
-    target_um: float
+    target_um: float  # film wanted
+    # Of the path.
     nodes: Nodes
     bounds: SpeedBounds
-    request: ImproveRequest
-    given_s: float
-    open_ends: np.ndarray
-    without: frozenset[str] = frozenset()
+    request: ImproveRequest  # of the user
+    given_s: float  # paint of the programme [s at the calibrated flow]
+    open_ends: np.ndarray  # (n,) bool, nodes at which the gun may as well be closed
+    without: frozenset[str] = frozenset()  # names of limits that are left out
 
     @property
     def size(self) -> int:

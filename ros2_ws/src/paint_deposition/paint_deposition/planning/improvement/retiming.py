@@ -11,12 +11,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import FilmAtPoints, stratified_sample
 from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
 from paint_deposition.planning.improvement.programme import Opening, Programme
-from paint_deposition.planning.improvement.quadratic_program import (
-    WORDS,
-    Density,
-    Problem,
-    solved,
-)
+from paint_deposition.planning.improvement.quadratic_program import WORDS, Density, Problem, solved
 from paint_deposition.planning.requests import ImproveRequest
 
 # Nodes per width of the pattern, within bounds.
@@ -37,34 +32,24 @@ CHECKS = 20
 
 @dataclass(frozen=True)
 class BindingLimit:
-    """A limit that keeps the film from being more even.
+    """A limit that keeps the film from being more even."""
 
-    Attributes:
-        name: of the limit, in words. sigma_n: what it would be without this limit alone.
-    """
-
-    name: str
-    sigma_n: float
+    name: str  # of the limit, in words
+    sigma_n: float  # what it would be without this limit alone
 
 
 @dataclass(frozen=True)
 class Retiming:
-    """A programme with new times and openings.
+    """A programme with new times and openings."""
 
-    Attributes:
-        given: the programme as it was; programme: the new one.
-        target_um: mean film aimed at.
-        binding: names of all limits that bind.
-        binding_limits: those of them that cost evenness, the strongest first.
-        sigma_n_of_path: the most even film of any densities of paint along this path, without
-            limits and without weights for paint, time and smoothness.
-    """
-
-    given: Programme
-    programme: Programme
-    target_um: float
-    binding: tuple[str, ...]
+    given: Programme  # the programme as it was
+    programme: Programme  # the new one
+    target_um: float  # mean film aimed at
+    binding: tuple[str, ...]  # names of all limits that bind
+    # Those of them that cost evenness, the strongest first.
     binding_limits: tuple[BindingLimit, ...]
+    # The most even film of any densities of paint along this path, without limits and without
+    # weights for paint, time and smoothness.
     sigma_n_of_path: float
 
 
@@ -79,17 +64,11 @@ def retime_for_evenness(
 ) -> Retiming:
     """Choose speeds, flows and triggers along the path of a programme.
 
-    The film at points spread evenly over the target region is linear in the density of paint
-    along the path: a quadratic program gives the best one. Effects that depend on speed, time or
-    film are followed by solving again about the film of the last solution.
-
-    Args:
-        surface: the part. target_region: (V,) bool, vertices whose film counts.
-        programme: as given.
-        models: equally likely ones; the first is the best known.
-        request: what is wanted and allowed.
-        progress: called with what is done and its share, 0 to 1.
-        explained: find out which limits cost evenness, and how even the path could be.
+    The film at points spread evenly over the target region, (V,) bool, is linear in the density of
+    paint along the path: a quadratic program gives the best one. Effects that depend on speed,
+    time or film are followed by solving again about the film of the last solution. The models are
+    equally likely, the first is the best known. ``explained`` finds out which limits cost
+    evenness, and how even the path could be.
 
     Raises:
         PlanError: the limits contradict each other.

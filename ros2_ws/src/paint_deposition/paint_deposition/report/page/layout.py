@@ -12,9 +12,8 @@ CLEAR = 'rgba(0,0,0,0)'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 
 
-def plotly_scale(table: bytes) -> list[list[Any]]:
-    """A table of 256 RGB colours as plotly's colour scale."""
-    colours = np.frombuffer(table, dtype=np.uint8).reshape(-1, 3)
+def plotly_scale(colours: np.ndarray) -> list[list[Any]]:
+    """A table of 256 RGB colours (256, 3) as plotly's colour scale."""
     places = np.linspace(0.0, 1.0, len(colours)).round(4).tolist()
     return [[place, f'rgb({r},{g},{b})'] for place, (r, g, b) in zip(places, colours, strict=True)]
 
