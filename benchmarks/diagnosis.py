@@ -6,6 +6,7 @@ the results, so that a run can be cut off and taken up again. After a change of 
 another file of results.
 """
 
+import ast
 import importlib
 import os
 import pickle
@@ -40,6 +41,8 @@ WORLDS = {
     'jet': 'worlds.jet',
 }
 PAINTED = ROOT / 'runs' / 'bench-diagnosis'
+# Constants of the diagnosis that have another value in this run, for its processes.
+CONSTANTS = 'PAINT_BENCH_CONSTANTS'
 # Shares of the kinds of campaigns.
 SHARES = {'clean': 0.25, 'effect': 0.4, 'pair': 0.15, 'unknown': 0.1, 'footprint': 0.1}
 
@@ -74,9 +77,26 @@ def painted(task: Task) -> Painted:
     return made
 
 
+def set_constants(settings: str) -> None:
+    """Give constants of the inference other values, as in 'SURE=0.9 FOOTPRINTS=(0.1,0.3)'."""
+    importlib.import_module('paint_deposition.inference.diagnosis.procedure')
+    for setting in settings.split():
+        name, _, value = setting.partition('=')
+        owners = [
+            module
+            for key, module in sys.modules.items()
+            if key.startswith('paint_deposition.inference.') and hasattr(module, name)
+        ]
+        if not owners:
+            raise click.BadParameter(f"the diagnosis has no constant '{name}'")
+        for module in owners:
+            setattr(module, name, ast.literal_eval(value))
+
+
 def run(task: Task) -> list[dict]:
     """Diagnose a campaign; a failure is a result too."""
     warnings.simplefilter('ignore')
+    set_constants(os.environ.get(CONSTANTS, ''))
     world, seed, kind = task
     try:
         campaign = painted(task)
@@ -160,6 +180,7 @@ def amounts(painted: Painted, diagnosis) -> list[dict]:
 @click.option(
     '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
 )
+@click.option('--constant', 'constants', multiple=True, help='NAME=VALUE in place of its own.')
 @click.option('--report-only', is_flag=True, help='Print the table of what is there.')
 @click.option('--failures', 'failed', is_flag=True, help='List what went wrong, too.')
 @click.option('--draw', is_flag=True, help='Draw the reliability diagram into the docs.')
@@ -171,6 +192,7 @@ def main(
     jobs: int,
     scheduler: str | None,
     results: Path,
+    constants: tuple[str, ...],
     report_only: bool,
     failed: bool,
     draw: bool,
@@ -188,6 +210,8 @@ def main(
     worlds = [world for world in generators.split(',') if _is_there(world)]
     if not worlds:
         raise click.UsageError('the measured tables of semi_real are not beside the repository')
+    os.environ[CONSTANTS] = ' '.join(constants)
+    set_constants(os.environ[CONSTANTS])
     PAINTED.mkdir(parents=True, exist_ok=True)
     records = kept(results)
     if not report_only:
