@@ -1,5 +1,8 @@
 """Learned laws are shown: curves with their closed forms, all others as maps."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
@@ -8,12 +11,14 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.diagnosis.model_space import FootprintProfile, RemainderFigures
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import (
     footprint_figure,
     learned_figure,
     map_figure,
+    profile_figure,
 )
 from small_campaign import small_campaign
 
@@ -98,3 +103,17 @@ def test_a_footprint_is_the_pattern_times_its_factor(study):
     at = np.argmin(np.hypot(x - 0.2, y))
     assert factor['z'].flat[at] == pytest.approx(1.3, abs=0.03)
     assert factor['z'][np.hypot(x, y) > 0.41] == pytest.approx(1.0)
+
+
+def test_the_footprint_is_shown_with_its_band(study):
+    radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
+    profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
+    left_over = RemainderFigures(0.02, 0.0, 0.03, 0.1, profile)
+    assert profile_figure(shown(study)) is None
+    diagnosed = replace(shown(study), diagnosis=SimpleNamespace(remainder=left_over))
+    band, plain, found = profile_figure(diagnosed)['charts'][0]['data']
+    assert (plain['y'] == eq1).all()
+    assert (found['y'] == eq1 + 0.1).all()
+    low, high = band['y'][:3], band['y'][:2:-1]
+    assert low == pytest.approx(np.maximum(found['y'] - 1.96 * profile.sd, 0.0), abs=1e-4)
+    assert high == pytest.approx(found['y'] + 1.96 * profile.sd, abs=1e-4)

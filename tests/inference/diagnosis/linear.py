@@ -8,7 +8,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.remainder import Remainder
+from paint_deposition.inference.diagnosis.remainder import Footprints, Remainder
 from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -95,10 +95,8 @@ def no_remainder(count: int) -> Remainder:
     none = np.zeros((count, count))
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
-    return Remainder(
-        3 * (none[:, :1],), 3 * (none[:1, :1],), none, fields, fields, False, lengths_m,
-        one_setting,
-    )  # fmt: skip
+    footprint = Footprints(3 * (none[:, :1],), 3 * (none[:1, :1],), none[0, :1], none[0, :1])
+    return Remainder(footprint, none, fields, fields, False, lengths_m, one_setting)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

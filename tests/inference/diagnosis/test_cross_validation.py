@@ -161,7 +161,8 @@ def test_what_acts_lowers_the_nested_error_to_the_noise():
 
 
 def test_a_law_must_say_more_than_any_footprint_could():
-    wave = replace(NOTHING_LEFT, footprint=(3.0 * CURVES[0].columns,))
+    columns = (3.0 * CURVES[0].columns,)
+    wave = replace(NOTHING_LEFT, footprint=replace(NOTHING_LEFT.footprint, columns=columns))
     stages = [replace(one, here=replace(one.here, usual=wave)) for one in stages_of(WAVE)]
     assert nested(stages[-1:]) == pytest.approx([nested(stages_of(WAVE))[0]] * (1 + MOST_LAWS))
 

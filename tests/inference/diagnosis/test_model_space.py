@@ -27,7 +27,12 @@ from paint_deposition.inference.diagnosis.model_space import (
     log_odds,
     probable_sizes,
 )
-from paint_deposition.inference.diagnosis.remainder import BEYOND_NATURE, Remainder, Sizes
+from paint_deposition.inference.diagnosis.remainder import (
+    BEYOND_NATURE,
+    Footprints,
+    Remainder,
+    Sizes,
+)
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.fitting.smooth_fields import smooth
 
@@ -68,8 +73,12 @@ def remainder() -> Remainder:
     return replace(
         no_remainder(READINGS),
         settings=fields,
-        footprint=tuple(size * footprint for size in SHARES),
-        of_peak=tuple(size * 0.1 * np.eye(1) for size in SHARES),
+        footprint=Footprints(
+            tuple(size * footprint for size in SHARES),
+            tuple(size * 0.1 * np.eye(1) for size in SHARES),
+            radius_m=np.zeros(1),
+            flux=np.ones(1),
+        ),
     )
 
 
@@ -268,10 +277,13 @@ def test_the_size_that_made_the_readings_is_found(plain, remainder):
 
 
 def test_the_deviation_of_the_footprint_is_told(plain, remainder):
-    loud = replace(remainder, footprint=tuple(3.0 * c for c in remainder.footprint))
-    there = shifted(plain, 2.0 * loud.footprint[SMALL.footprint][:, 0])
+    columns = tuple(3.0 * column for column in remainder.footprint.columns)
+    loud = replace(remainder, footprint=replace(remainder.footprint, columns=columns))
+    there = shifted(plain, 2.0 * columns[SMALL.footprint][:, 0])
     figures = space_of(there, [], loud).figures
     assert figures.footprint_of_peak == pytest.approx(0.2, abs=0.02)
+    assert figures.profile.found - figures.profile.eq1 == pytest.approx(0.2, abs=0.02)
+    assert 0.0 < figures.profile.sd < 0.02
     assert figures.length_m == remainder.lengths_m[SMALL.length]
     assert 'the footprint differs from two Gaussians by 20 % of its peak' in str(figures)
     assert 'parts painted alike' not in str(figures)

@@ -140,7 +140,7 @@ def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_f
     alone, knots_m
 ):
     flux = mean_flux(knots_m)
-    for size, of_peak in zip(FOOTPRINTS, alone[1].of_peak, strict=True):
+    for size, of_peak in zip(FOOTPRINTS, alone[1].footprint.of_peak, strict=True):
         # The pattern hardly moves the second harmonics.
         sd = np.sqrt(np.sum(of_peak.reshape(RADII, WAVES, -1)[:, 3:] ** 2, axis=2))
         expected = np.minimum(size, flux)[:, np.newaxis]
@@ -150,8 +150,8 @@ def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_f
 
 
 def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
-    tails = alone[1].of_peak[0].reshape(RADII, WAVES, -1)[:, :, :2]
-    for of_peak in alone[1].of_peak:
+    tails = alone[1].footprint.of_peak[0].reshape(RADII, WAVES, -1)[:, :, :2]
+    for of_peak in alone[1].footprint.of_peak:
         assert np.array_equal(of_peak.reshape(RADII, WAVES, -1)[:, :, :2], tails)
     assert not tails[:, 1:].any()
     step = 1e-4
@@ -163,7 +163,7 @@ def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
 
 def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     study, remainder = alone
-    columns, of_peak = remainder.footprint[-1], remainder.of_peak[-1]
+    columns, of_peak = remainder.footprint.columns[-1], remainder.footprint.of_peak[-1]
     amounts = np.random.default_rng(1).normal(size=columns.shape[1])
     basis = footprint_basis(study, MODEL, RADII)
     flux = np.repeat(mean_flux(np.linspace(0.0, basis.settings['reach_m'], RADII)), WAVES)

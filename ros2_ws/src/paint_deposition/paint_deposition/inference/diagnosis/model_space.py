@@ -8,7 +8,7 @@ enough to test whether anything is missing, and to propose what.
 """
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import NamedTuple
 
@@ -16,6 +16,7 @@ import numpy as np
 from scipy.special import expit
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
@@ -127,6 +128,25 @@ class Weighed(NamedTuple):
 
 
 @dataclass(frozen=True)
+class FootprintProfile:
+    """The footprint from its middle outward, averaged over the angle, over the peak of eq. (1).
+
+    Attributes:
+        radius_m: (n,) on the model plane [m].
+        eq1, found, sd: (n,) of eq. (1), as the readings have it, and how well they know it.
+    """
+
+    radius_m: np.ndarray
+    eq1: np.ndarray
+    found: np.ndarray
+    sd: np.ndarray
+
+    def to_dict(self) -> dict[str, list[float]]:
+        """Its figures, for ``diagnosis.json``."""
+        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+
+
+@dataclass(frozen=True)
 class RemainderFigures:
     """What nature leaves over in a campaign, as far as its readings show it.
 
@@ -136,12 +156,19 @@ class RemainderFigures:
         length_m: over which neighbours differ alike [m].
         footprint_of_peak: largest deviation of the footprint from eq. (1) that shows, over its
             peak.
+        profile: of the footprint.
     """
 
     setting_share: float
     part_share: float
     length_m: float
     footprint_of_peak: float
+    profile: FootprintProfile
+
+    def to_dict(self) -> dict[str, float]:
+        """Sizes and length, for ``diagnosis.json``."""
+        names = ('setting_share', 'part_share', 'length_m', 'footprint_of_peak')
+        return {name: getattr(self, name) for name in names}
 
     def __str__(self) -> str:
         setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
@@ -269,7 +296,8 @@ class ModelSpace:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
         null = self.central.null
         size = self.nature[int(self.share.argmax())].sizes.footprint
-        seen, of_peak = null.whiten(self.remainder.footprint[size]), self.remainder.of_peak[size]
+        footprint = self.remainder.footprint
+        seen, of_peak = null.whiten(footprint.columns[size]), footprint.of_peak[size]
         mean = of_peak @ (seen.T @ null.deviation)
         spread = np.eye(seen.shape[1]) - seen.T @ seen
         sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
@@ -279,6 +307,12 @@ class ModelSpace:
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.remainder.lengths_m[one.length] for one in found]),
             float(np.max(np.abs(mean), where=np.abs(mean) > SHOWS * sd, initial=0.0)),
+            FootprintProfile(
+                footprint.radius_m,
+                footprint.flux,
+                np.maximum(footprint.flux + mean[::WAVES], 0.0),
+                sd[::WAVES],
+            ),
         )
 
 

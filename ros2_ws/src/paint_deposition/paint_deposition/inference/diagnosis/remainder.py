@@ -79,13 +79,53 @@ class Sizes:
 
 
 @dataclass(frozen=True)
+class Footprints:
+    """Deviations of the footprint, which all parts share, for amplitudes of unit variance.
+
+    Attributes:
+        columns: for each size (P, n), of the readings over the noise.
+        of_peak: for each (K, n), at the knots of a footprint, as shares of its peak.
+        radius_m, flux: (RADII,) distance of the knots, and the mean flux there over the peak's.
+    """
+
+    columns: tuple[np.ndarray, ...]
+    of_peak: tuple[np.ndarray, ...]
+    radius_m: np.ndarray
+    flux: np.ndarray
+
+    @staticmethod
+    def of(study: Study, fit: Fit) -> 'Footprints':
+        """What is left of them when the pattern has followed.
+
+        The tails are kept as they are: the pattern follows them far from where it was fitted.
+        """
+        basis = footprint_basis(study, fit.model, RADII)
+        reach_m = basis.settings['reach_m']
+        flux, tails = _flux_and_tails(fit.model.patterns, reach_m)
+        at_knots = np.repeat(flux, WAVES)[:, np.newaxis]
+        fields = np.hstack([
+            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
+            for length in FOOTPRINT_LENGTHS
+        ])  # fmt: skip
+        pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
+        of_film = basis.film_um / study.sigma_um[:, np.newaxis]
+        columns, of_peak = [], []
+        for size in FOOTPRINTS:
+            free = np.minimum(size / at_knots, MOST_OF_FLUX) * fields
+            beside, followed = beside_pattern(basis, free, study, fit)
+            change = of_film @ free - pattern @ followed
+            columns.append(np.hstack([of_film @ (TAILS * tails), change]))
+            of_peak.append(at_knots * np.hstack([TAILS * tails, beside]))
+        radius_m = np.linspace(0.0, reach_m, RADII)
+        return Footprints(tuple(columns), tuple(of_peak), radius_m, flux)
+
+
+@dataclass(frozen=True)
 class Remainder:
     """What nature leaves over at P points, over the noise.
 
     Attributes:
-        footprint: for each size (P, n), deviations that all parts share, for amplitudes of unit
-            variance.
-        of_peak: for each (K, n), what they are at the knots of a footprint, as shares of its peak.
+        footprint: deviations that all parts share.
         shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
         settings, parts: for each length (P, P), covariances of fields of size one over parts
             painted alike together, and over each by itself; of the latter only where parts were
@@ -95,8 +135,7 @@ class Remainder:
         setting_of: (P,) number of the setting of each point, see ``painted_alike``.
     """
 
-    footprint: tuple[np.ndarray, ...]
-    of_peak: tuple[np.ndarray, ...]
+    footprint: Footprints
     shapes: np.ndarray
     settings: tuple[np.ndarray, ...]
     parts: tuple[np.ndarray, ...]
@@ -121,7 +160,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
-            *_footprints(study, fit),
+            Footprints.of(study, fit),
             _shapes(study, fit, setting_of),
             tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
             tuple(field(owner, scale * repeated, length_m) for length_m in lengths_m),
@@ -163,7 +202,7 @@ class Remainder:
 
     def of_footprint(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of the footprint, which all parts share."""
-        columns = self.footprint[sizes.footprint]
+        columns = self.footprint.columns[sizes.footprint]
         return columns @ columns.T
 
     def of_parts(self, sizes: Sizes) -> np.ndarray:
@@ -177,36 +216,10 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
     return float(-0.5 * (np.log(value / usual) / np.log(factor)) ** 2)
 
 
-def _footprints(study: Study, fit: Fit) -> tuple[tuple[np.ndarray, ...], tuple[np.ndarray, ...]]:
-    """What is left of a footprint's deviations when the pattern has followed them, of each size.
-
-    Its tails are kept as they are: the pattern follows them far from where it was fitted.
-    """
-    basis = footprint_basis(study, fit.model, RADII)
-    reach_m = basis.settings['reach_m']
-    flux, tails = _flux_and_tails(fit.model.patterns, reach_m)
-    fields = np.hstack(
-        [
-            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
-            for length in FOOTPRINT_LENGTHS
-        ]
-    )
-    pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
-    of_film = basis.film_um / study.sigma_um[:, np.newaxis]
-    columns, of_peak = [], []
-    for size in FOOTPRINTS:
-        free = np.minimum(size / flux, MOST_OF_FLUX)[:, np.newaxis] * fields
-        beside, followed = beside_pattern(basis, free, study, fit)
-        columns.append(np.hstack([of_film @ (TAILS * tails), of_film @ free - pattern @ followed]))
-        at_knots = np.hstack([TAILS * tails, beside])
-        of_peak.append(flux[:, np.newaxis] * at_knots)
-    return tuple(columns), tuple(of_peak)
-
-
 def _flux_and_tails(
     patterns: Sequence[PlanarPattern], reach_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """At the K knots of a footprint: (K,) mean flux over the peak's, (K, 2) its changes.
+    """Of a footprint (RADII,) mean flux over the peak's, and at its K knots (K, 2) its changes.
 
     The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
     exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.
@@ -223,7 +236,7 @@ def _flux_and_tails(
         change = -share * u * np.log(np.maximum(u, 1e-9))
         tails += np.clip(change, -MOST_OF_FLUX / TAILS, MOST_OF_FLUX / TAILS).T / len(patterns)
     mean_over_angle = np.eye(WAVES)[:, :1]
-    return np.repeat(flux, WAVES), np.kron(tails, mean_over_angle)
+    return flux, np.kron(tails, mean_over_angle)
 
 
 def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:

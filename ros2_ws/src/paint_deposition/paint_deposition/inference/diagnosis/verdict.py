@@ -267,9 +267,12 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
-            'remainder': self.remainder and asdict(self.remainder),
+            'remainder': self.remainder and self.remainder.to_dict(),
             'footprint': self.remainder
-            and {'deviation_of_peak': self.remainder.footprint_of_peak},
+            and {
+                'deviation_of_peak': self.remainder.footprint_of_peak,
+                'profile': self.remainder.profile.to_dict(),
+            },
             'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),

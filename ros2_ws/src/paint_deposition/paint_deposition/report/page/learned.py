@@ -111,6 +111,33 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     return layout.figure('maps', charts) if charts else None
 
 
+def profile_figure(data: ReportData) -> dict[str, Any] | None:
+    """The footprint from its middle outward, by eq. (1) and as the readings have it."""
+    left_over = data.diagnosis and data.diagnosis.remainder
+    if not left_over:
+        return None
+    profile = left_over.profile
+    half = TWO_SIDED_95 * profile.sd
+    band = np.concatenate([profile.found - half, (profile.found + half)[::-1]])
+    radius_m = profile.radius_m
+    traces = [
+        layout.scatter(
+            np.concatenate([radius_m, radius_m[::-1]]), np.maximum(band, 0.0), 'lines',
+            line={'width': 0}, fill='toself', fillcolor=BAND, hoverinfo='skip',
+        ),
+        layout.scatter(radius_m, profile.eq1, 'lines', line={'color': MUTED, 'width': 1.5}),
+        layout.scatter(radius_m, profile.found, 'lines', line={'color': ACCENT, 'width': 2.5}),
+    ]  # fmt: skip
+    arranged = layout.base_layout(
+        xaxis=layout.axis('distance from the axis on the model plane [m]'),
+        yaxis=layout.axis('flux over the peak of eq. (1)'),
+    )
+    legend = [('eq. (1)', MUTED, 'line'), ('readings', ACCENT, 'bold')]
+    legend.append(('95 % band', ACCENT, 'band'))
+    chart = layout.chart('mean over the angle', traces, arranged, 300)
+    return layout.figure('profile', [chart], legend)
+
+
 def footprint_figure(data: ReportData) -> dict[str, Any] | None:
     """The patterns of eq. (1), the patterns as learned, and the factor between the two."""
     laws = [effect for effect in data.model.effects if isinstance(effect, LearnedFootprint)]

@@ -21,7 +21,12 @@ from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import charts, tables
 from paint_deposition.report.page.headline import headline, key_figures
-from paint_deposition.report.page.learned import footprint_figure, learned_figure, map_figure
+from paint_deposition.report.page.learned import (
+    footprint_figure,
+    learned_figure,
+    map_figure,
+    profile_figure,
+)
 from paint_deposition.report.page.tables import film_rows, point_rows, shares_in_words
 from paint_deposition.report.pictures.chart import DOTS_PER_INCH
 from paint_deposition.report.pictures.comparison import comparison_figure, part_figure
@@ -66,6 +71,7 @@ def report_html(data: ReportData) -> str:
         charts.unknown_figure(data),
         learned_figure(data),
         map_figure(data),
+        profile_figure(data),
         footprint_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
