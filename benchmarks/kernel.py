@@ -28,11 +28,11 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.model.eq2_projection import flux_um_per_s
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
+from reference import reference_film_um
 
 PACKAGE = Path(paint_deposition.__file__).parents[1]
 SAMPLES = PACKAGE / 'samples'
@@ -92,18 +92,7 @@ def sample() -> Case:
 
 def numpy_um(case: Case, rows: slice) -> np.ndarray:
     """The film of some sub-steps by eq. (2) in NumPy, double precision."""
-    film = np.zeros(len(case.points))
-    path = case.path
-    for row in range(len(path))[rows]:
-        film += path.dwell_s[row] * path.flow[row] * flux_um_per_s(
-            MODEL.planar,
-            MODEL.projection,
-            case.points.positions_m,
-            case.points.normals,
-            path.position_m[row],
-            path.rotation[row],
-        )  # fmt: skip
-    return film
+    return reference_film_um(case.points, case.path.select(rows), MODEL)
 
 
 @njit(parallel=True)
@@ -219,6 +208,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.motion.path_builder import PathBuilder
 from paint_deposition.part.points import SurfacePoints
+from reference import reference_film_um
 loaded = time.perf_counter()
 points = SurfacePoints(np.zeros((64, 3)), np.tile([0.0, 0.0, 1.0], (64, 1)))
 builder = PathBuilder()

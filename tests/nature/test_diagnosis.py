@@ -44,7 +44,8 @@ def test_of_three_heights_the_spread_is_named_and_nothing_else(diagnosed, nozzle
     exponent = found.model.effect('pattern_spread').exponent
     assert -0.4 < exponent < -0.1
     before, after = found.history[0], found.history[-1]
-    assert after.holdout_rmse_um < before.holdout_rmse_um
+    assert after.rmse_um < before.rmse_um
+    assert not found.worse
 
 
 def test_of_one_height_nobody_is_blamed(diagnosed):

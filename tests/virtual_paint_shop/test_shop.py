@@ -50,7 +50,7 @@ def test_jobs_are_believable(seed):
 
 @pytest.mark.slow
 def test_panel_study_paints_one_bell_at_three_indexes():
-    studies = [panel_study(1, index, parcels=200_000) for index in (0.577, 0.525, 0.625)]
+    studies = [panel_study(1, index, parcels=1_000_000) for index in (0.577, 0.525, 0.625)]
     assert len({s.pattern for s in studies}) == 1
     films = [s.experiments[0].readings.film_um.mean() for s in studies]
     assert films[1] > films[0] > films[2]

@@ -87,11 +87,14 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     assert found.history[1].rmse_um < 0.8 * found.history[0].rmse_um
 
 
-def test_an_effect_outside_the_library_is_not_blamed_on_another(shielded):
+def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):
+    campaign = small_campaign(
+        tmp_path, **DOOR | {'seed': 22, 'truth': 'convex_attraction', 'amplitude': 0.3}
+    )
     # Those that look alike on these readings, as the effect itself declares, would be right, too.
-    alike = {'faraday_shielding', *EFFECTS['faraday_shielding'].rivals}
+    alike = {'convex_attraction', *EFFECTS['convex_attraction'].rivals}
     library = {key: effect for key, effect in EFFECTS.items() if key not in alike}
-    diagnosis = diagnose(shielded, DepositionModel(), library)
+    diagnosis = diagnose(campaign, DepositionModel(), library)
     assert diagnosis.verdict in ('unknown_effect', 'undecided')
     assert all(name.startswith('learned:') for name in diagnosis.accepted)
     assert diagnosis.p_value < 0.01

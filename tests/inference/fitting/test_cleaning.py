@@ -119,7 +119,7 @@ def test_what_was_probably_meant(written, expected, guess):
 @pytest.mark.slow
 @pytest.mark.parametrize('texture', [0.002, 0.02])
 def test_the_texture_is_estimated_beside_a_missing_effect(texture):
-    shares = [Scatter.of(built_up(scattered(seed, texture))).texture_share for seed in range(6)]
+    shares = [Scatter.of(built_up(scattered(seed, texture))).texture_share for seed in range(12)]
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 

@@ -16,9 +16,10 @@ from scipy.optimize import least_squares
 from paint_deposition.inference.fitting.panel_fit import CollapseFit, fit_collapse
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.model.eq2_projection import Projection, flux_um_per_s
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
+from paint_deposition.part.points import SurfacePoints
+from scenes import painted, straight_pass
 
 SHIPPED = json.loads(Path(__file__).with_name('real_profiles.json').read_text())
 COLLAPSE = ThreeGaussianCollapse(**SHIPPED['eq3'])
@@ -60,11 +61,10 @@ def share_on_the_axis(angle_deg: np.ndarray) -> np.ndarray:
     """Eq. (2) on the gun's axis at spray angles (N,), relative to the largest."""
     lean = np.radians(90.0 - angle_deg)
     normals = np.stack([np.sin(lean), np.zeros(len(lean)), -np.cos(lean)], axis=1)
-    flux = flux_um_per_s(
-        PlanarPattern(), Projection(), np.zeros((len(lean), 3)), normals,
-        np.array([0.0, 0.0, -0.25]), np.eye(3),
-    )  # fmt: skip
-    return flux / flux.max()
+    above = (0.0, 0.0, -0.25)
+    still = straight_pass(np.linspace(0.0, 1.0, 11), above, above, quaternion=(0.0, 0.0, 0.0, 1.0))
+    film = painted(SurfacePoints(np.zeros((len(lean), 3)), normals), still, precision='double')
+    return film.film_um / film.film_um.max()
 
 
 # --- everywhere, on the shipped figures

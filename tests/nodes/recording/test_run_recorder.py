@@ -128,7 +128,7 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
 def test_bad_input_is_told_at_the_start(record):
     for values, says in (
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
-        ({'compression': 'zip'}, "compression is 'zip': choose one of zstd, lz4, none"),
+        ({'compression': 'zip'}, "compression is 'zip': choose one of none, lz4, zstd"),
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
         ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
     ):

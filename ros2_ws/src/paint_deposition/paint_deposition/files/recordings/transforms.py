@@ -151,7 +151,8 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
     clock = max(way.moving, key=lambda edge: len(edge.stamps_ns))
     moving = [edge for edge in way.moving if len(edge.stamps_ns) > 1]
-    stamps = clock.stamps_ns[_covered(moving, clock.stamps_ns)]
+    covered = _covered(moving, clock.stamps_ns)
+    stamps = clock.stamps_ns[covered]
     if len(stamps) < 2:
         raise RecordingError(
             f"{bag.path}: the transforms from '{source}' to '{target}' are never known together"
@@ -162,7 +163,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
         longest_s = max(np.diff(edge.stamps_ns).max(initial=0) for edge in way.moving) * 1e-9
         note += f', {more} more transforms interpolated over up to {longest_s:.3g} s'
     trajectory = Trajectory(stamps, poses[:, :3], poses[:, 3:], target, notes=(note,))
-    return trajectory, clock.log_times_ns[known]
+    return trajectory, clock.log_times_ns[covered]
 
 
 def poses_over_time(
