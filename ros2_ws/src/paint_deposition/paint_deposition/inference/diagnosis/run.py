@@ -16,7 +16,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import Explanation, of_any_form
-from paint_deposition.inference.diagnosis.model_space import RemainderFigures
+from paint_deposition.inference.diagnosis.left_over import RemainderFigures
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (

@@ -14,7 +14,7 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
-from paint_deposition.inference.diagnosis.model_space import RemainderFigures
+from paint_deposition.inference.diagnosis.left_over import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit

@@ -1,0 +1,63 @@
+"""What nature leaves over in a campaign, in figures for people."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class FootprintProfile:
+    """The footprint from its middle outward, averaged over the angle, over the peak of eq. (1).
+
+    Attributes:
+        radius_m: (n,) on the model plane [m].
+        eq1, found, sd: (n,) of eq. (1), as the readings have it, and how well they know it.
+    """
+
+    radius_m: np.ndarray
+    eq1: np.ndarray
+    found: np.ndarray
+    sd: np.ndarray
+
+    def to_dict(self) -> dict[str, list[float]]:
+        """Its figures, for ``diagnosis.json``."""
+        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
+
+
+@dataclass(frozen=True)
+class RemainderFigures:
+    """What nature leaves over in a campaign, as far as its readings show it.
+
+    Attributes:
+        setting_share, part_share: by how much the film of a setting differs from any law, and
+            parts of one setting from each other, as shares of the thickest film.
+        length_m: over which neighbours differ alike [m].
+        footprint_of_peak: largest deviation of the footprint from eq. (1) that shows, over its
+            peak.
+        profile: of the footprint.
+    """
+
+    setting_share: float
+    part_share: float
+    length_m: float
+    footprint_of_peak: float
+    profile: FootprintProfile
+
+    def to_dict(self) -> dict[str, float]:
+        """Sizes and length, for ``diagnosis.json``."""
+        names = ('setting_share', 'part_share', 'length_m', 'footprint_of_peak')
+        return {name: getattr(self, name) for name in names}
+
+    def __str__(self) -> str:
+        setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
+        parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
+        footprint = (
+            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak'
+            if peak
+            else 'no deviation of the footprint from two Gaussians shows'
+        )
+        return (
+            f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
+            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm; '
+            f'{footprint}.'
+        )
