@@ -102,6 +102,9 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
     assert model.planar.K1_cm3_per_s == pytest.approx(0.653, rel=0.02)
     content = json.loads((folder / 'calibration.json').read_text())
     assert content['experiments'][0]['residual_sd_um'] < 0.75
+    # The panel was painted by eq. (1).
+    assert content['footprint']['deviation_of_peak'] < 0.1
+    assert 'differs from two Gaussians' not in done.stdout
     assert (content['converged'], content['readings']) == (True, 90)
     assert content['parameters']['r_m']['low'] < 0.231 < content['parameters']['r_m']['high']
     for name in ('collapse.png', 'profiles.png', 'agreement.png'):

@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -112,6 +113,8 @@ def test_a_wrong_footprint_is_not_blamed_on_physics(tmp_path):
     assert set(diagnosis.accepted) <= {'learned:footprint'}
     peak = diagnosis.to_dict()['footprint']['deviation_of_peak']
     assert peak == diagnosis.remainder.footprint_of_peak > 0.1
+    # A calibration says so, too.
+    assert pd.calibrate(campaign).remainder.footprint_of_peak > 0.1
 
 
 def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path):

@@ -15,6 +15,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.diagnosis.model_space import left_over
 from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted
@@ -53,7 +54,8 @@ def calibrate(
     """
     model = model or _model_of(campaign)
     require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
-    return calibrated(campaign, model, seed, progress)
+    found = calibrated(campaign, model, seed, progress)
+    return replace(found, remainder=left_over(found.study, found.fit))
 
 
 def compare(

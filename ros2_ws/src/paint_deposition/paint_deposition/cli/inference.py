@@ -107,6 +107,12 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
         f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
         f'{noise.typical_um:.2f} µm ({noise.source})'
     )
+    if result.remainder and result.remainder.footprint_of_peak:
+        yield (
+            'the footprint differs from two Gaussians by '
+            f'{100.0 * result.remainder.footprint_of_peak:.0f} % of its peak; '
+            'paint refit CAMPAIGN --add learned:footprint learns it'
+        )
 
 
 @click.command('compare')

@@ -18,8 +18,10 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, simulated
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.left_over import FootprintProfile, RemainderFigures
 from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.left_over import FootprintProfile, RemainderFigures
 
 # Prior probability that a cause is missing: an effect of the library; and, as one effect more,
 # something outside it, half of which shows over a covariate and half as a setting that differs
@@ -287,6 +289,15 @@ def probable_sizes(
         most = sorted(here, key=lambda one: -one[0])[: 1 if kind[0] else MOST_SIZES]
         kept += [sizes for weight, sizes in most if weight > least]
     return kept
+
+
+def left_over(study: Study, fit: Fit) -> RemainderFigures:
+    """What a fitted model leaves over where nothing is missing."""
+    plain, remainder = NullModel.around(fit, study.nuisance), Remainder.of(study, fit)
+    freedom = study.noise.degrees_of_freedom
+    sizes = probable_sizes(plain, remainder, [], freedom)
+    weighed = [Weighed.of(plain, remainder, size, freedom) for size in sizes]
+    return ModelSpace(weighed, [], remainder, freedom).figures
 
 
 def inclusion_of(log_weights: Sequence[float], nothing: float) -> float:

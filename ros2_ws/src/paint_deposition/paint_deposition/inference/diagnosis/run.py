@@ -16,7 +16,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import Explanation, of_any_form
-from paint_deposition.inference.diagnosis.left_over import RemainderFigures
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
@@ -33,6 +32,7 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 

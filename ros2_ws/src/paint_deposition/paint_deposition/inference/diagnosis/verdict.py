@@ -14,13 +14,13 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
-from paint_deposition.inference.diagnosis.left_over import RemainderFigures
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.residuals import is_worse, root_mean_square
 
@@ -268,11 +268,7 @@ class Diagnosis:
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
             'remainder': self.remainder and self.remainder.to_dict(),
-            'footprint': self.remainder
-            and {
-                'deviation_of_peak': self.remainder.footprint_of_peak,
-                'profile': self.remainder.profile.to_dict(),
-            },
+            'footprint': self.remainder and self.remainder.footprint,
             'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),

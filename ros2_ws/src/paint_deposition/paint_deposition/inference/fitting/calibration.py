@@ -33,6 +33,7 @@ from paint_deposition.inference.fitting.panel_fit import (
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
@@ -84,6 +85,7 @@ class Calibration:
         correlations: of pairs, strongest first.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
         warnings: what the reader must know, a sentence each.
+        remainder: what no pattern explains; None before that is looked at.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
             reach the pattern's edges; they widen the uncertainties.
     """
@@ -96,6 +98,7 @@ class Calibration:
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
     shifts: np.ndarray
+    remainder: RemainderFigures | None = None
 
     def __repr__(self) -> str:
         known = sum(value.determined for value in self.parameters)
@@ -136,6 +139,7 @@ class Calibration:
             'noise': study.noise_figures,
             'left_out': [outlier.to_dict() for outlier in study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
+            'footprint': self.remainder and self.remainder.footprint,
             'warnings': list(self.warnings),
         }
 

@@ -1,6 +1,7 @@
 """What nature leaves over in a campaign, in figures for people."""
 
 from dataclasses import dataclass, fields
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ class FootprintProfile:
     sd: np.ndarray
 
     def to_dict(self) -> dict[str, list[float]]:
-        """Its figures, for ``diagnosis.json``."""
+        """Its figures, for JSON."""
         return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
 
 
@@ -44,9 +45,15 @@ class RemainderFigures:
     profile: FootprintProfile
 
     def to_dict(self) -> dict[str, float]:
-        """Sizes and length, for ``diagnosis.json``."""
+        """Sizes and length, for JSON."""
         names = ('setting_share', 'part_share', 'length_m', 'footprint_of_peak')
         return {name: getattr(self, name) for name in names}
+
+    @property
+    def footprint(self) -> dict[str, Any]:
+        """How far the footprint is from eq. (1), for JSON."""
+        profile = self.profile.to_dict()
+        return {'deviation_of_peak': self.footprint_of_peak, 'profile': profile}
 
     def __str__(self) -> str:
         setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
