@@ -61,6 +61,7 @@ def test_declared_targets_speeds_and_zones(read):
     data = f"""
     LOCAL CONST robtarget pStart:={target(100)};
     TASK PERS robtarget pEnd:={target(900)};
+    CONST robtarget row{{2}}:=[{target(1)},{target(2)}];
     VAR speeddata vSlow:=[250.5,500,5000,1000];
     CONST zonedata zOwn:=[FALSE,7.5,11,11,1.1,11,1.1];
     CONST zonedata zStop:=[TRUE,7.5,11,11,1.1,11,1.1];
@@ -69,16 +70,16 @@ def test_declared_targets_speeds_and_zones(read):
     body = r"""
     MoveJ pStart, v1000, FINE, tool0;
     movel PEND, vslow, zOwn, tBell \WObj:=wobj0;
-    MoveL pStart, v600\V:=450, zStop, tBell;
+    MoveL row{2}, v600\V:=450, zStop, tBell;
     MoveL Offs(pEnd,0,step,-2*step), vmax, z0, tBell;
     step := step + 10;
     MoveL RelTool(pEnd,0,0,step), v5, z200, tBell;
-    pEnd := pStart;
+    pEnd.trans.z := 7;
     MoveL pEnd\ID:=10, [120,500,5000,1000], z10, tBell;
     """
     program = read(body, data)
     x = [move.position_m.tolist() for move in program.moves]
-    expected = [[100, 0, 0], [900, 0, 0], [100, 0, 0], [900, 50, -100], [900, 0, 60], [100, 0, 0]]
+    expected = [[100, 0, 0], [900, 0, 0], [2, 0, 0], [900, 50, -100], [900, 0, 60], [900, 0, 7]]
     np.testing.assert_allclose(x, np.array(expected) * 1e-3, atol=1e-12)
     speeds = [move.speed_m_per_s for move in program.moves]
     assert speeds == pytest.approx([1.0, 0.2505, 0.45, 5.0, 0.005, 0.12])
@@ -162,9 +163,9 @@ def test_conditions_without_moves_do_no_harm(read):
         ('FOR i FROM 1 TO 3 DO\nMoveL p,v1,fine,t;\nENDFOR', 'line 5: movel inside FOR'),
         ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'paintl inside WHILE is not followed'),
         ('IF reg1=1 MoveL p,v1,fine,t;', 'line 4: movel inside IF is not followed; unroll it'),
-        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse has no value in this module'),
-        ('MoveL row{2},v100,fine,tBell;', 'line 4: row{2} is not followed; write its value'),
-        ('p.trans.z:=7;', 'line 4: p.trans.z is not followed; write its value instead'),
+        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in this module'),
+        ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in this module'),
+        ('p.trans.z:=7;', 'line 4: p has no such part to assign to'),
         (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
         (f'MoveL {target(1)},v100,fine,tBell', "line 5: ';' expected, found 'ENDPROC'"),
         ('main;', 'procedure main calls itself'),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import operator
 import re
 from collections.abc import Callable
@@ -15,6 +16,12 @@ from paint_deposition.files.rapid.parser import Call, Module, Reference
 
 # Quaternions are written with four digits; further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01
+# Of the records whose parts programs name: robtarget, pose, tooldata, wobjdata, speeddata.
+COMPONENTS = {
+    'trans': 0, 'rot': 1, 'robconf': 2, 'extax': 3, 'x': 0, 'y': 1, 'z': 2,
+    'q1': 0, 'q2': 1, 'q3': 2, 'q4': 3, 'v_tcp': 0, 'v_ori': 1,
+    'robhold': 0, 'tframe': 1, 'tload': 2, 'ufprog': 1, 'ufmec': 2, 'uframe': 3, 'oframe': 4,
+}  # fmt: skip
 ARITHMETIC: dict[str, Callable] = {
     '+': operator.add, '-': operator.sub, '*': operator.mul, '/': operator.truediv,
 }  # fmt: skip
@@ -28,7 +35,8 @@ class RapidData:
     def __init__(self, module: Module, source: str) -> None:
         self._source = source
         self.line = 0
-        self._values: dict[str, Any] = {}
+        self._types = {name: datum.type for name, datum in module.data.items()}
+        self._values: dict[str, object] = {}
         for name, datum in module.data.items():
             if datum.value is not None:
                 self.line = datum.line
@@ -44,10 +52,7 @@ class RapidData:
         if isinstance(expression, Call):
             return self._call(expression)
         if isinstance(expression, Reference):
-            name = self._whole(expression)
-            if name not in self._values:
-                self.fail(f'{name} has no value in this module; write one instead')
-            return self._values[name]
+            return self._look_up(expression)
         return expression
 
     def number(self, expression: object, name: str) -> float:
@@ -58,7 +63,13 @@ class RapidData:
         return value
 
     def assign(self, target: Reference, value: object) -> None:
-        self._values[self._whole(target)] = value
+        *path, last = [target.name, *self._path(target)]
+        place: Any = self._values
+        for key in path:
+            place = _part(place, key)
+        if path and _part(place, last) is None:
+            self.fail(f'{target.name} has no such part to assign to')
+        place[last] = value
 
     # --- motion data
 
@@ -108,7 +119,7 @@ class RapidData:
         """Object frame in the world [m]; None when the module does not define it."""
         if name not in self._values:
             return (np.zeros(3), Rotation.identity()) if name == 'wobj0' else None
-        value = self._values[name]
+        value: Any = self._values[name]
         if not _is_record(value, 5):
             self.fail(f'{name} is no wobjdata')
         if value[0]:
@@ -118,21 +129,34 @@ class RapidData:
         return position + rotation.apply(object_position), rotation * object_rotation
 
     def tool_is_held(self, name: str) -> bool:
-        tool = self._values.get(name)
-        return not (isinstance(tool, list) and tool and tool[0] is False)
+        return _part(self._values.get(name), 0) is not False
 
     # --- names and functions
-
-    def _whole(self, reference: Reference) -> str:
-        """The name of a datum, of which no part is meant."""
-        if reference.part:
-            self.fail(f'{reference.name}{reference.part} is not followed; write its value instead')
-        return reference.name
 
     def _predefined(self, expression: object) -> str:
         """The name of what the controller predefines, '' where the module has its own value."""
         name = expression.name if isinstance(expression, Reference) else ''
         return '' if name in self._values else name
+
+    def _path(self, reference: Reference) -> list[int]:
+        path = [int(self.number(index, 'an index')) - 1 for index in reference.indexes]
+        for component in reference.components:
+            if component not in COMPONENTS:
+                self.fail(f'component {component} of {reference.name} is not known')
+            path.append(COMPONENTS[component])
+        return path
+
+    def _look_up(self, reference: Reference) -> object:
+        if reference.name not in self._values:
+            if kind := self._types.get(reference.name):
+                self.fail(f'{kind} {reference.name} has no value yet')
+            self.fail(f'{reference.name} is not declared in this module')
+        value: Any = self._values[reference.name]
+        for index in self._path(reference):
+            value = _part(value, index)
+            if value is None:
+                self.fail(f'{reference.name} has no such part')
+        return copy.deepcopy(value)
 
     def _call(self, call: Call) -> object:
         arguments = self.value(call.arguments)
@@ -161,3 +185,10 @@ def _is_record(value: object, length: int) -> TypeGuard[list]:
 
 def _are_numbers(value: object, count: int) -> bool:
     return _is_record(value, count) and all(map(_is_number, value))
+
+
+def _part(value: Any, index: Any) -> Any:
+    """A part of an array or record, a datum of all; None if there is no such thing."""
+    if isinstance(value, dict):
+        return value.get(index)
+    return value[index] if isinstance(value, list) and index in range(len(value)) else None

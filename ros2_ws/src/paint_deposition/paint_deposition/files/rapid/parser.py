@@ -44,10 +44,11 @@ class Token(NamedTuple):
 
 
 class Reference(NamedTuple):
-    """A datum by name; ``part`` is the index or component behind it as text, '' for none."""
+    """A datum by name, with the indexes and components that follow it."""
 
     name: str
-    part: str = ''
+    indexes: tuple = ()
+    components: tuple = ()
 
 
 class Call(NamedTuple):
@@ -91,8 +92,9 @@ class Instruction:
 
 @dataclass(frozen=True)
 class Declaration:
-    """A datum's value, None where it is declared without, and the line that declares it."""
+    """A datum's type, its value, None where there is none, and the line that declares it."""
 
+    type: str
     value: object
     line: int
 
@@ -198,13 +200,11 @@ class ModuleParser:
                 return values, options
 
     def _reference(self, name: str) -> Reference:
-        start = self._at
-        while self._now.text in ('.', '{'):
-            if self._next().text == '{':
-                self._skip_past('}')
-            else:
-                self._name()
-        return Reference(name, ''.join(token.text for token in self._tokens[start : self._at]))
+        indexes = self._arguments('}')[0] if self._takes('{') else []
+        components = []
+        while self._takes('.'):
+            components.append(self._name())
+        return Reference(name, tuple(indexes), tuple(components))
 
     # --- declarations and procedures
 
@@ -227,14 +227,13 @@ class ModuleParser:
         return module
 
     def _declaration(self, data: dict[str, Declaration]) -> None:
-        line = self._now.line
-        self._name()
+        line, kind = self._now.line, self._name()
         while True:
             name = self._name()
             if self._takes('{'):
                 self._skip_past('}')
             value = self._expression() if self._takes(':=') else None
-            data[name] = Declaration(value, line)
+            data[name] = Declaration(kind, value, line)
             if not self._takes(','):
                 break
         self._expect(';')
