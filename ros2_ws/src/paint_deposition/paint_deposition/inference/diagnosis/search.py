@@ -41,6 +41,8 @@ LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
 COARSENED = 2.0
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
+# Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
+MISLEADS = 12.0
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
 
@@ -215,7 +217,7 @@ class Search:
     def stages(self) -> list[Stage]:
         """From nothing to the best set, each with one effect more than the one before."""
         found: list[Stage] = []
-        here = self.nothing
+        here = self._around_the_best()
         while True:
             room = len(here.names) < MOST_EFFECTS
             stage = Stage(here, [self.with_effect(here, name) for name in here.proposed if room])
@@ -228,6 +230,25 @@ class Search:
                 return [*found, stage]
             found.append(stage)
             here = best
+
+    def _around_the_best(self) -> Trial:
+        """Nothing missing, with what nature leaves over around the best fit with one effect.
+
+        The pattern that was fitted without a strong effect may be far from the true one, and the
+        deviations of its footprint with it. All sets that are compared have the same.
+        """
+        nothing, run = self.nothing, self.run
+        tried = [self.with_effect(nothing, name) for name in nothing.proposed]
+        best = max(tried, key=lambda one: one.log_weight_alone, default=nothing)
+        if best.log_weight_alone - best.log_prior <= nothing.log_weight_alone + MISLEADS:
+            return nothing
+        usual = Remainder.of(run.study, best.fit)
+        laws = [*of_effects(run.study, best.fit, run.candidates)]
+        sizes = probable_sizes(run.plain(best.fit), usual, laws, run.freedom)
+        self._trials, self._tried = {}, set()
+        for start in (nothing, best):
+            self.nothing = self._refitted({}, replace(start, usual=usual, sizes=sizes))
+        return self.nothing
 
     def _in_another_pattern(self, stage: Stage) -> Trial:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""

@@ -278,8 +278,10 @@ def beside_pattern(
         return (harmonics @ np.mean(around, axis=0)).T.ravel()
 
     here, count = log_flux(fit.vector), len(fit.parameters.pattern)
-    steps = STEP * np.eye(len(fit.vector))[:count]
-    relative = np.stack([(log_flux(fit.vector + step) - here) / STEP for step in steps], axis=1)
+    # Away from an upper bound: beyond it there is no pattern.
+    steps = np.where(fit.vector + STEP > fit.parameters.bounds[1], -STEP, STEP)
+    moved = fit.vector + np.diag(steps)
+    relative = np.stack([(log_flux(moved[k]) - here) / steps[k] for k in range(count)], axis=1)
     change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
     followed = np.linalg.lstsq(fit.jacobian[:, :count], change, rcond=None)[0]
     return at_knots - relative @ followed, followed
