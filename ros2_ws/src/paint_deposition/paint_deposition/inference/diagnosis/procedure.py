@@ -77,6 +77,7 @@ def diagnose(
     stages = search.stages()
     best, groups = search.groups(stages[-1].here)
     run.fit, run.left_over = run.fitted_with([*best.effects.values()]), best.space.figures
+    run.remainder = best.best.null.remainder
     stages = [*(s for s in stages if s.here.names < best.names), Stage(best, [])]
     model = run.fit.model
     options = [*of_any_form(run.study, model), *of_footprint(run.study, run.fit)]

@@ -60,6 +60,8 @@ class Run:
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
         candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
+        left_over, remainder: what nature leaves over, and its covariance (P, P) over the noise, by
+            which intervals are wider; None while it is not known.
         trouble: why the fit cannot be right, '' if it can.
     """
 
@@ -88,6 +90,7 @@ class Run:
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
         self.left_over: RemainderFigures | None = None
+        self.remainder: np.ndarray | None = None
         self.trouble = trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
@@ -207,7 +210,7 @@ class Run:
             members,
             min(probability, 1.0),
             members[0],
-            intervals(after.fit, members[0]),
+            intervals(replace(after.fit, remainder=self.remainder), members[0]),
             {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um},
         )
 
