@@ -112,8 +112,13 @@ class Trial:
     @cached_property
     def log_weight_alone(self) -> float:
         """The same weight if nothing unknown can act."""
+        return self.log_evidence_alone + self.log_prior
+
+    @cached_property
+    def log_evidence_alone(self) -> float:
+        """Its evidence then, whatever the prior of the set."""
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature)) + self.log_prior
+        return float(np.logaddexp.reduce(nature))
 
     @property
     def log_prior(self) -> float:
@@ -181,11 +186,14 @@ class Search:
         self.run = run
         self._trials: dict[frozenset[str], Trial] = {}
         self._tried: set[frozenset[str]] = set()
-        laws = [*of_effects(run.study, run.fit, run.candidates)]
-        usual = Remainder.of(run.study, run.fit)
-        sizes = probable_sizes(run.plain(run.fit), usual, laws, run.freedom)
-        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, usual, sizes))
+        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, *self._around(run.fit)))
         run.testable = testability(self.nothing.space.central, run.seed)
+
+    def _around(self, fit: Fit) -> tuple[Remainder, list[Sizes]]:
+        """What nature leaves over around a fit, and its sizes that matter."""
+        run, usual = self.run, Remainder.of(self.run.study, fit)
+        laws = [*of_effects(run.study, fit, run.candidates)]
+        return usual, probable_sizes(run.plain(fit), usual, laws, run.freedom)
 
     def with_effect(self, parent: Trial, name: str) -> Trial:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
@@ -237,14 +245,12 @@ class Search:
         The pattern that was fitted without a strong effect may be far from the true one, and the
         deviations of its footprint with it. All sets that are compared have the same.
         """
-        nothing, run = self.nothing, self.run
+        nothing = self.nothing
         tried = [self.with_effect(nothing, name) for name in nothing.proposed]
         best = max(tried, key=lambda one: one.log_weight_alone, default=nothing)
-        if best.log_weight_alone - best.log_prior <= nothing.log_weight_alone + MISLEADS:
+        if best.log_evidence_alone <= nothing.log_evidence_alone + MISLEADS:
             return nothing
-        usual = Remainder.of(run.study, best.fit)
-        laws = [*of_effects(run.study, best.fit, run.candidates)]
-        sizes = probable_sizes(run.plain(best.fit), usual, laws, run.freedom)
+        usual, sizes = self._around(best.fit)
         self._trials, self._tried = {}, set()
         for start in (nothing, best):
             self.nothing = self._refitted({}, replace(start, usual=usual, sizes=sizes))
@@ -254,9 +260,7 @@ class Search:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""
         here = stage.here
         for trial in sorted(stage.tried, key=lambda one: -one.log_weight_alone):
-            gain = (
-                trial.log_weight_alone - trial.log_prior - here.log_weight_alone + here.log_prior
-            )
+            gain = trial.log_evidence_alone - here.log_evidence_alone
             again = self.without(trial, *(trial.names - here.names)) if gain > SAME else here
             if again is not here:
                 self._tried = {names for names in self._tried if not names > here.names}
