@@ -39,7 +39,7 @@ def errors(study: Study, *effects: Effect, kept: tuple[str, ...] | None = None) 
     model = MODEL.model_copy(update={'effects': effects})
     fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=model)
     ids = [effect.id for effect in effects] if kept is None else kept
-    return law_errors(study, fit, frozenset(ids))
+    return law_errors(study, fit, frozenset(ids), fit.model)
 
 
 def change_um(study: Study, effect: Effect) -> np.ndarray:

@@ -125,17 +125,20 @@ def of_footprint(study: Study, fit: Fit) -> list[Explanation]:
     return found
 
 
-def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
+def law_errors(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+) -> np.ndarray:
     """(P, n) directions over the noise in which the laws of effects in a model may be off.
 
     Args:
         study: the readings.
         fit: of the model.
         kept: ids of the effects.
+        model: whose rays say over which values of the covariates; one like it.
     """
     covariates = {
         c.name: (c.values - c.values.mean()) / c.values.std()
-        for c in study.covariates(fit.model)
+        for c in study.covariates(model)
         if c.varies
     }
     film = study.forward.predict_um(fit.model)
@@ -149,7 +152,7 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str]) -> np.ndarray:
             scale = LAW_ERROR / np.sqrt(len(own))
             basis = None
             if effect.free_law and name in CURVES:
-                basis = curve_basis(study, fit.model, name, effect.free_law)
+                basis = curve_basis(study, model, name, effect.free_law)
             if basis is None:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 columns = scale * change[:, np.newaxis] * root

@@ -9,6 +9,7 @@ are hyperparameters with a prior from measured sprays, over which every evidence
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 
 import numpy as np
@@ -93,6 +94,11 @@ class Footprints:
     radius_m: np.ndarray
     flux: np.ndarray
 
+    @cached_property
+    def covariances(self) -> tuple[np.ndarray, ...]:
+        """For each size (P, P), of the readings over the noise."""
+        return tuple(columns @ columns.T for columns in self.columns)
+
     @staticmethod
     def of(study: Study, fit: Fit) -> 'Footprints':
         """What is left of them when the pattern has followed.
@@ -125,6 +131,7 @@ class Remainder:
     """What nature leaves over at P points, over the noise.
 
     Attributes:
+        model: around which it is taken.
         footprint: deviations that all parts share.
         shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
         settings, parts: for each length (P, P), covariances of fields of size one over parts
@@ -135,6 +142,7 @@ class Remainder:
         setting_of: (P,) number of the setting of each point, see ``painted_alike``.
     """
 
+    model: DepositionModel
     footprint: Footprints
     shapes: np.ndarray
     settings: tuple[np.ndarray, ...]
@@ -160,6 +168,7 @@ class Remainder:
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return Remainder(
+            model,
             Footprints.of(study, fit),
             _shapes(study, fit, setting_of),
             tuple(field(setting_of, scale, length_m) for length_m in lengths_m),
@@ -202,8 +211,7 @@ class Remainder:
 
     def of_footprint(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of the footprint, which all parts share."""
-        columns = self.footprint.columns[sizes.footprint]
-        return columns @ columns.T
+        return self.footprint.covariances[sizes.footprint]
 
     def of_parts(self, sizes: Sizes) -> np.ndarray:
         """(P, P) that of settings and of parts."""

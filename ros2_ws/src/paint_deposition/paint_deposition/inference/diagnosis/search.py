@@ -78,7 +78,7 @@ class Trial:
     def weighed(self) -> list[Weighed]:
         """The model as the null hypothesis, its laws being off, with each size of remainder."""
         study, freedom = self.run.study, self.run.freedom
-        errors = law_errors(study, self.fit, self.names)
+        errors = law_errors(study, self.fit, self.names, self.usual.model)
         found = []
         for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
             null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
@@ -100,7 +100,7 @@ class Trial:
             fit: of the model with the set.
         """
         null = self.run.plain(fit).with_remainder(self.remainder.of_parts(self.best.sizes))
-        return null.beside(law_errors(self.run.study, fit, self.names))
+        return null.beside(law_errors(self.run.study, fit, self.names, self.usual.model))
 
     @cached_property
     def log_weight(self) -> float:

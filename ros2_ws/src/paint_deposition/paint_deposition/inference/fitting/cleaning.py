@@ -48,7 +48,7 @@ def clean_and_fit(
     """
     if len(campaign) > MANY:
         rough = _fitted(Study.of(thinned(campaign, seed), effects), start, starts, seed, known)
-        campaign = condensed(campaign, rough.model)
+        campaign, start, starts = condensed(campaign, rough.model), rough.model, 1
     study = Study.of(campaign, effects)
     fit = _fitted(study, start, starts, seed, known)
     if len(study) < FEWEST or not fit.predicted_um.any():

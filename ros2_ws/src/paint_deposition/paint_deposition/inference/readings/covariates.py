@@ -64,7 +64,7 @@ class Rays:
         offset, omega = model.projection.emission_offset_m, model.projection.model_plane_m
         origin = path.position_m[rows] - offset * axes[:, :, 2]
         to_point = points.positions_m[np.newaxis] - origin[:, np.newaxis]
-        local = np.einsum('mpi,mij->mpj', to_point, axes)
+        local = to_point @ axes
         distance = np.linalg.norm(to_point, axis=2)
         facing = -np.einsum('mpi,pi->mp', to_point, points.normals)
         along = local[:, :, 2]
