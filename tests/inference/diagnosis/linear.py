@@ -14,7 +14,8 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.posterior import Posterior
 
-PARAMETERS = FreeParameters.of(DepositionModel())
+MODEL = DepositionModel()
+PARAMETERS = FreeParameters.of(MODEL)
 
 
 def correlated(parameters: FreeParameters, seed: int = 0) -> Posterior:
@@ -96,7 +97,7 @@ def no_remainder(count: int) -> Remainder:
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
     footprint = Footprints(3 * (none[:, :1],), 3 * (none[:1, :1],), none[0, :1], none[0, :1])
-    return Remainder(footprint, none, fields, fields, False, lengths_m, one_setting)
+    return Remainder(MODEL, footprint, none, fields, fields, False, lengths_m, one_setting)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

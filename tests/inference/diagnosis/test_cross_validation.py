@@ -14,10 +14,10 @@ from inference.diagnosis.linear import (
     null_of,
     smooth_curves,
 )
-from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
+from paint_deposition.inference.diagnosis.cross_validation import LeftOut
 from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out, left_out
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.learning import MOST_LAWS
+from paint_deposition.inference.diagnosis.learning import MOST_LAWS, Nulls
 from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, Weighed, log_odds
 from paint_deposition.inference.diagnosis.remainder import Sizes
 from paint_deposition.inference.diagnosis.search import Stage, Trial
@@ -91,8 +91,10 @@ class LinearTrial(Trial):
     def weighed(self):
         return [Weighed.of(self.fit, self.usual, size, np.inf) for size in self.sizes]
 
-    def beside(self, fit):
-        return fit.with_remainder(self.usual.of_parts(self.best.sizes))
+    def nulls(self, fit):
+        sizes = self.best.sizes
+        beside = fit.with_remainder(self.usual.covariance(sizes))
+        return Nulls(fit.with_remainder(self.usual.of_parts(sizes)), beside, beside)
 
 
 def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> LinearTrial:
@@ -124,7 +126,7 @@ CURVES = [learnable(smooth_curves(PLACE, KNOTS, 0.5))]
 
 def nested(stages, options=CURVES, without=()) -> np.ndarray:
     """By the number of laws learned, in standard deviations of the noise."""
-    return nested_rmse_um(stages, options, without) / SIGMA_UM
+    return LeftOut(stages, options).errors_um(frozenset(without)) / SIGMA_UM
 
 
 @pytest.mark.parametrize(('change', 'found'), [(0.0, 0), (2.0, 1)])
@@ -138,7 +140,7 @@ def test_errors_are_those_of_the_set_that_the_other_points_call_for(change, foun
 def test_a_fold_that_calls_for_another_set_does_not_go_on():
     """The effect shows in one fold alone: without its points nobody would look for more."""
     here = FOLDS == 3
-    stages = stages_of(4.0 * FORM * here)
+    stages = stages_of(6.0 * FORM * here)
     nothing, edge, *_ = [stage.here for stage in stages]
     deviation = hold_out(edge.fit, FOLDS)
     deviation[here] = left_out(nothing.fit, [], here)
@@ -180,7 +182,7 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction():
             trial(WAVE + 2.0 * FORM + added * out, *forms, sigma_um=out.astype(float))
             for forms in (nothing, edge)
         )
-        return POINTS * nested_rmse_um([Stage(here, [tried]), Stage(tried, [])], CURVES) ** 2
+        return POINTS * LeftOut([Stage(here, [tried]), Stage(tried, [])], CURVES).errors_um() ** 2
 
     curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
     assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)

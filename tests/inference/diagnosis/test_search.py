@@ -14,7 +14,11 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
-from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, SURE, log_odds
+from paint_deposition.inference.diagnosis.model_space import (
+    PRIOR_EFFECT,
+    SURE,
+    log_odds,
+)
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import SAME, Search, Stage, Trial
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
@@ -91,8 +95,8 @@ def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
         weights = [search.with_effect(others, rival).log_weight for rival in rivals]
-        odds = np.exp(np.logaddexp.reduce(weights) - others.log_weight)
-        assert probability == pytest.approx(odds / (1.0 + odds))
+        odds = np.sum(np.exp((np.array(weights) - others.log_weight) / COARSENED))
+        assert probability == pytest.approx((1.0 - PRIOR_UNKNOWN) * odds / (1.0 + odds))
 
 
 def test_effects_that_look_alike_share_one_group():

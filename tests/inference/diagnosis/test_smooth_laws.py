@@ -88,7 +88,7 @@ def test_values_have_the_size_and_the_correlation_that_were_asked_for(length):
 def test_a_law_may_leave_the_film_as_a_whole_as_it_is():
     """Beside a pattern of which the level is free that part of it would say nothing."""
     basis = replace(basis_on_a_line(), film_um=np.diag(np.arange(1.0, 10.0)))
-    free, centred = basis.random(0.2, 1.0), basis.random(0.2, 1.0, centred=True)
+    free, centred = basis.random(0.2, 1.0), basis.random(0.2, 1.0).centred
     assert np.abs(free.change_um.sum(axis=0)).max() > 0.1
     assert np.abs(centred.change_um.sum(axis=0)).max() < 1e-12
     # Its form is the same.

@@ -1,20 +1,18 @@
 """Cross-validation: how well a fitted model predicts readings that were left out."""
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import left_out
-from paint_deposition.inference.diagnosis.explanations import Explanation
+from paint_deposition.inference.diagnosis.explanations import PLACE, Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
 from paint_deposition.inference.diagnosis.search import Stage, Trial
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 
-def nested_rmse_um(
-    stages: Sequence[Stage], options: Sequence[Explanation], without: Collection[str] = ()
-) -> np.ndarray:
-    """(n,) errors on readings left out with effects and 0 to n - 1 laws learned without them [um].
+class LeftOut:
+    """Errors on readings left out, of a search and the laws learned after it.
 
     For each fold the choice is repeated with the other readings between the sets of effects that
     were tried: as long as it is the same, it goes on to the next stage. The fits of the sets are
@@ -23,24 +21,42 @@ def nested_rmse_um(
     Args:
         stages: of the search.
         options: laws of any form that may be learned.
-        without: covariates of laws that are not learned.
     """
-    run = stages[0].here.run
-    folds = run.study.folds()
-    options = [option for option in options if option.learns not in without]
-    deviation = np.empty((MOST_LAWS + 1, len(folds)))
-    for fold in np.unique(folds):
-        out = folds == fold
-        found = _found_without(stages, out)
-        plain = run.plain(found.fit)
-        beside = found.beside(found.fit).select(~out)
-        footprint = found.remainder.of_footprint(found.best.sizes)[np.ix_(~out, ~out)]
-        kept = [option.select(~out) for option in options]
-        laws = choose_laws(beside, footprint, kept, run.freedom)
-        learned = [size * options[k].columns for k, size in laws]
-        for count in range(MOST_LAWS + 1):
-            deviation[count, out] = left_out(plain, learned[:count], out)
-    return np.array([root_mean_square(each * run.study.sigma_um) for each in deviation])
+
+    def __init__(self, stages: Sequence[Stage], options: Sequence[Explanation]) -> None:
+        self.stages, self.options = stages, options
+        self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
+
+    def errors_um(self, without: frozenset[str] = frozenset(), law: str = '') -> np.ndarray:
+        """(n,) with effects and 0 to n - 1 laws, all found without what is left out [um].
+
+        Args:
+            without: covariates of laws that are not learned.
+            law: covariate of the law in question. Whole parts are left out where there are
+                several; but patches for a map, which says nothing of another part.
+        """
+        key = without, law == PLACE
+        if key not in self._known:
+            study = self.stages[0].here.run.study
+            folds = study.patches() if law == PLACE else study.folds()
+            self._known[key] = self._errors_um(folds, without)
+        return self._known[key]
+
+    def _errors_um(self, folds: np.ndarray, without: frozenset[str]) -> np.ndarray:
+        run = self.stages[0].here.run
+        options = [option for option in self.options if option.learns not in without]
+        deviation = np.empty((MOST_LAWS + 1, len(folds)))
+        for fold in np.unique(folds):
+            out = folds == fold
+            found = _found_without(self.stages, out)
+            plain = run.plain(found.fit)
+            nulls = found.nulls(found.fit).select(~out)
+            kept = [option.select(~out) for option in options]
+            laws = choose_laws(nulls, kept, run.freedom)
+            learned = [size * options[k].columns for k, size in laws]
+            for count in range(MOST_LAWS + 1):
+                deviation[count, out] = left_out(plain, learned[:count], out)
+        return np.array([root_mean_square(each * run.study.sigma_um) for each in deviation])
 
 
 def _found_without(stages: Sequence[Stage], out: np.ndarray) -> Trial:

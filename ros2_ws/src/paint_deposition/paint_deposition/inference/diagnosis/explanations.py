@@ -13,6 +13,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.place import LearnedMap
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
@@ -20,24 +21,26 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     beside_pattern,
     curve_basis,
     footprint_basis,
+    map_bases,
 )
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.smooth_fields import field_over_values
 from paint_deposition.inference.fitting.study import Study
 
-UNKNOWN, FOOTPRINT = 'unknown', 'footprint'
+UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
 # The size of an effect is what it changes at this share of the points at the most.
 LARGEST = 0.95
-# Laws of any form: typical size of a factor, and of an addition [um].
+# Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
+FACTOR_OF_PLACE = 0.1
 # Typical deviation of a footprint, as a share of the flux at the place.
 OF_FLUX = 0.15
 # Their lengths of correlation: over a covariate in its standard deviations, over the part [m], and
 # over the radius of the pattern in steps.
-LENGTHS = {'covariate': (0.35, 1.0), 'place': (0.1, 0.25), 'footprint': (2.0, 6.0)}
+LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25), FOOTPRINT: (2.0, 6.0)}
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,7 @@ class Explanation:
         share: prior share of this explanation among those of its cause.
         law: of an effect; its directions are ``columns``. None for a law of any form.
         random: the law of any form whose amplitudes the directions are, or None.
+        corrects: id of the effect whose law it corrects, if it does.
     """
 
     cause: str
@@ -59,6 +63,7 @@ class Explanation:
     share: float
     law: Sensitivity | None = None
     random: RandomLaw | None = None
+    corrects: str = ''
 
     @property
     def learns(self) -> str:
@@ -100,7 +105,7 @@ def of_any_form(study: Study, model: DepositionModel) -> list[Explanation]:
     None of them changes the film as a whole: that is the pattern's.
     """
     laws = [
-        basis.random(FACTOR, length, centred=True)
+        basis.random(FACTOR, length).centred
         for name, law in CURVES.items()
         if name != 'film_um' and model.effect(law.id) is None
         for basis in [curve_basis(study, model, name)]
@@ -110,12 +115,39 @@ def of_any_form(study: Study, model: DepositionModel) -> list[Explanation]:
     return [of_random(study, law, 1.0 / len(laws)) for law in laws]
 
 
+def of_places(study: Study, model: DepositionModel) -> list[Explanation]:
+    """Smooth factors on the film over places of a part, for what no covariate carries."""
+    if model.effect(LearnedMap.id) is not None:
+        return []
+    laws = [
+        basis.random(FACTOR_OF_PLACE, length).centred
+        for basis in map_bases(study, model)
+        for length in LENGTHS[PLACE]
+    ]
+    return [of_random(study, law, 1.0 / len(laws)) for law in laws]
+
+
+def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explanation]:
+    """Curves over their own covariates by which the laws of effects in a model may be off.
+
+    Args:
+        study: the readings.
+        fit: of the model.
+        names: ids of the effects. One that a part lacks has no such curve: curves act on all.
+    """
+    return [
+        replace(of_random(study, curve.centred), corrects=effect.id)
+        for effect, _, curve in _laws_off(study, fit, names, fit.model)
+        if curve and study.has(type(effect)).all() and not fit.model.effect(curve.basis.law.id)
+    ]
+
+
 def of_footprint(study: Study, fit: Fit) -> list[Explanation]:
     """Deviations of the footprint from the two Gaussians of eq. (1) that fit best."""
     basis = footprint_basis(study, fit.model)
     if fit.model.effect(basis.law.id) is not None:
         return []
-    lengths = LENGTHS['footprint']
+    lengths = LENGTHS[FOOTPRINT]
     found = []
     for length in lengths:
         free = basis.random(OF_FLUX, length).at_knots
@@ -125,9 +157,7 @@ def of_footprint(study: Study, fit: Fit) -> list[Explanation]:
     return found
 
 
-def law_errors(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
-) -> np.ndarray:
+def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel) -> np.ndarray:
     """(P, n) directions over the noise in which the laws of effects in a model may be off.
 
     Args:
@@ -136,33 +166,36 @@ def law_errors(
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
+    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
+    return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
+
+
+def _laws_off(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
+    """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
     covariates = {
         c.name: (c.values - c.values.mean()) / c.values.std()
         for c in study.covariates(model)
         if c.varies
     }
     film = study.forward.predict_um(fit.model)
-    found = [np.empty((len(study), 0))]
     for effect in (e for e in fit.model.effects if e.id in kept and not e.exact):
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})
         change = film - study.forward.predict_um(without)
         own = [name for name in effect.covariates if name in covariates]
+        scale = LAW_ERROR / np.sqrt(max(len(own), 1))
         for name in own:
-            scale = LAW_ERROR / np.sqrt(len(own))
-            basis = None
-            if effect.free_law and name in CURVES:
-                basis = curve_basis(study, model, name, effect.free_law)
-            if basis is None:
-                root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
-                columns = scale * change[:, np.newaxis] * root
-            else:
+            curves = effect.free_law and name in CURVES
+            if basis := curve_basis(study, model, name, effect.free_law) if curves else None:
                 relative = change if effect.free_law == 'addition' else _share(change, film)
                 size = scale * float(np.quantile(np.abs(relative), LARGEST))
-                has = study.has(type(effect))[:, np.newaxis]
-                columns = has * basis.random(size, LAW_LENGTH).change_um
-            found.append(columns / study.sigma_um[:, np.newaxis])
-    return np.hstack(found)
+                curve = basis.random(size, LAW_LENGTH)
+                yield effect, study.has(type(effect))[:, np.newaxis] * curve.change_um, curve
+            else:
+                root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+                yield effect, scale * change[:, np.newaxis] * root, None
 
 
 def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:

@@ -4,7 +4,8 @@ They are chosen one after the other by their evidence beside everything that the
 and kept only if they improve the prediction of readings left out.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -17,16 +18,47 @@ MOST_LAWS = 2
 WORTH_LEARNING = 6.0
 
 
+@dataclass(frozen=True)
+class Nulls:
+    """What a law of each kind must say more than.
+
+    Attributes:
+        footprint: for a footprint: pattern, nuisance, what the accepted laws may be off by, and
+            what nature leaves over of parts and settings.
+        correction: for a correction of an accepted law: the same with the footprint, without what
+            that law may be off by.
+        any_form: for all others: all of it.
+    """
+
+    footprint: NullModel
+    correction: NullModel
+    any_form: NullModel
+
+    def of(self, explanation: Explanation) -> NullModel:
+        """That for an explanation."""
+        if explanation.corrects:
+            return self.correction
+        return self.footprint if explanation.learns == FOOTPRINT else self.any_form
+
+    def beside(self, columns: np.ndarray) -> 'Nulls':
+        """The same where some directions (P, n) may vary, too."""
+        return self._each(lambda null: null.beside(columns))
+
+    def select(self, rows: np.ndarray) -> 'Nulls':
+        """The same for some of the readings."""
+        return self._each(lambda null: null.select(rows))
+
+    def _each(self, change: Callable[[NullModel], NullModel]) -> 'Nulls':
+        return Nulls(change(self.footprint), change(self.correction), change(self.any_form))
+
+
 def choose_laws(
-    null: NullModel, footprint: np.ndarray, explanations: Sequence[Explanation], freedom: float
+    nulls: Nulls, explanations: Sequence[Explanation], freedom: float
 ) -> list[tuple[int, float]]:
     """The laws that the readings call for, strongest first.
 
     Args:
-        null: what varies already: pattern, nuisance, the accepted laws, and what nature leaves
-            over of parts and settings.
-        footprint: (P, P) covariance of the deviations of a footprint. A law over a covariate must
-            say more than any footprint could.
+        nulls: what varies already.
         explanations: laws of any form, of which one for each covariate is considered.
         freedom: degrees of freedom of the noise estimate.
 
@@ -36,18 +68,18 @@ def choose_laws(
     left = {k: e for k, e in enumerate(explanations) if e.learns}
     chosen: list[tuple[int, float]] = []
     while left and len(chosen) < MOST_LAWS:
-        beside = null.with_more(footprint)
         gain, k, size = max(
             (float(value), k, float(size))
             for k, explanation in left.items()
-            for of in [null if explanation.learns == FOOTPRINT else beside]
-            for value, size in zip(by_size(of, explanation, freedom), SIZES, strict=True)
+            for value, size in zip(
+                by_size(nulls.of(explanation), explanation, freedom), SIZES, strict=True
+            )
         )
         if gain < WORTH_LEARNING:
             break
         chosen.append((k, size))
         # What was chosen may vary from now on, too.
-        null = null.beside(size * left[k].columns)
+        nulls = nulls.beside(size * left[k].columns)
         left = {number: e for number, e in left.items() if e.learns != left[k].learns}
     return chosen
 

@@ -10,19 +10,21 @@
 5. Conclude what is missing, or between what it is undecided, or where the unexplained shows.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.cross_validation import nested_rmse_um
+from paint_deposition.inference.diagnosis.cross_validation import LeftOut
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     UNKNOWN,
     Explanation,
     of_any_form,
+    of_corrections,
     of_footprint,
+    of_places,
 )
 from paint_deposition.inference.diagnosis.learning import choose_laws
 from paint_deposition.inference.diagnosis.run import Run
@@ -76,23 +78,27 @@ def diagnose(
     progress('refitting with what may be missing')
     stages = search.stages()
     best, groups = search.groups(stages[-1].here)
-    run.fit, run.left_over = run.fitted_with([*best.effects.values()]), best.space.figures
-    run.remainder = best.best.null.remainder
+    run.fit = run.fitted_with([*best.effects.values()])
+    run.left_over, run.remainder = best.space.figures, best.best.null.remainder
     stages = [*(s for s in stages if s.here.names < best.names), Stage(best, [])]
     model = run.fit.model
-    options = [*of_any_form(run.study, model), *of_footprint(run.study, run.fit)]
-    errors_um = nested_rmse_um(stages, options)
-    _accept(run, groups, float(errors_um[0]))
+    options = [
+        *of_corrections(run.study, run.fit, best.names),
+        *of_any_form(run.study, model),
+        *of_places(run.study, model),
+        *of_footprint(run.study, run.fit),
+    ]
+    left_out = LeftOut(stages, options)
+    _accept(run, groups, float(left_out.errors_um()[0]))
     progress('learning what the laws leave unexplained')
-    _learn(run, best, stages, options, errors_um)
+    _learn(run, best, left_out)
     return _conclude(run, best, p_value)
 
 
 def _nothing_missing(run: Run, nothing: Trial, p_value: float) -> Diagnosis:
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
     rmse_um, noise_um = run.history[0].rmse_um, run.study.noise_floor_um
-    stages, options = [Stage(nothing, [])], of_footprint(run.study, run.fit)
-    _learn(run, nothing, stages, options, nested_rmse_um(stages, options))
+    _learn(run, nothing, LeftOut([Stage(nothing, [])], of_footprint(run.study, run.fit)))
     if run.accepted:
         unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)
         reason = 'The footprint differs from the two Gaussians of eq. (1); it was learned.'
@@ -126,24 +132,17 @@ def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
         run.accepted.append(run.described(members, probability, before))
 
 
-def _learn(
-    run: Run,
-    best: Trial,
-    stages: Sequence[Stage],
-    options: Sequence[Explanation],
-    errors_um: np.ndarray,
-) -> None:
+def _learn(run: Run, best: Trial, left_out: LeftOut) -> None:
     """Add as few laws of any form as improve the prediction of readings left out.
 
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
-    without: set[str] = set()
-    beside = best.beside(run.fit)
-    footprint = best.remainder.of_footprint(best.best.sizes)
+    without: frozenset[str] = frozenset()
+    nulls = best.nulls(run.fit)
     while True:
-        left = [option for option in options if option.learns not in without]
-        laws = choose_laws(beside, footprint, left, run.freedom)
-        chosen = _predicting([(left[k], size) for k, size in laws], errors_um)
+        left = [option for option in left_out.options if option.learns not in without]
+        laws = [(left[k], size) for k, size in choose_laws(nulls, left, run.freedom)]
+        chosen = _predicting(laws, left_out, without)
         if not chosen:
             return
         fit = run.learned(chosen)
@@ -153,26 +152,26 @@ def _learn(
         )
         if fit.objective <= run.fit.objective and not any(is_worse(*part) for part in parts):
             break
-        without.add(chosen[0][0].learns)
-        errors_um = nested_rmse_um(stages, options, without)
+        without |= {chosen[0][0].learns}
     learned = [
         e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
     ]
-    before = run.history[-1]
-    run.record(' and '.join(learned), fit, float(errors_um[len(chosen)]))
+    before, error_um = run.history[-1], left_out.errors_um(without)[len(chosen)]
+    run.record(' and '.join(learned), fit, float(error_um))
     run.accepted += [run.described((law,), 1.0, before) for law in learned]
 
 
 def _predicting(
-    laws: list[tuple[Explanation, float]], errors_um: np.ndarray
+    laws: list[tuple[Explanation, float]], left_out: LeftOut, without: frozenset[str]
 ) -> list[tuple[Explanation, float]]:
     """The first of some laws, as far as readings left out bear them out.
 
-    A curve must predict them better. A footprint, which a bell has on any part, must not predict
-    them worse: of two parts each says little of the other.
+    A curve must predict whole parts better, and a map patches of its part. A footprint, which a
+    bell has on any part, must not predict parts worse: of two parts each says little of the other.
     """
     kept = 0
     for count, (law, _) in enumerate(laws, start=1):
+        errors_um = left_out.errors_um(without, law.learns)
         most = 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN)
         if errors_um[count] <= most * errors_um[kept]:
             kept = count

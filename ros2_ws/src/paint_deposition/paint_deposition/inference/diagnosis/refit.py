@@ -10,7 +10,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.diagnosis.evidence import NullModel, left_out
+from paint_deposition.inference.diagnosis.evidence import left_out
 from paint_deposition.inference.diagnosis.explanations import (
     ADDITION_UM,
     FACTOR,
@@ -18,8 +18,8 @@ from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     of_random,
 )
-from paint_deposition.inference.diagnosis.learning import by_size
-from paint_deposition.inference.diagnosis.model_space import SIZES, SURE
+from paint_deposition.inference.diagnosis.learning import Nulls, by_size
+from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
@@ -62,8 +62,9 @@ def refit(
     if run.trouble:
         return run.diagnosis(np.nan, 'fit_broken', run.trouble)
     search = Search(run)
-    run.left_over = search.nothing.space.figures
-    p_value = search.nothing.space.p_value(seed)
+    nothing = search.nothing
+    run.left_over, run.remainder = nothing.space.figures, nothing.best.null.remainder
+    p_value = nothing.space.p_value(seed)
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'
@@ -74,10 +75,11 @@ def refit(
         return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
     if law is not None:
         progress(f'learning {law.id}')
-        return _with_learned(run, law, p_value)
+        return _with_learned(run, law, nothing.nulls(run.fit), p_value)
     progress(f'fitting with {added.id}')
-    before, with_it = run.history[-1], search.with_effect(search.nothing, added.id)
-    probability = float(expit(with_it.log_weight - with_it.log_prior - search.nothing.log_weight))
+    before, with_it = run.history[-1], search.with_effect(nothing, added.id)
+    probability = inclusion_of([with_it.log_weight - with_it.log_prior], nothing.log_weight)
+    run.left_over, run.remainder = with_it.space.figures, with_it.best.null.remainder
     run.record(added.id, run.fitted_with([*with_it.effects.values()]))
     run.accepted.append(run.described((added.id,), probability, before))
     reason = (
@@ -89,14 +91,14 @@ def refit(
     return run.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
 
 
-def _with_learned(run: Run, law: type[LearnedLaw], p_value: float) -> Diagnosis:
-    """The model with a law over the covariate, whatever its evidence."""
-    options, null = _options(run, law), run.plain(run.fit)
-    weights = _log_bayes_factors(run, null, options)
+def _with_learned(run: Run, law: type[LearnedLaw], nulls: Nulls, p_value: float) -> Diagnosis:
+    """The model with a law over the covariate, whatever its evidence beside what may vary."""
+    options = _options(run, law)
+    weights = _log_bayes_factors(run, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before = run.history[-1]
     fit = run.learned([_best(options, weights)])
-    run.record(law.id, fit, _holdout_um(run, null, options))
+    run.record(law.id, fit, _holdout_um(run, nulls, options))
     run.accepted.append(run.described((law.id,), probability, before))
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
@@ -125,10 +127,9 @@ def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
     return found
 
 
-def _log_bayes_factors(run: Run, null: NullModel, options: Sequence[Explanation]) -> np.ndarray:
-    """(n, S) log Bayes factor of each law at each size against the null hypothesis."""
-    freedom = run.study.noise.degrees_of_freedom
-    return np.array([by_size(null, explanation, freedom) for explanation in options])
+def _log_bayes_factors(run: Run, nulls: Nulls, options: Sequence[Explanation]) -> np.ndarray:
+    """(n, S) log Bayes factor of each law at each size."""
+    return np.array([by_size(nulls.of(option), option, run.freedom) for option in options])
 
 
 def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanation, float]:
@@ -137,14 +138,14 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
     return options[int(number)], float(SIZES[size])
 
 
-def _holdout_um(run: Run, null: NullModel, options: Sequence[Explanation]) -> float:
+def _holdout_um(run: Run, nulls: Nulls, options: Sequence[Explanation]) -> float:
     """Error on points left out [um], the law's kind, length and size chosen without them."""
-    folds = run.study.folds()
+    folds, plain = run.study.folds(), run.plain(run.fit)
     deviation = np.empty(len(folds))
     for fold in np.unique(folds):
         out = folds == fold
         kept = [explanation.select(~out) for explanation in options]
-        weights = _log_bayes_factors(run, null.select(~out), kept)
+        weights = _log_bayes_factors(run, nulls.select(~out), kept)
         explanation, size = _best(options, weights)
-        deviation[out] = left_out(null, [size * explanation.columns], out)
+        deviation[out] = left_out(plain, [size * explanation.columns], out)
     return root_mean_square(deviation * run.study.sigma_um)

@@ -15,7 +15,9 @@ from scipy.special import softmax
 from paint_deposition.effects.base import Effect
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_errors, of_effects
+from paint_deposition.inference.diagnosis.learning import Nulls
 from paint_deposition.inference.diagnosis.model_space import (
+    COARSENED,
     CREDIBLE,
     PRIOR_EFFECT,
     SIZES,
@@ -36,9 +38,6 @@ MOST_EFFECTS, TRIALS = 4, 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each.
 LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
-# Differences of log evidence between rivals count as so many times smaller: laws are true to their
-# form no better than that, and each fit is linear around one of several patterns.
-COARSENED = 2.0
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
@@ -93,14 +92,17 @@ class Trial:
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
-    def beside(self, fit: Fit) -> NullModel:
-        """What a law that is learned must say more than: all but the footprint.
+    def nulls(self, fit: Fit) -> Nulls:
+        """What laws that are learned must say more than.
 
         Args:
             fit: of the model with the set.
         """
-        null = self.run.plain(fit).with_remainder(self.remainder.of_parts(self.best.sizes))
-        return null.beside(law_errors(self.run.study, fit, self.names, self.usual.model))
+        sizes, plain = self.best.sizes, self.run.plain(fit)
+        correction = plain.with_remainder(self.remainder.covariance(sizes))
+        off = law_errors(self.run.study, fit, self.names, self.usual.model)
+        footprint = plain.with_remainder(self.remainder.of_parts(sizes)).beside(off)
+        return Nulls(footprint, correction, correction.beside(off) if off.size else correction)
 
     @cached_property
     def log_weight(self) -> float:
@@ -284,15 +286,11 @@ class Search:
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
 
     def group(self, trial: Trial, name: str) -> Group:
-        """The effects that could stand in place of one, and how probable one of them is.
-
-        None could whose model is less probable than the one without any.
-        """
+        """The effects that could stand in place of one, and how probable one of them is."""
         others = self.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
         weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
         found = sorted(weights, key=lambda cause: -weights[cause])
-        found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
         return tuple(members), inclusion_of([*weights.values()], others.log_weight)

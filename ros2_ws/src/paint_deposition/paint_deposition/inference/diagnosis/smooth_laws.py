@@ -58,19 +58,18 @@ class Basis:
     shortest: float
     edges: bool = False
 
-    def random(self, size: float, length: float, centred: bool = False) -> 'RandomLaw':
+    def random(self, size: float, length: float) -> 'RandomLaw':
         """Random laws.
 
         Args:
             size: standard deviation of the values.
             length: of correlation.
-            centred: whether the law leaves the film as a whole as it is.
         """
         correlation = with_edges if self.edges else smooth
         root = size * root_of_field(
             self.knots, max(length, self.shortest), NEGLIGIBLE, correlation
         )
-        return RandomLaw(self, self.centred(root) if centred else root)
+        return RandomLaw(self, root)
 
     def centred(self, values: np.ndarray) -> np.ndarray:
         """(K, n) values less their mean over all film, so that its whole stays as it is."""
@@ -94,6 +93,11 @@ class RandomLaw:
     def change_um(self) -> np.ndarray:
         """(P, n) change of the film for each amplitude of one."""
         return self.basis.film_um @ self.at_knots
+
+    @property
+    def centred(self) -> 'RandomLaw':
+        """The same laws, each leaving the film as a whole as it is."""
+        return RandomLaw(self.basis, self.basis.centred(self.at_knots))
 
     def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
         """The same where another model says what arrives where."""

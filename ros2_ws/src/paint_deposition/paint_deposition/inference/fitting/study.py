@@ -262,12 +262,17 @@ class Study:
 
         Whole parts where there are several, else patches of the one part.
         """
-        parts = self.campaign.experiment_of
-        if self.has_several_parts:
-            return parts % FOLDS
-        places = self.campaign.positions_m
-        count = min(FOLDS, len(np.unique(places, axis=0)))
-        _, patch = kmeans2(places / places.std(), count, minit='++', rng=seed)
+        return (
+            self.campaign.experiment_of % FOLDS if self.has_several_parts else self.patches(seed)
+        )
+
+    def patches(self, seed: int = 0) -> np.ndarray:
+        """(P,) number of the patch of its part in which each point lies."""
+        patch, part = np.zeros(len(self), dtype=int), self.campaign.experiment_of
+        for k in range(len(self.campaign.experiments)):
+            places = self.campaign.positions_m[part == k]
+            count = min(FOLDS, len(np.unique(places, axis=0)))
+            patch[part == k] = kmeans2(places / places.std(), count, minit='++', rng=seed)[1]
         return patch
 
     def passes(self, model: DepositionModel) -> np.ndarray:
