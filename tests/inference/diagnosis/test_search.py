@@ -15,7 +15,9 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.inference.diagnosis.model_space import (
+    COARSENED,
     PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
     SURE,
     log_odds,
 )
