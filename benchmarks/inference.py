@@ -29,6 +29,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
 
@@ -101,9 +102,9 @@ def stages(campaign: Campaign, rounds: int) -> dict[str, Any]:
 
     for _ in range(rounds):
         run = timed('first fit', lambda: Run(campaign, MODEL, EFFECTS, 0, lambda line: None))
-        space = timed('sensitivities and explanations', lambda run=run: run.linearise())
-        timed('p-value', lambda space=space: space.p_value(0))
-        timed('evidence of all models', lambda space=space: space.models)
+        search = timed('evidence of what may be missing', lambda run=run: Search(run))
+        timed('p-value', lambda search=search: search.nothing.space.p_value(0))
+        timed('search of the missing effects', lambda search=search: search.stages())
         diagnosis = timed('the whole diagnosis', lambda: diagnose(campaign, MODEL, EFFECTS))
     print(f'\n{"stage, once":53}{"wall":>9}{"processor":>11}')
     for name, stage in table.items():

@@ -9,7 +9,8 @@ from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, hat_w
 from paint_deposition.kernel.laws import Ray
 
 # Harmonics of the angle: 1, cos, sin, cos 2, sin 2.
-WAVES = 5
+HARMONICS = np.array([0, 1, 1, 2, 2])
+WAVES = len(HARMONICS)
 TINY_M2 = 1e-20
 
 
