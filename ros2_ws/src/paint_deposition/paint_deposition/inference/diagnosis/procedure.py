@@ -92,7 +92,7 @@ def diagnose(
     _accept(run, groups, float(left_out.errors_um()[0]))
     progress('learning what the laws leave unexplained')
     _learn(run, best, left_out)
-    return _conclude(run, best, p_value)
+    return _conclude(run, best, _others(run, search.beside(best)), p_value)
 
 
 def _nothing_missing(run: Run, nothing: Trial, p_value: float) -> Diagnosis:
@@ -178,10 +178,9 @@ def _predicting(
     return laws[:kept]
 
 
-def _conclude(run: Run, best: Trial, p_value: float) -> Diagnosis:
+def _conclude(run: Run, best: Trial, others: tuple[EffectClass, ...], p_value: float) -> Diagnosis:
     """The verdict on what was found."""
     named = [c for c in run.accepted if not c.best.startswith('learned:')]
-    others = _others(run, best)
     if named:
         names = ', and '.join(_in_words(c) for c in named)
         return run.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
@@ -195,15 +194,14 @@ def _conclude(run: Run, best: Trial, p_value: float) -> Diagnosis:
     return run.diagnosis(p_value, 'undecided', reason, others)
 
 
-def _others(run: Run, best: Trial) -> tuple[EffectClass, ...]:
-    """Effects that may act beside those that were accepted."""
+def _others(run: Run, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:
+    """Effects that may act beside those that were accepted, as probable as this."""
     known = {member for found in run.accepted for member in found.members}
     if run.testable:
         known |= set(run.testable[0])
     found = []
-    for cause in best.space.alone:
-        probability = best.space.inclusion(cause)
-        if cause in known or cause == UNKNOWN or probability < WORTH_LISTING:
+    for cause, probability in probabilities.items():
+        if cause in known or probability < WORTH_LISTING:
             continue
         fit = run.fitted_with([*run.taken, run.candidates[cause][0]])
         found.append(run.described((cause,), probability, run.history[-1], fit))

@@ -20,6 +20,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     COARSENED,
     CREDIBLE,
     PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
     SIZES,
     SURE,
     ModelSpace,
@@ -269,6 +270,13 @@ class Search:
                 return again
         return here
 
+    def beside(self, trial: Trial) -> dict[str, float]:
+        """Effects that may act beside a set, with their probabilities if one at the most does."""
+        weights = {name: self.with_effect(trial, name).log_weight for name in trial.proposed}
+        shares = softmax(np.array([trial.log_weight, *weights.values()]) / COARSENED)[1:]
+        found = dict(zip(weights, (1.0 - PRIOR_UNKNOWN) * shares, strict=True))
+        return dict(sorted(found.items(), key=lambda item: -item[1]))
+
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
         """The set without effects that do not stand, and what could stand in place of each.
 
@@ -286,11 +294,15 @@ class Search:
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
 
     def group(self, trial: Trial, name: str) -> Group:
-        """The effects that could stand in place of one, and how probable one of them is."""
+        """The effects that could stand in place of one, and how probable one of them is.
+
+        None could whose model is less probable than the one without any.
+        """
         others = self.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
         weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
         found = sorted(weights, key=lambda cause: -weights[cause])
+        found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
         return tuple(members), inclusion_of([*weights.values()], others.log_weight)
