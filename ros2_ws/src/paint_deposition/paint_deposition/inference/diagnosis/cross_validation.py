@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import left_out
-from paint_deposition.inference.diagnosis.explanations import PLACE, Explanation
+from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
 from paint_deposition.inference.diagnosis.search import Stage, Trial
 from paint_deposition.inference.readings.residuals import root_mean_square
@@ -27,18 +27,19 @@ class LeftOut:
         self.stages, self.options = stages, options
         self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
 
-    def errors_um(self, without: frozenset[str] = frozenset(), law: str = '') -> np.ndarray:
+    def errors_um(
+        self, without: frozenset[str] = frozenset(), patches: bool = False
+    ) -> np.ndarray:
         """(n,) with effects and 0 to n - 1 laws, all found without what is left out [um].
 
         Args:
             without: covariates of laws that are not learned.
-            law: covariate of the law in question. Whole parts are left out where there are
-                several; but patches for a map, which says nothing of another part.
+            patches: leave out patches of parts, even where there are several parts.
         """
-        key = without, law == PLACE
+        key = without, patches
         if key not in self._known:
             study = self.stages[0].here.run.study
-            folds = study.patches() if law == PLACE else study.folds()
+            folds = study.patches() if patches else study.folds()
             self._known[key] = self._errors_um(folds, without)
         return self._known[key]
 

@@ -19,6 +19,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.cross_validation import LeftOut
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
+    PLACE,
     UNKNOWN,
     Explanation,
     of_any_form,
@@ -166,14 +167,16 @@ def _predicting(
 ) -> list[tuple[Explanation, float]]:
     """The first of some laws, as far as readings left out bear them out.
 
-    A curve must predict whole parts better, and a map patches of its part. A footprint, which a
-    bell has on any part, must not predict parts worse: of two parts each says little of the other.
+    A curve must predict whole parts better, and a map these or patches of its own part. A
+    footprint, which a bell has on any part, must not predict parts worse: of two parts each says
+    little of the other.
     """
     kept = 0
     for count, (law, _) in enumerate(laws, start=1):
-        errors_um = left_out.errors_um(without, law.learns)
         most = 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN)
-        if errors_um[count] <= most * errors_um[kept]:
+        ways = (False, True) if law.learns == PLACE else (False,)
+        found = (left_out.errors_um(without, patches) for patches in ways)
+        if any(errors_um[count] <= most * errors_um[kept] for errors_um in found):
             kept = count
     return laws[:kept]
 

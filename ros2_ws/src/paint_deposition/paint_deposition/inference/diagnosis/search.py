@@ -272,7 +272,11 @@ class Search:
 
     def beside(self, trial: Trial) -> dict[str, float]:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
-        weights = {name: self.with_effect(trial, name).log_weight for name in trial.proposed}
+        for name in trial.proposed:
+            self.with_effect(trial, name)
+        larger = [t for t in self._trials.values() if len(t.names - trial.names) == 1]
+        larger = [t for t in larger if t.names > trial.names]
+        weights = {name: t.log_weight for t in larger for name in t.names - trial.names}
         shares = softmax(np.array([trial.log_weight, *weights.values()]) / COARSENED)[1:]
         found = dict(zip(weights, (1.0 - PRIOR_UNKNOWN) * shares, strict=True))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
