@@ -143,6 +143,11 @@ class Run:
             nuisance = np.hstack([nuisance, free])
         return self.study.fit(self._free(start), nuisance=nuisance, remainder=remainder)
 
+    def fitted_from_many_starts(self, effects: Sequence[Effect]) -> Fit:
+        """The start model with these effects, its pattern searched as in the first fit."""
+        start = self.start.model_copy(update={'effects': (*self.start.effects, *effects)})
+        return self.study.fit(self._free(start), STARTS, self.seed, self.study.nuisance)
+
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""
         fit = self.fit

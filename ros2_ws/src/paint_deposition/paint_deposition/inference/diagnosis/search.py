@@ -253,10 +253,13 @@ class Search:
         best = max(tried, key=lambda one: one.log_weight_alone, default=nothing)
         if best.log_evidence_alone <= nothing.log_evidence_alone + MISLEADS:
             return nothing
-        usual, sizes = self._around(best.fit)
-        self._trials, self._tried = {}, set()
-        for start in (nothing, best):
-            self.nothing = self._refitted({}, replace(start, usual=usual, sizes=sizes))
+        others = self.run.fitted_from_many_starts([*best.effects.values()])
+        tried = [(best.fit, *self._around(best.fit)), (others, *self._around(others))]
+        anew = [replace(best, fit=f, usual=usual, sizes=sizes) for f, usual, sizes in tried]
+        best = max(anew, key=lambda one: one.log_evidence_alone)
+        self._trials, self._tried = {best.names: best}, set()
+        for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
+            self.nothing = self._refitted({}, start)
         return self.nothing
 
     def _in_another_pattern(self, stage: Stage) -> Trial:
