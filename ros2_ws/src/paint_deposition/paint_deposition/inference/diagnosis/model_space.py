@@ -30,7 +30,7 @@ PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
 SIZES = np.array([0.5, 1.0, 2.0])
 # An effect acts for certain from this posterior probability of its group on.
-SURE = 0.75
+SURE = 0.7
 # Differences of log weight between refitted models count as so many times smaller (a coarsened
 # posterior, Miller and Dunson 2019): laws are true to their form no better than that, and each
 # fit is linear around one of several patterns. No effect is surer than the library is complete.

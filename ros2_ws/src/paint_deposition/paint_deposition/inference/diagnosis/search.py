@@ -13,6 +13,7 @@ import numpy as np
 from scipy.special import softmax
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_errors, of_effects
 from paint_deposition.inference.diagnosis.learning import Nulls
@@ -189,6 +190,7 @@ class Search:
         self.run = run
         self._trials: dict[frozenset[str], Trial] = {}
         self._tried: set[frozenset[str]] = set()
+        self._patterns: tuple[DepositionModel, ...] = ()
         self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, *self._around(run.fit)))
         run.testable = testability(self.nothing.space.central, run.seed)
 
@@ -203,7 +205,9 @@ class Search:
         names = parent.names | {name}
         if names not in self._tried:
             self._tried.add(names)
-            self._refitted(parent.effects | {name: parent.space.by_law(name)}, parent)
+            effects = parent.effects | {name: parent.space.by_law(name)}
+            for pattern in (parent.fit.model, *self._patterns):
+                self._refitted(effects, parent, pattern)
         return self._trials[names]
 
     def without(self, trial: Trial, *names: str) -> Trial:
@@ -215,10 +219,12 @@ class Search:
         fewer = {n: e for n, e in trial.effects.items() if n not in names}
         return self._refitted(fewer, trial)
 
-    def _refitted(self, effects: dict[str, Effect], start: Trial) -> Trial:
-        """A set fitted from the pattern, and beside the remainder, of another one."""
-        remainder = start.best.null.remainder
-        fit = self.run.fitted_with([*effects.values()], model=start.fit.model, remainder=remainder)
+    def _refitted(
+        self, effects: dict[str, Effect], start: Trial, pattern: DepositionModel | None = None
+    ) -> Trial:
+        """A set fitted beside the remainder of another one, from its pattern or this one."""
+        remainder, model = start.best.null.remainder, pattern or start.fit.model
+        fit = self.run.fitted_with([*effects.values()], model=model, remainder=remainder)
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
         if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:
@@ -258,6 +264,7 @@ class Search:
         anew = [replace(best, fit=f, usual=usual, sizes=sizes) for f, usual, sizes in tried]
         best = max(anew, key=lambda one: one.log_evidence_alone)
         self._trials, self._tried = {best.names: best}, set()
+        self._patterns = (nothing.fit.model,)
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
             self.nothing = self._refitted({}, start)
         return self.nothing

@@ -287,7 +287,11 @@ def beside_pattern(
     moved = fit.vector + np.diag(steps)
     relative = np.stack([(log_flux(moved[k]) - here) / steps[k] for k in range(count)], axis=1)
     change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-    followed = np.linalg.lstsq(fit.jacobian[:, :count], change, rcond=None)[0]
+    # Within what is known of it before, else a pattern that few readings show goes anywhere.
+    prior = fit.parameters.prior.whitening[:count, :count]
+    slopes = np.vstack([fit.jacobian[:, :count], prior])
+    change = np.vstack([change, np.zeros((count, change.shape[1]))])
+    followed = np.linalg.lstsq(slopes, change, rcond=None)[0]
     return at_knots - relative @ followed, followed
 
 
