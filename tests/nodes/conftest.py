@@ -81,7 +81,7 @@ def painted(wait_until):
 
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:
         wait_until(lambda: node.film.counts.received >= count, what=f'{count} poses painted')
-        node.up_to_date()
-        return node.film.up_to_date().film_um
+        node.catch_up()
+        return node.film.snapshot().film_um
 
     return painted

@@ -93,7 +93,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     saved = call(events, SaveFilm, '/deposition_simulator/save_film', request)
     assert saved.success
     assert managed.activate() == (True, 'active')
-    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert np.array_equal(node.film.snapshot().film_um, film)
     assert np.array_equal(film, offline_um(node, MOTION))
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')
@@ -153,10 +153,10 @@ def test_what_it_reads_can_be_changed_while_it_is_not_configured(
     assert (node.mesh_file, node.gun_names) == (other, ['left', 'right'])
     refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
     assert told(max_edge_length_m=0.1).startswith(refused)
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
     managed.cleanup()
     assert told(max_edge_length_m=0.1) == ''
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
 
 
 class Faulty(ManagedNode):

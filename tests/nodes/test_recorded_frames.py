@@ -64,7 +64,7 @@ def test_it_is_simulated_without_being_told_where_the_part_stood(
     assert np.abs(offline - film).max() < 1e-6 * film.max()
     if HAS_TF:
         return
-    # Its replay says what to give the simulator.
+    # The player names the simulator's parameters to set.
     chosen = parameters(bag=str(run), start_paused=True)
     executor.add_node(BagPlayer(context=ros_context, parameter_overrides=chosen))
     said = capfd.readouterr().err
@@ -91,7 +91,7 @@ def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, o
     viewer = onlooker({})
     for kind in ('BYTE', 'BOOL', 'DOUBLE'):
         assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
-        assert node.frame.transform_from('base_link', 0) is not None
+        assert node.frame.lookup_transform('base_link', 0) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
         request = SetParameters.Request(
             parameters=[ParameterMessage(name='part_pose', value=value)]

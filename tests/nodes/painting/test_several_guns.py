@@ -116,7 +116,7 @@ def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait
     first.send(HIGH)
     painted(node, len(behind) + len(HIGH))
     wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the first gun')
-    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, HIGH))
+    assert np.array_equal(node.film.snapshot().film_um, offline_um(node, HIGH))
 
 
 def test_what_does_not_go_together_is_refused(simulator, tmp_path):

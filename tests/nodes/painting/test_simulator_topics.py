@@ -165,7 +165,7 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     wait_until(lambda: viewer.tells(POSES, 'no transform between them', b'\x02'))
     assert "they are in frame 'base_link'" in viewer.status(POSES).message
     assert 'set part_pose and part_parent_frame' in viewer.status(POSES).message
-    assert node.film.up_to_date().film_um.max() == 0.0
+    assert node.film.snapshot().film_um.max() == 0.0
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_rejected == len(MOTION)))
     # Refused they were, but none is any more.
     counted = f'{len(MOTION)} poses refused for their frame'

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
-from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -17,7 +17,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 def _pose(values: list[float]) -> list[float]:
     if not is_pose(values):
-        raise ValueError(f'{values} is no pose; give {POSE_WORDS}')
+        raise ValueError(f'{values} is no pose; give {POSE_FORMAT}')
     return values
 
 
@@ -50,7 +50,7 @@ class MotionSource(BaseModel, extra='forbid'):
     )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
-        None, description=f'the pose of the part in the frame of the poses, {POSE_WORDS}'
+        None, description=f'the pose of the part in the frame of the poses, {POSE_FORMAT}'
     )
 
     def refuse_other(self, path: Path, kind: str) -> None:

@@ -66,7 +66,7 @@ class Robot:
         return Robot(path, base, tip, [parents.edges[pair]['joint'] for pair in way][::-1])
 
     @property
-    def moving(self) -> list[str]:
+    def moving_joints(self) -> list[str]:
         """Names of the joints that move."""
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
 
@@ -105,7 +105,7 @@ def read_joint_poses(
             raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
         topic_name = topics[0].name
     topic = bag.choose(topic_name, (JOINT_TYPE,), 'JointState')
-    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving}
+    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving_joints}
     seen: set[str] = set()
     for _, log_time_ns, message in bag.decoded([topic.name]):
         stamp = stamp_ns(message.header)
@@ -132,7 +132,7 @@ def read_joint_poses(
     positions, quaternions = robot.poses(np.stack(values, axis=1))
     note = (
         f"joints: pose of '{robot.tip}' in '{robot.base}' by {robot.path.name}, from "
-        f'{" ".join(robot.moving)} on {topic.name}, {len(stamps)} poses'
+        f'{" ".join(robot.moving_joints)} on {topic.name}, {len(stamps)} poses'
     )
     trajectory = Trajectory(stamps, positions, quaternions, robot.base, notes=(note,))
     return trajectory, log_times[known]
