@@ -134,7 +134,7 @@ class ReplayedTransforms:
 
 def _part_pose_hint(bag: Bag) -> str:
     """The parameters of the simulator that replace the transforms, for a warning."""
-    for parent, child, place in StaticFrames.in_bag(bag).places:
+    for parent, child, place in StaticFrames.from_bag(bag).places:
         if child == 'part':
             values = ', '.join(f'{value:.9g}' for value in place.values)
             return (

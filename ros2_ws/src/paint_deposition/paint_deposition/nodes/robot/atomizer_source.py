@@ -15,7 +15,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import USUAL_TIP, Robot
+from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
@@ -110,7 +110,7 @@ class AtomizerSource(PaintNode):
         if alone:
             raise PaintError(f'{alone[0]} is given without a trigger: name the signal of the gun')
         for name in SIGNALS:
-            if values[name] and Signal.of(values[name]) is None:
+            if values[name] and Signal.parse(values[name]) is None:
                 raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
 
     def _load_files(self) -> None:
@@ -121,7 +121,7 @@ class AtomizerSource(PaintNode):
                 Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
             )
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        named = {name: Signal.of(values[name]) for name in SIGNALS}
+        named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
@@ -129,7 +129,7 @@ class AtomizerSource(PaintNode):
     def _create_motion(self) -> JointPoses | TfPoses:
         values = self.values
         if self._robot is None:
-            tip = values['tip_link'] or USUAL_TIP
+            tip = values['tip_link'] or DEFAULT_TIP
             return TfPoses(self, values['base_link'], tip, self._publish_pose)
         joints = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
         self._missing[values['joint_topic']] = joints.take
