@@ -35,7 +35,7 @@ def robot(ros_context, spin, wait_until):
     def robot(*nodes) -> Robot:
         robot = Robot(ros_context)
         spin(robot)
-        wait_until(lambda: robot.is_heard_by(*nodes), what='discovery of the simulator')
+        wait_until(lambda: robot.is_subscribed_by(*nodes), what='discovery of the simulator')
         return robot
 
     return robot

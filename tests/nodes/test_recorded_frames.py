@@ -43,7 +43,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     wait_until(lambda: '/part_pose' in recorder.run.counts, what='the pose of the part recorded')
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
-    wait_until(lambda: source.has_listeners(2))
+    wait_until(lambda: source.has_subscribers(2))
     source.send(in_the_cell(), frame_id='base_link')
     film = painted(node, len(MOTION))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='all recorded')
@@ -51,7 +51,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     return recorder.run.folder, film
 
 
-def test_it_is_simulated_without_being_told_where_the_part_stood(
+def test_it_is_simulated_with_the_recorded_pose_of_the_part(
     recorded, simulator, ros_context, executor, capfd
 ):
     run, film = recorded

@@ -98,7 +98,7 @@ def test_another_link_and_another_base(arm, tmp_path):
         ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
 )
-def test_what_is_missing_is_said(given, words, arm, tmp_path):
+def test_missing_links_and_joints_are_named(given, words, arm, tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of()[:3])
     given = {key: str(arm) if value == 'ARM' else value for key, value in given.items()}
     with pytest.raises(RecordingError) as refused:

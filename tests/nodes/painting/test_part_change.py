@@ -198,7 +198,7 @@ def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
     assert width_m() == pytest.approx(PANEL_M)
 
 
-def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change,
+def test_a_further_coat_lies_on_the_first(simulator, robot, painted, change,
                                                       tmp_path):  # fmt: skip
     node = simulator()
     source = robot(node)

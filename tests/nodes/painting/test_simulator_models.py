@@ -93,7 +93,7 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     assert 'own.py: Own has a flux_factor that does not compile' in problem
     assert '\n' not in problem
     assert np.array_equal(node.film.snapshot().film_um, painted_anew)
-    wait_until(lambda: viewer.tells('deposition_simulator: film', problem), what='diagnostics')
+    wait_until(lambda: viewer.reports('deposition_simulator: film', problem), what='diagnostics')
     # Painting again, for another reason, is done with the model that is in use.
     node.set_parameters(parameters(max_pose_gap_s=0.3))
     wait_until(lambda: not node.repainting, what='repainting')

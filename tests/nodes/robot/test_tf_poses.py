@@ -55,7 +55,7 @@ class Broadcaster(Node):
             transforms.append(transform)
         self._publishers_of[static].publish(self._kind(transforms=transforms))
 
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         return all(each.get_subscription_count() for each in self._publishers_of.values())
 
 
@@ -71,7 +71,7 @@ def broadcaster(ros_context, spin, viewer, wait_until):
     )
     sender = Broadcaster(ros_context)
     spin(node, sender)
-    wait_until(sender.is_heard, what='discovery')
+    wait_until(sender.has_subscribers, what='discovery')
     wait_until(lambda: viewer.count_publishers('atomizer/pose'))
     return sender
 
