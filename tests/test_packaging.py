@@ -127,7 +127,7 @@ def wanted(**given: str) -> dict[str, dict]:
     for entity in module.generate_launch_description().entities:
         if isinstance(entity, DeclareLaunchArgument):
             entity.execute(context)
-    return module.wanted(context.launch_configurations)
+    return module.node_parameters(context.launch_configurations)
 
 
 def launched(*arguments: str) -> subprocess.CompletedProcess:

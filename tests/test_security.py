@@ -15,7 +15,8 @@ from nodes.cell import parameters
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.recording.run_recorder import RunRecorder, default_topics
+from paint_deposition.nodes.recording.recorder_parameters import default_topics
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode

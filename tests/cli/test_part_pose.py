@@ -101,7 +101,7 @@ def test_a_static_transform_of_the_recording_is_used_and_said(storage, tmp_path)
     assert note.startswith("static transforms: poses brought from 'base_link' to 'door', ")
     assert 'stands at 2.1 -0.4 0.9 ' in note
     (warning,) = pd.read_recording(path).warnings
-    assert 'it stands still to door, table' in warning
+    assert 'static transforms connect it to door, table' in warning
 
 
 def placed_bag(path, topic: str, *places: tuple[int, list[float]]):

@@ -77,9 +77,9 @@ def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
     motion = replace(weaving(TIMES_S), **CHANGES)
     film, expected = LiveFilm(lying_plane(), model), painted(lying_plane(), motion, model)
     for event in events(motion, batch):
-        film.follow([event])
-    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
-    assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
+        film.replay([event])
+    assert np.array_equal(film.snapshot().film_um, expected.film_um)
+    assert film.snapshot().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
     assert (film.flow, film.brush) == (1.2, 1)
 
 

@@ -64,24 +64,24 @@ def test_set_points_paint_as_a_brush_that_is_interpolated_at_them():
 def test_the_live_film_between_brushes_is_the_offline_film_to_the_last_bit():
     film = LiveFilm(lying_plane(), MODEL)
     for event in events(CHANGING, 10):
-        film.follow([event])
-    assert np.array_equal(film.up_to_date().film_um, offline_um(CHANGING))
+        film.replay([event])
+    assert np.array_equal(film.snapshot().film_um, offline_um(CHANGING))
 
 
 def test_a_film_that_another_model_goes_on_with_keeps_the_set_points():
     """As after a new model file: the motion so far is another model's, the rest the new one's."""
     film = LiveFilm(lying_plane(), MODEL)
-    film.follow(events(motion((1.0, 0, MIDDLE)), 10))
+    film.replay(events(motion((1.0, 0, MIDDLE)), 10))
     wider = MODEL.with_patterns(
         p.model_copy(update={'K1_cm3_per_s': 2.0 * p.K1_cm3_per_s}) for p in MODEL.patterns
     )
-    before = film.up_to_date().film_um
-    film.use(wider)
+    before = film.snapshot().film_um
+    film.switch_model(wider)
     later = weaving(TIMES_S + 4.0)
     film.add_poses(PoseBatch(later.stamps_ns, later.positions_m, later.quaternions_xyzw))
     assert film.brush >= BETWEEN
     assert film.model.brushes[-1].planar.K1_cm3_per_s > 1.9 * MODEL.planar.K1_cm3_per_s
-    assert film.up_to_date().film_um.sum() > 2.5 * before.sum()
+    assert film.snapshot().film_um.sum() > 2.5 * before.sum()
 
 
 @pytest.mark.parametrize(('told', 'number'), [((0, AT_FIRST), 1), ((2, OUTSIDE), 2)])

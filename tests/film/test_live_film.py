@@ -38,7 +38,7 @@ TRIGGERS = {
 
 def followed(coming, model=MODEL, **options):
     film = LiveFilm(lying_plane(), model, **options)
-    film.follow(coming)
+    film.replay(coming)
     return film
 
 
@@ -52,11 +52,11 @@ def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
     expected = painted(lying_plane(), motion, model)
     film = LiveFilm(lying_plane(), model)
     for event in events(motion, batch):
-        film.follow([event])
+        film.replay([event])
         if batch > 1:
-            film.up_to_date()  # looking at the film changes nothing
-    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
-    assert film.up_to_date().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
+            film.snapshot()  # looking at the film changes nothing
+    assert np.array_equal(film.snapshot().film_um, expected.film_um)
+    assert film.snapshot().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
     assert expected.film_um.max() > 1.0
 
 
@@ -67,7 +67,7 @@ def test_a_state_that_comes_a_little_late_cuts_where_it_belongs(batch, delay_s):
     # A batch of 25 poses is 0.1 s long and comes at its end.
     latency_s = 0.1 + (0.1 if batch == 25 else 0.0)
     film = followed(events(motion, batch, delay_s), trigger_latency_s=latency_s)
-    assert np.array_equal(film.up_to_date().film_um, painted(lying_plane(), motion).film_um)
+    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     assert film.counts.late_triggers == 0
 
 
@@ -77,7 +77,7 @@ def test_a_state_that_comes_too_late_is_counted_and_counts_from_there_on():
     film = followed(events(motion, 1, delay_s=0.15))
     assert film.counts.late_triggers >= 2
     # Each change acts 0.05 s late, at 0.3 m/s on a film of some ten um/s.
-    difference = np.abs(film.up_to_date().film_um - painted(lying_plane(), motion).film_um).max()
+    difference = np.abs(film.snapshot().film_um - painted(lying_plane(), motion).film_um).max()
     assert 0.05 < difference < 2.0
 
 
@@ -87,11 +87,11 @@ def test_the_first_state_takes_back_what_was_painted_before_it():
     film = LiveFilm(lying_plane(), MODEL)
     film.add_poses(poses(motion, slice(0, 300)))
     assert film.flow is None
-    assert film.up_to_date().film_um.max() > 1.0
+    assert film.snapshot().film_um.max() > 1.0
     film.add_trigger(first)
     assert film.flow == 1.0
-    film.follow([*rest, poses(motion, slice(300, None))])
-    assert np.array_equal(film.up_to_date().film_um, painted(lying_plane(), motion).film_um)
+    film.replay([*rest, poses(motion, slice(300, None))])
+    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     assert film.counts.late_triggers == 0
 
 
@@ -114,13 +114,13 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     film = LiveFilm(lying_plane(), MODEL)
     coming = events(motion, 10)
     half = len(coming) // 2
-    film.follow(coming[:half])
+    film.replay(coming[:half])
     assert film.flow == 0.0
     film.reset()
-    assert film.up_to_date().film_um.max() == 0.0
+    assert film.snapshot().film_um.max() == 0.0
     assert film.counts.received == 0
     assert film.flow == 0.0
-    film.follow(coming[half:])
+    film.replay(coming[half:])
     # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
     rest = PoseBatch.joined([event for event in coming[half:] if isinstance(event, PoseBatch)])
     second = Trajectory(
@@ -131,7 +131,7 @@ def test_after_a_reset_the_gun_stays_as_it_was():
         trigger_flow=np.array([0.8]),
     )
     assert np.allclose(
-        film.up_to_date().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
+        film.snapshot().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
     )
 
 
@@ -139,9 +139,9 @@ def test_a_motion_that_begins_again_paints_a_second_coat():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = LiveFilm(lying_plane(), MODEL)
     for _ in range(2):
-        film.follow(events(motion, 10))
+        film.replay(events(motion, 10))
     once = painted(lying_plane(), motion).film_um
-    assert np.allclose(film.up_to_date().film_um, 2 * once, rtol=0, atol=1e-5 * once.max())
+    assert np.allclose(film.snapshot().film_um, 2 * once, rtol=0, atol=1e-5 * once.max())
     assert film.counts.restarts == 1
     assert film.counts.late_triggers == 0
 
@@ -150,9 +150,9 @@ def test_the_log_paints_the_motion_again_with_another_model():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = followed(events(motion, 10, delay_s=0.05))
     again = LiveFilm(lying_plane(), LAGGING)
-    again.follow(film.log.events())
+    again.replay(film.log.events())
     assert np.array_equal(
-        again.up_to_date().film_um, painted(lying_plane(), motion, LAGGING).film_um
+        again.snapshot().film_um, painted(lying_plane(), motion, LAGGING).film_um
     )
     assert again.counts == film.counts
 
@@ -164,25 +164,25 @@ def test_another_model_from_here_on_leaves_the_film_so_far():
     )
     film = LiveFilm(lying_plane(), MODEL, trigger_latency_s=0.0)
     film.add_poses(poses(motion, slice(0, 501)))
-    before = film.up_to_date().film_um
-    film.use(doubled)
-    assert np.allclose(film.up_to_date().film_um, before, rtol=0, atol=1e-6)
+    before = film.snapshot().film_um
+    film.switch_model(doubled)
+    assert np.allclose(film.snapshot().film_um, before, rtol=0, atol=1e-6)
     film.add_poses(poses(motion, slice(501, None)))
     whole = painted(lying_plane(), motion).film_um
     assert np.allclose(
-        film.up_to_date().film_um, before + 2 * (whole - before), rtol=0, atol=1e-4 * whole.max()
+        film.snapshot().film_um, before + 2 * (whole - before), rtol=0, atol=1e-4 * whole.max()
     )
 
 
 def test_memory_is_bounded_and_says_so():
     motion = straight_pass(TIMES_S)
-    film = followed(events(motion, 100), limit_poses=500)
+    film = followed(events(motion, 100), pose_memory=500)
     assert not film.log.complete
     assert list(film.log.events()) == []
-    assert np.array_equal(film.up_to_date().film_um, painted(lying_plane(), motion).film_um)
+    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), motion).film_um)
     # Too late to be taken back: the gun is off from the first state on, not before.
     film.add_trigger(TriggerChange(START_NS + 10_000_000_000, 1.0))
-    assert film.up_to_date().film_um.max() > 1.0
+    assert film.snapshot().film_um.max() > 1.0
 
 
 def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
@@ -190,8 +190,8 @@ def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
     model = two_brushes()
     before = followed([TriggerChange(START_NS, 1.0, 2)], model)
     other_part = LiveFilm(lying_plane(), model)
-    other_part.carry_on(before)
+    other_part.start_bare_after(before)
     with pytest.raises(ModelError, match='brush 2 is not in the model'):
-        other_part.use(model.with_brush(1))
+        other_part.switch_model(model.with_brush(1))
     other_part.add_poses(poses(straight_pass(TIMES_S), slice(0, 500)))
     assert (other_part.brush, other_part.flow) == (2, 1.0)

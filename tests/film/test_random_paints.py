@@ -104,4 +104,4 @@ def test_the_live_film_is_the_offline_film_to_the_last_bit(motion, model, sizes)
         start, turn = rows.stop, turn + 1
     for stamp, flow in states:
         film.add_trigger(TriggerChange(stamp, float(flow)))
-    assert np.array_equal(film.up_to_date().film_um, expected.film_um)
+    assert np.array_equal(film.snapshot().film_um, expected.film_um)

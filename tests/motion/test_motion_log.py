@@ -51,7 +51,7 @@ def test_who_has_followed_a_part_gets_the_rest():
 
 
 def test_a_full_log_closes_and_forgets():
-    log = _log(*(_poses(first, 5) for first in range(0, 20, 5)), limit_poses=10)
+    log = _log(*(_poses(first, 5) for first in range(0, 20, 5)), pose_memory=10)
     log.add(TriggerChange(0, 1.0))
     assert not log.complete
     assert list(log.events()) == []

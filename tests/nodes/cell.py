@@ -120,15 +120,15 @@ class Robot(Node):
         self.pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self.state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
 
-    def is_heard_by(self, *nodes: Node) -> bool:
+    def is_subscribed_by(self, *nodes: Node) -> bool:
         """Both sides know of each other: what is sent from now on arrives."""
         topics = [
             publisher.topic_name for publisher in (self.pose_publisher, self.state_publisher)
         ]
         inputs = [s for node in nodes for s in node.subscriptions if s.topic_name in topics]
-        return all(s.get_publisher_count() for s in inputs) and self.has_listeners(len(nodes))
+        return all(s.get_publisher_count() for s in inputs) and self.has_subscribers(len(nodes))
 
-    def has_listeners(self, count: int) -> bool:
+    def has_subscribers(self, count: int) -> bool:
         """Whether so many listen to the poses and to the states."""
         return all(
             publisher.get_subscription_count() >= count
@@ -201,7 +201,7 @@ class Onlooker(Node):
                     return status
         return None
 
-    def tells(self, name: str, text: str, level: bytes | None = None) -> bool:
+    def reports(self, name: str, text: str, level: bytes | None = None) -> bool:
         """Whether the last status of a task says that, at this level if one is given."""
         status = self.status(name)
         return status is not None and text in status.message and level in (None, status.level)

@@ -35,7 +35,7 @@ def robot(ros_context, spin, wait_until):
     def robot(*nodes) -> Robot:
         robot = Robot(ros_context)
         spin(robot)
-        wait_until(lambda: robot.is_heard_by(*nodes), what='discovery of the simulator')
+        wait_until(lambda: robot.is_subscribed_by(*nodes), what='discovery of the simulator')
         return robot
 
     return robot
@@ -81,7 +81,7 @@ def painted(wait_until):
 
     def painted(node, count: int = TWO_PASSES_POSES) -> np.ndarray:
         wait_until(lambda: node.film.counts.received >= count, what=f'{count} poses painted')
-        node.up_to_date()
-        return node.film.up_to_date().film_um
+        node.catch_up()
+        return node.film.snapshot().film_um
 
     return painted

@@ -93,7 +93,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     saved = call(events, SaveFilm, '/deposition_simulator/save_film', request)
     assert saved.success
     assert managed.activate() == (True, 'active')
-    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert np.array_equal(node.film.snapshot().film_um, film)
     assert np.array_equal(film, offline_um(node, MOTION))
     assert managed.deactivate() == (True, 'inactive')
     assert managed.cleanup() == (True, 'unconfigured')
@@ -106,7 +106,7 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     assert states[-2:] == ['shuttingdown', 'finalized']
 
 
-def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
+def test_poses_received_while_inactive_are_counted_and_not_painted(
     simulator, robot, manager, painted, viewer, wait_until
 ):
     node = simulator(autostart=False)
@@ -116,7 +116,7 @@ def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
     source.send(MOTION, slice(0, 300))
 
     told = '300 poses came and were not painted'
-    wait_until(lambda: viewer.tells(POSES, told, b'\x01'))
+    wait_until(lambda: viewer.reports(POSES, told, b'\x01'))
     managed.activate()
     source.send(MOTION, slice(300, 600))
     film = painted(node, 300)
@@ -128,7 +128,7 @@ def test_poses_that_come_while_it_is_inactive_are_not_painted_and_told(
         quaternions_xyzw=MOTION.quaternions_xyzw[300:],
     )
     assert np.array_equal(film, offline_um(node, second_pass))
-    wait_until(lambda: viewer.tells(POSES, 'painting', b'\x00'))
+    wait_until(lambda: viewer.reports(POSES, 'painting', b'\x00'))
     assert viewer.value(POSES, 'poses not painted while inactive') == '300'
 
 
@@ -145,18 +145,18 @@ def test_what_it_reads_can_be_changed_while_it_is_not_configured(
     def told(**values) -> str:
         return node.set_parameters_atomically(parameters(**values)).reason
 
-    wait_until(lambda: viewer.tells(STATE, 'late.stl', b'\x02'))
+    wait_until(lambda: viewer.reports(STATE, 'late.stl', b'\x02'))
     assert told(mesh_file=other, max_edge_length_m=0.2, atomizers=['left', 'right']) == ''
     assert 'not all zero' in told(down=[0.0, 0.0, 0.0])
     assert managed.configure() == (True, 'inactive')
-    wait_until(lambda: viewer.tells(STATE, 'inactive', b'\x00'))
+    wait_until(lambda: viewer.reports(STATE, 'inactive', b'\x00'))
     assert (node.mesh_file, node.gun_names) == (other, ['left', 'right'])
     refused = 'max_edge_length_m cannot change while the node is configured: the film so far lies'
     assert told(max_edge_length_m=0.1).startswith(refused)
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
     managed.cleanup()
     assert told(max_edge_length_m=0.1) == ''
-    assert 'while the node runs: the network does not choose' in told(output_directory='/tmp')
+    assert 'while the node runs: remote nodes must not choose' in told(output_directory='/tmp')
 
 
 class Faulty(ManagedNode):
@@ -169,7 +169,7 @@ class Faulty(ManagedNode):
         raise ZeroDivisionError('by nothing')
 
 
-def test_an_error_that_nobody_foresaw_leads_back_to_the_beginning(ros_context, spin, manager,
+def test_an_unexpected_error_leads_to_unconfigured(ros_context, spin, manager,
                                                                   viewer, wait_until):  # fmt: skip
     node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
     spin(node)
@@ -178,7 +178,7 @@ def test_an_error_that_nobody_foresaw_leads_back_to_the_beginning(ros_context, s
     assert managed.configure() == (True, 'inactive')
     assert managed.activate() == (False, 'unconfigured')
     assert len(list(node.publishers)) == publishers
-    wait_until(lambda: viewer.tells('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
+    wait_until(lambda: viewer.reports('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
     with pytest.raises(ZeroDivisionError):
         Faulty('faulty', context=ros_context)
 

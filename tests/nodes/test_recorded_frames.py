@@ -43,7 +43,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     wait_until(lambda: '/part_pose' in recorder.run.counts, what='the pose of the part recorded')
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
-    wait_until(lambda: source.has_listeners(2))
+    wait_until(lambda: source.has_subscribers(2))
     source.send(in_the_cell(), frame_id='base_link')
     film = painted(node, len(MOTION))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='all recorded')
@@ -51,7 +51,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     return recorder.run.folder, film
 
 
-def test_it_is_simulated_without_being_told_where_the_part_stood(
+def test_it_is_simulated_with_the_recorded_pose_of_the_part(
     recorded, simulator, ros_context, executor, capfd
 ):
     run, film = recorded
@@ -64,7 +64,7 @@ def test_it_is_simulated_without_being_told_where_the_part_stood(
     assert np.abs(offline - film).max() < 1e-6 * film.max()
     if HAS_TF:
         return
-    # Its replay says what to give the simulator.
+    # The player names the simulator's parameters to set.
     chosen = parameters(bag=str(run), start_paused=True)
     executor.add_node(BagPlayer(context=ros_context, parameter_overrides=chosen))
     said = capfd.readouterr().err
@@ -91,7 +91,7 @@ def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, o
     viewer = onlooker({})
     for kind in ('BYTE', 'BOOL', 'DOUBLE'):
         assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
-        assert node.frame.transform_from('base_link', 0) is not None
+        assert node.frame.lookup_transform('base_link', 0) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
         request = SetParameters.Request(
             parameters=[ParameterMessage(name='part_pose', value=value)]

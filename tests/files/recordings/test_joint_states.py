@@ -43,7 +43,7 @@ def test_any_joints_agree_with_the_product_of_exponentials(arm):
     joints = np.random.default_rng(8).uniform(-3.5, 3.5, (40, 6))  # beyond their limits, too
     joints[0] = 0.0
     robot = Robot.read(arm)
-    assert (robot.base, robot.tip, robot.moving) == ('base_link', 'tool0', list(JOINTS))
+    assert (robot.base, robot.tip, robot.moving_joints) == ('base_link', 'tool0', list(JOINTS))
     positions, quaternions = robot.poses(joints)
     assert np.allclose(positions[0], TIP_M, atol=1e-9)
     expected, turned = tip_poses(joints)
@@ -98,7 +98,7 @@ def test_another_link_and_another_base(arm, tmp_path):
         ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
 )
-def test_what_is_missing_is_said(given, words, arm, tmp_path):
+def test_missing_links_and_joints_are_named(given, words, arm, tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of()[:3])
     given = {key: str(arm) if value == 'ARM' else value for key, value in given.items()}
     with pytest.raises(RecordingError) as refused:

@@ -47,7 +47,7 @@ def test_the_film_is_that_of_the_offline_run(simulator, robot, painted):
     assert np.array_equal(film, offline_um(node, MOTION))
 
 
-def test_the_gun_tells_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
+def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
     """A plate of 12 mm that is painted on +x: booth air to the gun's right blows to +y."""
     aside_m = 0.06
     model = DepositionModel().with_effect(AirDrift(shift_across_m=aside_m))

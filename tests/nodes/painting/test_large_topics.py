@@ -13,7 +13,7 @@ from paint_msgs.msg import ThicknessField
 
 from nodes.cell import two_passes
 from nodes.processes import NodeProcess
-from paint_deposition.nodes.painting.film_display import PATIENCE_S
+from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
 from paint_deposition.nodes.runtime import topics
 
 MOTION = two_passes()
@@ -42,7 +42,7 @@ def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooke
             painted(node, row + 30)
             node.publish()
         # Of 20 editions one may be on its way, and one for each time that patience ends.
-        patience = (time.monotonic() - began_s) / PATIENCE_S
+        patience = (time.monotonic() - began_s) / ACKNOWLEDGE_TIMEOUT_S
         assert len(other.heard['thickness/field']) <= before + 2 + patience
         listener.go_on()
         film = painted(node).astype(np.float32)

@@ -106,7 +106,7 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
     figures = json.loads((folder / 'film.json').read_text())
     assert figures['part'].items() >= {'serial': '4711', 'type': 'door', 'coat': 1}.items()
     assert figures['poses']['received'] == len(MOTION)
-    assert node.film.up_to_date().film_um.max() == 0.0
+    assert node.film.snapshot().film_um.max() == 0.0
     assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
     source.send(later(MOTION))
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
@@ -198,14 +198,14 @@ def test_meshes_that_were_read_are_there_at_once_in_the_shape_they_have(
     assert width_m() == pytest.approx(PANEL_M)
 
 
-def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted, change,
+def test_a_further_coat_lies_on_the_first(simulator, robot, painted, change,
                                                       tmp_path):  # fmt: skip
     node = simulator()
     source = robot(node)
     assert change(serial='A-1').success
     source.send(MOTION)
     once = painted(node, len(MOTION))
-    assert "serial 'A-1' is the part in the cell: say coat: true" in change(serial='A-1').message
+    assert "serial 'A-1' is the part in the cell: set coat: true" in change(serial='A-1').message
     other = change(serial='A-2', coat=True)
     assert "coat: the part in the cell is 'A-1' of " in other.message
     coat = change(serial='A-1', coat=True)
@@ -220,7 +220,7 @@ def test_a_further_coat_is_said_and_lies_on_the_first(simulator, robot, painted,
     assert figures[1]['mean_um'] == pytest.approx(2.0 * figures[0]['mean_um'], rel=0.1)
     done_before = change(serial='A-1')
     assert not done_before.success
-    assert 'A-1 is there already: a part has one run for each coat' in done_before.message
+    assert 'A-1 already exists: a part has one run for each coat' in done_before.message
 
 
 def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted, change,
@@ -234,12 +234,12 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
         ({'serial': '..'}, "serial '..': use letters"),
         ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
         ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
-        ({'prepare': True}, 'prepare without a mesh_file'),
+        ({'prepare': True}, 'prepare needs a mesh_file'),
     ):
         answer = change(**fields)
         assert not answer.success
         assert message in answer.message
-    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert np.array_equal(node.film.snapshot().film_um, film)
     assert not (tmp_path / 'films').exists()
 
 

@@ -47,7 +47,7 @@ def guns(ros_context, spin, wait_until):
     def guns(node) -> list[Robot]:
         robots = [Robot(ros_context, namespace=name) for name in GUNS]
         spin(*robots)
-        wait_until(lambda: all(r.is_heard_by(node) for r in robots), what='discovery')
+        wait_until(lambda: all(r.is_subscribed_by(node) for r in robots), what='discovery')
         return robots
 
     return guns
@@ -73,7 +73,7 @@ def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, pa
     assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
 
 
-def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until):
+def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
     fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
     viewer = onlooker({'thickness/stats': (ThicknessStats, topics.LATCHED)} | fields)
@@ -105,7 +105,7 @@ def test_each_guns_share_is_told(simulator, guns, painted, onlooker, wait_until)
     wait_until(lambda: viewer.value(task, 'poses taken') == str(len(LOW)), what='its poses')
 
 
-def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait_until):
+def test_the_first_gun_decides_which_side_is_outward(simulator, guns, painted, wait_until):
     """Two guns on the two sides of a sheet; the one behind it comes first."""
     node = simulator(atomizers=GUNS)
     first, second = guns(node)
@@ -116,7 +116,7 @@ def test_the_first_gun_says_which_side_is_outward(simulator, guns, painted, wait
     first.send(HIGH)
     painted(node, len(behind) + len(HIGH))
     wait_until(lambda: node.surface.outward[1] < 0.0, what='the part turned to the first gun')
-    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, HIGH))
+    assert np.array_equal(node.film.snapshot().film_um, offline_um(node, HIGH))
 
 
 def test_what_does_not_go_together_is_refused(simulator, tmp_path):

@@ -65,14 +65,14 @@ def test_a_brush_that_is_not_in_the_model_is_refused_and_those_it_has_are_named(
     )
     assert np.array_equal(film, offline_um(node, replace(MOTION, **taken), MODEL))
     refusal = 'brush 4 is not in the model; its brushes: 1, 2'
-    assert node.inputs[0].refusals_of_states == {refusal}
-    wait_until(lambda: viewer.tells(POSES, refusal, b'\x01'), what='the refusal')
+    assert node.inputs[0].state_errors == {refusal}
+    wait_until(lambda: viewer.reports(POSES, refusal, b'\x01'), what='the refusal')
     other = DepositionModel.of_brushes([Brush(number=1, planar=MODEL.planar)])
     write_model(tmp_path / 'other.yaml', other)
     assert node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))[0].successful
     wait_until(lambda: not node.repainting, what='the end of the trial')
     assert 'brush 2 is not in the model; its brushes: 1' in node.model_problem
-    assert np.array_equal(node.film.up_to_date().film_um, film)
+    assert np.array_equal(node.film.snapshot().film_um, film)
 
 
 def test_without_a_state_nothing_says_which_brush_sprays(node, robot, painted, onlooker,
@@ -81,4 +81,4 @@ def test_without_a_state_nothing_says_which_brush_sprays(node, robot, painted, o
     robot(node).send(two_passes(trigger=False))
     assert painted(node).max() == 0.0
     told = 'no state names one of the brushes yet'
-    wait_until(lambda: viewer.tells(POSES, told), what='the warning')
+    wait_until(lambda: viewer.reports(POSES, told), what='the warning')

@@ -52,7 +52,7 @@ def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, w
     # Back to the model of before: as if it had never been another.
     set_model(node, None)
     wait_until(lambda: not node.repainting)
-    assert np.array_equal(node.film.up_to_date().film_um, offline_um(node, MOTION))
+    assert np.array_equal(node.film.snapshot().film_um, offline_um(node, MOTION))
     # A reset while a model is prepared is kept.
     set_model(node, MODEL)
     node.reset()
@@ -78,7 +78,7 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     assert np.array_equal(film, offline_um(node, MOTION))
     (tmp_path / 'gate').touch()
     wait_until(lambda: not node.repainting, what='repainting')
-    painted_anew = node.film.up_to_date().film_um
+    painted_anew = node.film.snapshot().film_um
     assert np.array_equal(painted_anew, offline_um(node, MOTION, read_model(own)))
     # Within 45 degrees of the axis the factor is 1.35 to 1.5.
     assert 1.2 < painted_anew.max() / film.max() <= 1.5
@@ -92,8 +92,8 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     problem = node.model_problem
     assert 'own.py: Own has a flux_factor that does not compile' in problem
     assert '\n' not in problem
-    assert np.array_equal(node.film.up_to_date().film_um, painted_anew)
-    wait_until(lambda: viewer.tells('deposition_simulator: film', problem), what='diagnostics')
+    assert np.array_equal(node.film.snapshot().film_um, painted_anew)
+    wait_until(lambda: viewer.reports('deposition_simulator: film', problem), what='diagnostics')
     # Painting again, for another reason, is done with the model that is in use.
     node.set_parameters(parameters(max_pose_gap_s=0.3))
     wait_until(lambda: not node.repainting, what='repainting')

@@ -82,7 +82,7 @@ def test_changes_that_cannot_be_are_refused_with_the_reason(simulator):
         ({'max_edge_length_m': 0.01}, 'the film so far lies on this mesh'),
         ({'frame_id': 'other'}, 'in this frame'),
         ({'pose_queue_depth': 10}, 'the subscriptions and the pose memory are made with it'),
-        ({'precision': 'double'}, 'was summed in it'),
+        ({'precision': 'double'}, 'was computed in it'),
         ({'publish_rate_hz': 600.0}, 'out of range'),
         ({'max_pose_gap_s': math.nan}, 'out of range'),
         ({'color_min_um': 50.0}, 'color_min_um 50 is not below color_max_um 0'),

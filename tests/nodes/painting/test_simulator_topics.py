@@ -103,7 +103,7 @@ def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted,
     painted(node, 399)
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.pose_gaps == 2))
     assert viewer.newest('thickness/stats').longest_gap_s == pytest.approx(0.404)
-    wait_until(lambda: viewer.tells(POSES, '2 gaps'))
+    wait_until(lambda: viewer.reports(POSES, '2 gaps'))
     for key, value in (
         ('gaps', '2'),
         ('intervals over 1.5 times the usual one', '3'),
@@ -136,7 +136,7 @@ def test_poses_that_cannot_be_are_counted_and_change_nothing(simulator, robot, p
     assert np.array_equal(film, offline_um(node, MOTION))
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == sent))
     assert viewer.newest('thickness/stats').poses_rejected == 5
-    wait_until(lambda: viewer.tells(POSES, 'not finite'))
+    wait_until(lambda: viewer.reports(POSES, 'not finite'))
     for key, value in (
         ('poses refused', '5'),
         ('poses that are not finite', '2'),
@@ -162,17 +162,17 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     robot(node).send(MOTION, frame_id='base_link')
     wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
     # tf knows none either, where it is installed.
-    wait_until(lambda: viewer.tells(POSES, 'no transform between them', b'\x02'))
+    wait_until(lambda: viewer.reports(POSES, 'no transform between them', b'\x02'))
     assert "they are in frame 'base_link'" in viewer.status(POSES).message
     assert 'set part_pose and part_parent_frame' in viewer.status(POSES).message
-    assert node.film.up_to_date().film_um.max() == 0.0
+    assert node.film.snapshot().film_um.max() == 0.0
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_rejected == len(MOTION)))
     # Refused they were, but none is any more.
     counted = f'{len(MOTION)} poses refused for their frame'
-    wait_until(lambda: viewer.tells(POSES, counted, b'\x01'), what='the error gone')
+    wait_until(lambda: viewer.reports(POSES, counted, b'\x01'), what='the error gone')
 
 
-def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, onlooker, wait_until):
+def test_two_guns_on_one_topic_are_reported(simulator, ros_context, spin, onlooker, wait_until):
     node, viewer = simulator(), onlooker()
     guns = [Robot(ros_context), Robot(ros_context)]
     spin(*guns)
@@ -182,5 +182,5 @@ def test_two_guns_on_one_topic_are_told(simulator, ros_context, spin, onlooker, 
             position = MOTION.positions_m[row] + [0.0, 0.0, side]
             stamp = MOTION.stamps_ns[row] + round(4e6 * side)
             gun.send_pose(stamp, position, MOTION.quaternions_xyzw[row])
-    wait_until(lambda: viewer.tells(POSES, 'steps faster than a robot', b'\x01'))
+    wait_until(lambda: viewer.reports(POSES, 'steps faster than a robot', b'\x01'))
     wait_until(lambda: node.inputs[0].jumps.count > 40)

@@ -7,7 +7,7 @@ pytest.importorskip('rclpy')
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 
-from paint_deposition.nodes.painting.frames import TIMEOUT_S, NoTransform, TfQueue
+from paint_deposition.nodes.painting.frames import TF_TIMEOUT_S, NoTransform, TfQueue
 
 
 class Part:
@@ -17,14 +17,14 @@ class Part:
         self.known_until_ns, self.may_come = 0, may_come
         self.placed: list[int] = []
         self.refused: list[int] = []
-        self.queue = TfQueue(self._place, lambda pose, _: self.refused.append(_stamp_ns(pose)))
+        self.queue = TfQueue(self._transform, lambda pose, _: self.refused.append(_stamp_ns(pose)))
 
     def take(self, stamp_ns: int, now_s: float) -> None:
         pose = PoseStamped()
         pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
         self.queue.add(pose, now_s)
 
-    def _place(self, pose: PoseStamped) -> None:
+    def _transform(self, pose: PoseStamped) -> None:
         if _stamp_ns(pose) > self.known_until_ns:
             raise NoTransform('not known', self.may_come)
         self.placed.append(_stamp_ns(pose))
@@ -40,7 +40,7 @@ def test_a_late_transform_lets_the_poses_through_in_order():
         part.take(stamp_ns, now_s=stamp_ns * 1e-3)
     assert (part.placed, len(part.queue)) == ([], 3)
     part.known_until_ns = 8
-    part.queue.release(now_s=0.020)
+    part.queue.process(now_s=0.020)
     assert (part.placed, len(part.queue)) == ([4, 8], 1)
     part.known_until_ns = 16
     part.take(16, now_s=0.024)
@@ -51,9 +51,9 @@ def test_a_pose_is_refused_when_its_time_is_up_or_nothing_can_come():
     part = Part()
     part.take(4, now_s=0.0)
     part.take(8, now_s=0.1)
-    part.queue.release(now_s=TIMEOUT_S - 1e-3)
+    part.queue.process(now_s=TF_TIMEOUT_S - 1e-3)
     assert part.refused == []
-    part.queue.release(now_s=TIMEOUT_S)
+    part.queue.process(now_s=TF_TIMEOUT_S)
     assert (part.refused, len(part.queue)) == ([4], 1)
     never = Part(may_come=False)
     never.take(4, now_s=0.0)

@@ -29,7 +29,7 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, paint
     assert np.array_equal(film, offline_um(node, UNTRIGGERED))
     # It says that it sprays, and that no paint flows.
     source.send_fields(UNTRIGGERED.stamps_ns[-1], spraying=True, flow=0.0)
-    wait_until(lambda: viewer.tells(POSES, '1 states that spray with flow 0', b'\x01'))
+    wait_until(lambda: viewer.reports(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
 def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, spin, wait_until,
@@ -56,24 +56,24 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
     wait_until(lambda: node.inputs[0].states_received == 2, what='the next state')
 
 
-def test_poses_that_stop_while_the_gun_sprays_are_told(simulator, robot, painted, onlooker,
+def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, painted, onlooker,
                                                        wait_until):  # fmt: skip
     node, viewer = simulator(), onlooker()
     source, motion = robot(node), two_passes()
     source.send(motion)
     painted(node)
     silent = 'the gun sprays, and no pose has come for'
-    wait_until(lambda: viewer.tells(POSES, silent, b'\x01'))
+    wait_until(lambda: viewer.reports(POSES, silent, b'\x01'))
     source.send_state(motion.stamps_ns[-1] + 1, 0.0)
-    wait_until(lambda: viewer.tells(POSES, 'waiting for poses', b'\x00'))
+    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
 
 
-def test_poses_of_any_reliability_are_heard(simulator, ros_context, spin, painted, wait_until):
+def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, painted, wait_until):
     """A best-effort robot joins a reliable one, which has been heard from its first pose on."""
     node = simulator(pose_queue_depth=5000)
     first = Robot(ros_context)
     spin(first)
-    wait_until(lambda: first.is_heard_by(node), what='discovery')
+    wait_until(lambda: first.is_subscribed_by(node), what='discovery')
     first.send(UNTRIGGERED, slice(0, 300))
     assert np.ptp(painted(node, 300)) > 0.0
     second = Robot(ros_context, reliable=False)

@@ -72,7 +72,7 @@ def test_answer_is_the_recommendation(planner, ask, viewer, wait_until):
     assert answer.standoff_drift_low_m == expected.standoff_drift_m[0]
     assert 'keeps its orientation' in answer.message
     name = 'index_planner: index'
-    wait_until(lambda: viewer.tells(name, 'sigma_n'), what='diagnostics')
+    wait_until(lambda: viewer.reports(name, 'sigma_n'), what='diagnostics')
     assert viewer.value(name, 'model') == 'a 50 mm bell'
 
 

@@ -13,7 +13,7 @@ from files.recorded import START_NS
 from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
 
 
-def test_gaps_and_missed_messages_are_counted_and_told(record, publisher, onlooker, wait_until):
+def test_gaps_and_missed_messages_are_reported(record, publisher, onlooker, wait_until):
     recorder = record(topics=['atomizer/pose'], max_pose_gap_s=0.1)
     viewer = onlooker()
     poses = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))

@@ -125,7 +125,7 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
     assert (change.name, change.value.double_value) == ('width_m', 0.75)
 
 
-def test_bad_input_is_told_at_the_start(record):
+def test_bad_input_is_reported_at_the_start(record):
     for values, says in (
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
         ({'compression': 'zip'}, "compression is 'zip': choose one of none, lz4, zstd"),

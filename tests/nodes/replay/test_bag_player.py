@@ -103,7 +103,7 @@ def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
     assert not player.finished.done()
 
 
-def test_bad_input_is_told_at_the_start(play, pass_bag):
+def test_bad_input_is_reported_at_the_start(play, pass_bag):
     for values, says in (
         ({'bag': ''}, 'bag is empty: give the path of a recording'),
         ({'bag': '/nowhere'}, 'no bag at /nowhere'),

@@ -4,51 +4,55 @@ import pytest
 
 pytest.importorskip('rclpy')
 
-from paint_deposition.nodes.replay.flow_control import LOST_AFTER_S, UNHEARD_AFTER_S, PoseWindow
+from paint_deposition.nodes.replay.flow_control import (
+    LOST_TIMEOUT_S,
+    NO_REPORT_TIMEOUT_S,
+    PoseWindow,
+)
 
 
 def published(window: PoseWindow, stamps, now_s: float = 0.0) -> None:
     for stamp in stamps:
-        window.publish(stamp, now_s)
+        window.add_sent(stamp, now_s)
 
 
-def test_what_never_arrives_is_given_up_while_reports_come():
+def test_lost_poses_are_not_waited_for_while_reports_arrive():
     window = PoseWindow()
-    window.present(['simulator'], 0.0)
+    window.set_subscribers(['simulator'], 0.0)
     published(window, range(10))
     now_s = 0.0
-    while now_s < LOST_AFTER_S:
+    while now_s < LOST_TIMEOUT_S:
         window.report('simulator', 6, now_s)
-        assert window.behind(now_s) == {'simulator': 3}
+        assert window.lag(now_s) == {'simulator': 3}
         now_s += 0.2
     window.report('simulator', 6, now_s + 0.2)
-    assert window.behind(now_s + 0.2) == {}
+    assert window.lag(now_s + 0.2) == {}
     assert window.subscribers['simulator'].lost == 3
 
 
-def test_who_never_reports_is_given_up_until_it_does():
+def test_a_subscriber_that_never_reports_is_not_waited_for():
     """The others are waited for as before."""
     window = PoseWindow()
-    window.present(['mute', 'simulator'], 0.0)
+    window.set_subscribers(['mute', 'simulator'], 0.0)
     published(window, range(10))
     window.report('simulator', 7, 0.0)
-    assert window.behind(UNHEARD_AFTER_S - 0.1) == {'mute': 10, 'simulator': 2}
-    assert window.behind(UNHEARD_AFTER_S + 0.1) == {'simulator': 2}
-    assert window.subscribers['mute'].unheard
+    assert window.lag(NO_REPORT_TIMEOUT_S - 0.1) == {'mute': 10, 'simulator': 2}
+    assert window.lag(NO_REPORT_TIMEOUT_S + 0.1) == {'simulator': 2}
+    assert window.subscribers['mute'].never_reported
     published(window, range(10, 25), now_s=40.0)
     window.report('simulator', 24, 40.0)
     window.report('mute', 21, 40.0)
-    assert window.behind(40.0) == {'mute': 3}
+    assert window.lag(40.0) == {'mute': 3}
 
 
-def test_who_has_gone_is_not_waited_for_and_who_joins_late_from_then_on():
+def test_only_present_subscribers_are_waited_for():
     window = PoseWindow()
-    window.present(['doomed', 'survivor'], 0.0)
+    window.set_subscribers(['doomed', 'survivor'], 0.0)
     published(window, range(10))
     window.report('survivor', 9, 0.0)
-    assert window.behind(0.0) == {'doomed': 10}
-    window.present(['late', 'survivor'], 0.0)
-    assert window.behind(0.0) == {}
+    assert window.lag(0.0) == {'doomed': 10}
+    window.set_subscribers(['late', 'survivor'], 0.0)
+    assert window.lag(0.0) == {}
     published(window, range(10, 15))
     window.report('survivor', 14, 0.0)
-    assert window.behind(0.0) == {'late': 5}
+    assert window.lag(0.0) == {'late': 5}

@@ -42,7 +42,7 @@ class Driver(Node):
             message.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
             self.joints.publish(message)
 
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         publishers = [self.joints, *self.signals.values()]
         return all(publisher.get_subscription_count() for publisher in publishers)
 
@@ -66,7 +66,7 @@ def driver(ros_context, spin, wait_until):
     def driver(*signals) -> Driver:
         node = Driver(ros_context, signals)
         spin(node)
-        wait_until(node.is_heard, what='discovery')
+        wait_until(node.has_subscribers, what='discovery')
         return node
 
     return driver
@@ -143,15 +143,15 @@ def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wai
     assert speeds == pytest.approx([0.35, 0.35, 0.35, 0.5], rel=1e-12)
 
 
-def test_what_cannot_be_used_is_told(source, driver, viewer, wait_until):
+def test_unusable_signals_are_reported(source, driver, viewer, wait_until):
     source(trigger='/io.level > 1')
     robot = driver(('/io', UInt16))
     robot.move(stamps_from_now(), names=JOINTS[:5], rows=WAY[:, :5])
     robot.signals['/io'].publish(UInt16(data=1))
-    wait_until(lambda: viewer.tells('atomizer_source: robot', 'no joint state has all'))
+    wait_until(lambda: viewer.reports('atomizer_source: robot', 'no joint state has all'))
     assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
     told = '/io: UInt16 has no number or Bool at .level'
-    wait_until(lambda: viewer.tells('atomizer_source: signals', told, b'\x02'))
+    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
 
 
 def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, wait_until):
@@ -161,7 +161,7 @@ def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, 
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY))
     robot.signals['/gun'].publish(Bool(data=True))
     told = '/gun has no stamps, and the poses of the robot are sent 29.'
-    wait_until(lambda: viewer.tells('atomizer_source: signals', told))
+    wait_until(lambda: viewer.reports('atomizer_source: signals', told))
     assert not viewer.heard['atomizer/state']
 
 

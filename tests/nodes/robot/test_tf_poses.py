@@ -55,7 +55,7 @@ class Broadcaster(Node):
             transforms.append(transform)
         self._publishers_of[static].publish(self._kind(transforms=transforms))
 
-    def is_heard(self) -> bool:
+    def has_subscribers(self) -> bool:
         return all(each.get_subscription_count() for each in self._publishers_of.values())
 
 
@@ -71,7 +71,7 @@ def broadcaster(ros_context, spin, viewer, wait_until):
     )
     sender = Broadcaster(ros_context)
     spin(node, sender)
-    wait_until(sender.is_heard, what='discovery')
+    wait_until(sender.has_subscribers, what='discovery')
     wait_until(lambda: viewer.count_publishers('atomizer/pose'))
     return sender
 
@@ -139,7 +139,7 @@ def test_a_frame_that_is_not_there_is_named(broadcaster, viewer, wait_until):
     broadcaster.send(START_NS, foot_to_tool=arm(START_NS))
     wait_until(lambda: told(viewer) == "tf has no frame 'tool0'; did you mean 'tool'?")
     broadcaster.send(START_NS, foot_to_tool0=arm(START_NS), cell_to_world=rail(START_NS))
-    no_way = "no transforms that move lead from 'tool0' to 'world'"
+    no_way = "no moving transforms connect 'tool0' to 'world'"
     wait_until(lambda: told(viewer) == no_way)
     assert not viewer.heard['atomizer/pose']
 

@@ -25,7 +25,7 @@ def test_the_mesh_is_the_marker_that_rclpy_builds(frame_id, triangles):
     mesh = ColouredMesh(vertices, faces, frame_id, 'thickness')
     for stamp_ns in STAMPS_NS:
         rows = rng.integers(0, len(FILM_PALETTE), size=len(vertices))
-        data = mesh.serialised(stamp_ns, FILM_PALETTE, rows)
+        data = mesh.serialise(stamp_ns, FILM_PALETTE, rows)
         expected = white_marker(Marker.TRIANGLE_LIST, 'thickness', 0, frame_id)
         expected.header = header(frame_id, stamp_ns)
         rgba = FILM_PALETTE[rows] / 255.0

@@ -123,5 +123,5 @@ def test_sim_time_and_qos_overrides_are_not_ours(declared):
 def test_every_description_states_a_unit_and_every_fixed_one_why(node_class):
     for name, row in node_class.PARAMETERS.items():
         assert row.description.endswith(']'), name
-        assert row.refusal(row.default) is None, name
+        assert row.error_for(row.default) is None, name
         assert len(row.fixed_because) > 20 or node_class not in (BagPlayer, RunRecorder), name

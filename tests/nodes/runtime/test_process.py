@@ -28,7 +28,7 @@ class Worker(PaintNode):
             os.kill(os.getpid(), signal.SIGINT)
         self.create_timer(0.02, self.work)
 
-    def _prepare(self):
+    def _load_files(self):
         if self.values['does'] == 'refuse':
             raise PaintError('mesh none.stl does not exist; give a mesh')
         if self.values['does'] == 'load':

@@ -1,10 +1,10 @@
-"""A paint cell: the live film and the index planner; a bag, a recording, a comparison on request.
+"""A paint cell: simulator and index planner; optionally bag player, recorder and comparison.
 
 ros2 launch paint_deposition paint_cell.launch.py
 ros2 launch paint_deposition paint_cell.launch.py bag:=run_1 record:=runs
 ros2 launch paint_deposition paint_cell.launch.py --show-args
 
-A node that fails ends the cell, and the launch with an error.
+If a node fails, all others are stopped and the launch ends with an error.
 """
 
 from pathlib import Path
@@ -45,7 +45,7 @@ ARGUMENTS = (
     (
         'trigger',
         '',
-        'What opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" [topic]',
+        'Signal that opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" [topic]',
     ),
     ('bag', '', 'Bag to replay into the cell; empty: poses come from the robot [path]'),
     ('pose_topic', '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"),
@@ -62,13 +62,13 @@ ARGUMENTS = (
     (
         'wait_for_subscribers',
         '',
-        'Nodes that take the poses and must be there before the replay; empty: as many as are '
-        'started here [count]',
+        'Subscribers of the poses to wait for before the replay; empty: as many as are started '
+        'here [count]',
     ),
     (
         'parameters',
         shared('config', 'cell.yaml'),
-        'Parameters of all nodes; the arguments above go first [path]',
+        'Parameters of all nodes, which the arguments above override [path]',
     ),
     ('namespace', '', 'Namespace of the cell; topic names are relative to it'),
     ('use_sim_time', 'false', 'Take time from /clock, which a replayed bag publishes'),
@@ -85,18 +85,19 @@ def generate_launch_description():
         )
         for name, default, description in ARGUMENTS
     ]
-    # All is checked before the first node starts: one that fails later would leave the others.
+    # All arguments are checked before the first node starts, so that none is left running.
     return LaunchDescription([*arguments, OpaqueFunction(function=cell)])
 
 
 def cell(context):
     """The nodes that the arguments ask for."""
     given = context.launch_configurations
-    return [cell_node(given, name, parameters) for name, parameters in wanted(given).items()]
+    parameters = node_parameters(given)
+    return [cell_node(given, name, values) for name, values in parameters.items()]
 
 
-def wanted(given):
-    """The parameters that the arguments give each node, by its name."""
+def node_parameters(given):
+    """The parameters of each node that is started, by its name, from the arguments."""
     if not Path(given['parameters']).is_file():
         raise ValueError(f'parameters: there is no file {given["parameters"]}')
     if given['urdf'] and given['base_frame']:
@@ -104,7 +105,7 @@ def wanted(given):
     if given['tip_frame'] and not given['base_frame']:
         raise ValueError('tip_frame is given without base_frame: name the frame of the poses')
     if given['trigger'] and not (given['urdf'] or given['base_frame']):
-        raise ValueError('trigger is given without urdf or base_frame, with which it goes')
+        raise ValueError('trigger is given without urdf or base_frame: give one of them')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
@@ -140,7 +141,7 @@ def wanted(given):
 
 
 def cell_node(given, name, parameters):
-    """Describe one node: the parameter file first, then what the arguments say."""
+    """The launch action of a node; the arguments override the parameter file."""
 
     def ended(event, context):
         if event.returncode and not context.is_shutdown:

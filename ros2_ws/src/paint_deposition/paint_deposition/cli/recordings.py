@@ -78,9 +78,9 @@ def _contents(
         program = read_program(path, gun_signal=gun_signal)
         return asdict(program), program_as_text(program)
     if is_pose_table(path):
-        MotionSource(gun_signal=gun_signal).refuse_other(path, 'a table of poses')
+        MotionSource(gun_signal=gun_signal).require_kind(path, 'a table of poses')
         return _table_contents(read_pose_table(path, PoseLayout()))
-    MotionSource(gun_signal=gun_signal).refuse_other(path, 'a bag')
+    MotionSource(gun_signal=gun_signal).require_kind(path, 'a bag')
     summary = summarise(path, max_pose_gap_s)
     return asdict(summary), _bag_contents(summary)
 

@@ -1,4 +1,4 @@
-"""Motions of guns from files of any kind, brought into the frame of the part."""
+"""Reading the motion of guns from files of any kind, in the frame of the part."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PART = 'part'
 
 @dataclass(frozen=True)
 class GunMotion:
-    """A gun by its name, '' for the only one, and its motion in the frame of the part."""
+    """The name of a gun, '' for the only one, and its motion in the frame of the part."""
 
     name: str
     trajectory: Trajectory
@@ -37,42 +37,42 @@ def read_recording(
     gun_signal: str | None = None,
     **more: Any,
 ) -> Trajectory:
-    """Read the poses and the trigger of a motion file, and bring them into the part's frame.
+    """Read the poses and the trigger of a motion file, and transform them into the part's frame.
 
     Args:
         path: a bag, a RAPID module or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
-        more: the other fields of ``MotionSource``, ``part_pose`` say.
+        more: the other fields of ``MotionSource``, such as ``part_pose``.
 
     Raises:
-        RecordingError: a file or an option that does not fit, poses in another frame than named.
+        RecordingError: the file, an option, or the frame of the poses is wrong.
     """
     given = {'pose_topic': pose_topic, 'state_topic': state_topic, 'gun_signal': gun_signal}
     return read_motion(path, checked(MotionSource, 'motion', given | more, RecordingError))
 
 
 def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajectory:
-    """The same with the options as they come from a campaign or the command line.
+    """``read_recording`` with the options of a campaign or the command line.
 
-    ``gun`` is the name of a gun whose topics in the bag stand behind it, '' for none.
+    ``gun`` is the name that precedes the gun's topics in the bag, '' for none.
     """
     path = Path(path)
     if is_rapid(path):
-        source.refuse_other(path, 'a RAPID module')
+        source.require_kind(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
     elif is_pose_table(path):
-        source.refuse_other(path, 'a table of poses')
+        source.require_kind(path, 'a table of poses')
         layout = PoseLayout(
             source.state_topic, source.pose_unit, source.rotation, source.angle_unit
         )
         recorded = read_pose_table(path, layout)
     else:
-        source.refuse_other(path, 'a bag')
+        source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
-            recorded = replace(_recorded(bag, source, gun), source=str(path))
-            return _brought_to_part(recorded, source, bag)
-    return _brought_to_part(replace(recorded, source=str(path)), source, None)
+            recorded = replace(_read_bag(bag, source, gun), source=str(path))
+            return _in_part_frame(recorded, source, bag)
+    return _in_part_frame(replace(recorded, source=str(path)), source, None)
 
 
 def read_gun_motions(
@@ -80,9 +80,9 @@ def read_gun_motions(
 ) -> list[GunMotion]:
     """Read the motion of each gun from a bag, a RAPID module or a table for each.
 
-    Or from one bag with all ``atomizers``, whose names stand before their topics, as
+    Or from one bag with all ``atomizers``, whose names precede their topics, as in
     /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves. Raises
-    RecordingError where names and files do not go together, or a file cannot be read.
+    RecordingError if names and files do not match, or a file cannot be read.
     """
     guns = [name.strip('/') for name in atomizers]
     names = guns or [file.stem for file in files]
@@ -105,8 +105,8 @@ def read_gun_motions(
     return [GunMotion(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
-def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
-    """The motion as the bag has it."""
+def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
+    """The motion in a bag, in the frame of its poses."""
     robot = None
     if source.urdf and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
@@ -122,15 +122,15 @@ def _recorded(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
         trigger = state.name if state else None
         return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, source.tf, robot)
-    # A plan's bag says itself what its trigger is.
+    # The bag of a plan names its trigger itself.
     planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
     trigger = source.state_topic or planned
     recorded = trajectory_of(bag, source.pose_topic, trigger, source.tf, robot)
-    return _noted(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
+    return _with_note(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
 
 
-def _brought_to_part(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
-    """By the pose of the part that is given, else by the transforms of the recording."""
+def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
+    """Transform by the given pose of the part, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
     if source.part_pose is not None:
         if source.frame_id and named and is_frame(named, part):
@@ -141,19 +141,19 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource, bag: Bag | None
         of = f"'{named}'" if named else 'their own frame'
         said = f'part_pose: poses brought from {of} to the part, which stands at '
         said += words(Rigid.of(source.part_pose))
-        return _noted(at_part(recorded, source.part_pose, part), said)
+        return _with_note(at_part(recorded, source.part_pose, part), said)
     if is_frame(named, part):
         return recorded
     known = ''
     if bag is not None:
         from paint_deposition.files.recordings.transforms import StaticFrames, poses_over_time
 
-        static = StaticFrames.in_bag(bag)
+        static = StaticFrames.from_bag(bag)
         if place := static.pose_of(part, named):
             said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
-            return _noted(at_part(recorded, place.values, part), said + words(place))
+            return _with_note(at_part(recorded, place.values, part), said + words(place))
         if over_time := poses_over_time(bag, part, named, recorded.stamps_ns):
-            return _on_a_moving_part(recorded, part, *over_time)
+            return _in_moving_part_frame(recorded, part, *over_time)
         known = static.words(named)
     if source.frame_id:
         raise RecordingError(
@@ -168,17 +168,17 @@ def _brought_to_part(recorded: Trajectory, source: MotionSource, bag: Bag | None
     return replace(recorded, warnings=(*recorded.warnings, warning))
 
 
-def _on_a_moving_part(
+def _in_moving_part_frame(
     recorded: Trajectory, part: str, known: np.ndarray, places: np.ndarray
 ) -> Trajectory:
-    """By the pose of the part at the time of each pose, (M, 7) where it is known (N,)."""
+    """Transform by the pose of the part (M, 7) at each time where it is known (N,)."""
     frames = f"'{part}' in '{recorded.frame_id}'"
     if not known.any():
         raise RecordingError(
             f'{recorded.source}: the transforms of {frames} cover none of its poses; their clock '
             'is another, give --part-pose'
         )
-    # One by one, as the nodes do, so that the film is the same.
+    # One by one, as in the nodes, so that the film is the same to the last bit.
     poses = zip(recorded.positions_m[known], recorded.quaternions_xyzw[known], strict=True)
     brought = [
         Rigid.of(place).inverse().applied(*pose) for place, pose in zip(places, poses, strict=True)
@@ -195,13 +195,13 @@ def _on_a_moving_part(
             ' pose on'
         )
         moved = replace(moved, warnings=(*moved.warnings, warning))
-    return _noted(moved, f'/tf: {len(moved)} poses brought to the moving part, {frames}')
+    return _with_note(moved, f'/tf: {len(moved)} poses brought to the moving part, {frames}')
 
 
 def words(place: Rigid) -> str:
-    """A pose as options take it."""
+    """A pose in the format of the options."""
     return ' '.join(f'{value + 0.0:.6g}' for value in place.values)
 
 
-def _noted(trajectory: Trajectory, note: str) -> Trajectory:
+def _with_note(trajectory: Trajectory, note: str) -> Trajectory:
     return replace(trajectory, notes=(*trajectory.notes, note))

@@ -1,4 +1,4 @@
-"""Which motion of a file is meant, and where the part stood: as campaigns and options say it."""
+"""The options of campaigns and commands on which motion to read, and where the part stood."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
-from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -17,7 +17,7 @@ Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 def _pose(values: list[float]) -> list[float]:
     if not is_pose(values):
-        raise ValueError(f'{values} is no pose; give {POSE_WORDS}')
+        raise ValueError(f'{values} is no pose; give {POSE_FORMAT}')
     return values
 
 
@@ -28,7 +28,7 @@ def _rotation(name: str) -> str:
 
 
 class MotionSource(BaseModel, extra='forbid'):
-    """What to read of a motion file, and how it lies to the part; None is not given."""
+    """What to read of a motion file, and the pose of the part; None: not given."""
 
     pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
     state_topic: Text | None = Field(None, description='the name of a topic of the recording')
@@ -50,11 +50,11 @@ class MotionSource(BaseModel, extra='forbid'):
     )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
-        None, description=f'the pose of the part in the frame of the poses, {POSE_WORDS}'
+        None, description=f'the pose of the part in the frame of the poses, {POSE_FORMAT}'
     )
 
-    def refuse_other(self, path: Path, kind: str) -> None:
-        """Refuse fields that a kind of file does not have, such as 'a bag'."""
+    def require_kind(self, path: Path, kind: str) -> None:
+        """Refuse fields that do not apply to a kind of file, such as 'a bag'."""
         for name, kinds in MOTION_KINDS.items():
             if PLURAL[kind] not in kinds and getattr(self, name) is not None:
                 option = f'--{name.replace("_", "-")}'

@@ -89,17 +89,17 @@ class LiveFilms:
         """Whether all motion so far is remembered and can be painted again."""
         return all(gun.log.complete for gun in self.guns)
 
-    def up_to_date(self) -> CommonFilm:
-        """The film of everything received; two of them are equal while nothing has come."""
-        return CommonFilm(tuple(gun.up_to_date() for gun in self.guns))
+    def snapshot(self) -> CommonFilm:
+        """The film of everything received so far; equal to the last one if nothing was."""
+        return CommonFilm(tuple(gun.snapshot() for gun in self.guns))
 
     def reset(self) -> None:
-        """Back to bare metal."""
+        """Clear the film."""
         for gun in self.guns:
             gun.reset()
 
     def warm_up(self) -> None:
-        """Compile and compute all that the models need, before there is any motion."""
+        """Compile the models and compute all they need, before there is any motion."""
         for gun in self.guns:
             gun.warm_up()
 

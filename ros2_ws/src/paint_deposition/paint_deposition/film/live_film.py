@@ -1,4 +1,4 @@
-"""The film of a motion that is still under way: feeds ``FilmIntegrator``, which paints."""
+"""The film of a motion that still goes on, by way of ``FilmIntegrator``."""
 
 import copy
 from bisect import bisect_right, insort
@@ -18,7 +18,7 @@ from paint_deposition.film.interpolated_brushes import (
 from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.pose_stream import (
-    DEFAULT_LIMIT_POSES,
+    DEFAULT_POSE_MEMORY,
     MotionLog,
     PoseBatch,
     TriggerChange,
@@ -29,32 +29,31 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
-# A trigger change so much older than the newest pose is from a stream that begins again [ns].
-ANOTHER_STREAM_NS = 1_000_000_000
+# A trigger change that is older than the newest pose by more is from a restarted stream [ns].
+STREAM_RESTART_NS = 1_000_000_000
 # Earlier than any stamp [ns].
 BEFORE_ALL_NS = -(2**62)
 _STAMP = attrgetter('stamp_ns')
 
 
 class LiveFilm:
-    """Gives poses and trigger changes to the integrator as they come, and can do so again.
+    """Passes poses and trigger changes on to the integrator, and logs them to replay them later.
 
-    Poses wait until one is newer by the trigger's latency, measured by their stamps: a change of
-    the trigger that comes a little later than the poses around it still cuts where it belongs.
-    However the poses were batched, the film is the same to the last bit, and the same as that of
-    an offline run.
+    A pose waits until one is newer by the trigger's latency, measured by their stamps, so that a
+    trigger change that arrives a little late still takes effect at its own stamp. The film does
+    not depend on how the poses were batched, and equals that of an offline run to the last bit.
 
-    Without any trigger change the gun always sprays; once one was seen, the gun was off before
-    it, as in a recording. What was painted up to then is taken back. With a model of several
-    brushes nothing is painted before a change that names one.
+    Without any trigger change the gun always sprays. The first change implies that the gun was
+    off before it, as in a recording: the film painted until then is discarded. A model of several
+    brushes paints nothing before a change that names a brush.
 
     Args:
         points: where the film is wanted.
         model: the deposition model with its effects.
         precision, occluder: as for ``FilmIntegrator``.
         max_pose_gap_s: a longer time between two poses is gun off [s].
-        trigger_latency_s: how much later than poses of its time a trigger change may come [s].
-        limit_poses: poses to remember, so that they can be painted with another model.
+        trigger_latency_s: how late a trigger change may arrive, by the stamps of the poses [s].
+        pose_memory: number of poses to log, so that another model can repaint them.
     """
 
     def __init__(
@@ -66,14 +65,14 @@ class LiveFilm:
         occluder: Occluder | None = None,
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
         trigger_latency_s: float = DEFAULT_TRIGGER_LATENCY_S,
-        limit_poses: int = DEFAULT_LIMIT_POSES,
+        pose_memory: int = DEFAULT_POSE_MEMORY,
     ) -> None:
         self.max_pose_gap_s = max_pose_gap_s
         self.trigger_latency_s = trigger_latency_s
-        self._limit_poses = limit_poses
+        self._limit_poses = pose_memory
         self._integrator = FilmIntegrator(points, model, precision, occluder)
         self._carried: list[TriggerChange] = []
-        # Of all changes that were taken, and of those carried over a reset.
+        # Brushes of all trigger changes, including those carried over a reset.
         self._brushes: set[int] = set()
         self._clear()
 
@@ -94,45 +93,45 @@ class LiveFilm:
 
     @property
     def _settled_ns(self) -> int:
-        """Up to here no trigger change is waited for any more."""
+        """Stamp before which late trigger changes are no longer waited for."""
         return (self.newest_ns or 0) - round(self.trigger_latency_s * 1e9)
 
     @property
     def flow(self) -> float | None:
-        """Relative flow at the newest pose; None: no trigger was ever seen."""
+        """Relative flow at the newest pose; None: there was no trigger change yet."""
         if not (self._changes or self._carried):
             return None
-        return self._set_now.flow if self._set_now else 0.0
+        return self._current_change.flow if self._current_change else 0.0
 
     @property
     def brush(self) -> int:
         """Number of the brush at the newest pose; 0 is the only one."""
-        return self._set_now.brush if self._set_now else ONLY_BRUSH
+        return self._current_change.brush if self._current_change else ONLY_BRUSH
 
     @property
-    def _set_now(self) -> TriggerChange | None:
-        """What holds at the newest pose."""
+    def _current_change(self) -> TriggerChange | None:
+        """The trigger change in effect at the newest pose."""
         changes, newest = self._changes or self._carried, self.newest_ns
         passed = len(changes) if newest is None else bisect_right(changes, newest, key=_STAMP)
         return changes[passed - 1] if passed else None
 
     @property
     def _sprays_without_trigger(self) -> bool:
-        """Not where nothing says with which brush."""
+        """Whether the gun sprays without a trigger; a model of several brushes must know which."""
         return len(self.model.brushes) <= 1
 
     def reset(self) -> None:
-        """Back to bare metal; the gun stays as it is, on or off, if the motion goes on."""
-        self.carry_on(self)
+        """Clear the film; the gun stays on or off if the motion continues."""
+        self.start_bare_after(self)
 
-    def carry_on(self, before: 'LiveFilm') -> None:
-        """Begin bare, with the gun as the motion left it that was painted elsewhere before.
+    def start_bare_after(self, before: 'LiveFilm') -> None:
+        """Clear the film and take over the state of the gun from another film.
 
         Raises:
-            ModelError: the model does not have the brush that it sprays with.
+            ModelError: the model does not have the brush that the gun sprays with.
         """
         carried = before._changes or before._carried
-        # A brush between the calibrated ones is made anew from its set-points.
+        # A brush between the calibrated ones is interpolated again from its set-points.
         sprayed = {change.brush for change in carried if change.flow > 0.0}
         brushes = {brush for brush in sprayed if brush < BETWEEN}
         self.model.require_brushes(brushes)
@@ -149,61 +148,58 @@ class LiveFilm:
             self._builder.add_trigger(BEFORE_ALL_NS, 0.0)
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
-        self._now: FilmIntegrator | None = None
+        self._snapshot: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:
-        """Take a change of the trigger, early, in time or late.
+        """Add a trigger change, early, in time or late.
 
         Raises:
             ModelError: its brush is not in the model, or its set-points lie outside the calibrated
-                ones; the change is not taken.
+                ones; the change is ignored.
         """
         if change.flow > 0.0:
-            change = self._with_its_brush(change)
+            change = self._with_brush_number(change)
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
-        self._carry_on(change.stamp_ns)
+        self._restore_carried_trigger(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
-            self._begin_again(change)
+            self._restart_with(change)
             return
         newest = self.newest_ns
-        if newest is not None and newest - change.stamp_ns > ANOTHER_STREAM_NS:
+        if newest is not None and newest - change.stamp_ns > STREAM_RESTART_NS:
             self._changes = []
         self._take_change(change)
 
     def add_poses(self, batch: PoseBatch) -> None:
-        """Take poses and paint what is old enough."""
+        """Add poses, and paint those that no longer wait for the trigger."""
         if not len(batch):
             return
-        self._carry_on(int(batch.stamps_ns[0]))
+        self._restore_carried_trigger(int(batch.stamps_ns[0]))
         self.log.add(batch)
         self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
         self._integrator.add(self._builder.take(self._settled_ns))
-        self._now = None
+        self._snapshot = None
 
-    def follow(self, events: Iterable[TriggerChange | PoseBatch]) -> None:
-        """Take what was logged."""
+    def replay(self, events: Iterable[TriggerChange | PoseBatch]) -> None:
+        """Add logged poses and trigger changes."""
         for event in events:
             if isinstance(event, TriggerChange):
                 self.add_trigger(event)
             else:
                 self.add_poses(event)
 
-    def up_to_date(self) -> FilmIntegrator:
-        """The film of everything received; the film that is painted on stays as it is.
+    def snapshot(self) -> FilmIntegrator:
+        """The film of everything received so far, as if all strokes ended here; a copy."""
+        if self._snapshot is None:
+            self._snapshot = self._integrator.fork()
+            self._snapshot.add(copy.deepcopy(self._builder).take(finish=True))
+        return self._snapshot
 
-        Strokes under way count as ending here.
-        """
-        if self._now is None:
-            self._now = self._integrator.fork()
-            self._now.add(copy.deepcopy(self._builder).take(finish=True))
-        return self._now
-
-    def use(self, model: DepositionModel) -> None:
-        """Paint with another model from here on; what was painted before stays.
+    def switch_model(self, model: DepositionModel) -> None:
+        """Paint with another model from here on; the film so far stays.
 
         Raises:
-            ModelError: the model does not have a brush that was used.
+            ModelError: the model lacks a brush that was used.
         """
         model = with_brushes_of(model, self.model)
         always_on = self._sprays_without_trigger and self.flow is None
@@ -213,19 +209,20 @@ class LiveFilm:
         self._integrator.use(model)
         builder.max_step_m = model.max_step_m
         builder.whole_strokes = model.needs_whole_strokes
-        self._now = None
+        self._snapshot = None
 
     def warm_up(self) -> None:
-        """Compile and compute all that the model needs, before there is any motion."""
-        away = PathBuilder()
-        away.add_poses([0, 1_000_000], np.full((2, 3), 1e3), np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
+        """Compile the model and compute all it needs, before there is any motion."""
+        far_away = np.full((2, 3), 1e3)
+        builder = PathBuilder()
+        builder.add_poses([0, 1_000_000], far_away, np.tile([0.0, 0.0, 0.0, 1.0], (2, 1)))
         unpainted = self._integrator.fork()
-        path = away.take(finish=True)
+        path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
 
-    def _with_its_brush(self, change: TriggerChange) -> TriggerChange:
-        """The change with the number that stands for its set-points, where those choose."""
+    def _with_brush_number(self, change: TriggerChange) -> TriggerChange:
+        """The change with the number of an interpolated brush, where set-points select it."""
         if not uses_set_points(self.model, change.brush, change.set_points):
             return change
         model, number = with_set_points(self.model, change.set_points)
@@ -233,14 +230,14 @@ class LiveFilm:
             self._integrator.use(model)
         return replace(change, brush=number)
 
-    def _begin_again(self, first_change: TriggerChange) -> None:
+    def _restart_with(self, first_change: TriggerChange) -> None:
         log = self.log
         self._clear()
         self._take_change(first_change)
-        self.follow(log.events())
+        self.replay(log.events())
 
-    def _carry_on(self, stamp_ns: int) -> None:
-        """After a reset, keep the trigger of a motion that goes on, drop that of an older one."""
+    def _restore_carried_trigger(self, stamp_ns: int) -> None:
+        """After a reset, add the trigger changes from before it, unless the stream restarted."""
         carried, self._carried = self._carried, []
         if carried and stamp_ns >= carried[0].stamp_ns:
             for change in carried:
@@ -249,8 +246,8 @@ class LiveFilm:
     def _take_change(self, change: TriggerChange) -> None:
         self.log.add(change)
         self._builder.add_trigger(change.stamp_ns, change.flow, change.brush)
-        # Kept are the changes that count from the newest pose on.
+        # Keep the changes that are in effect from the newest pose on.
         insort(self._changes, change, key=_STAMP)
         passed = bisect_right(self._changes, self.newest_ns or 0, key=_STAMP)
         del self._changes[: max(0, passed - 1)]
-        self._now = None
+        self._snapshot = None

@@ -14,7 +14,7 @@ from paint_deposition.motion.trajectory import Trajectory
 QUATERNION_TOLERANCE = 0.01
 # On which painting nodes say where the part stands.
 PART_POSE_TOPIC = 'part_pose'
-POSE_WORDS = 'seven numbers, x y z [m] and a unit quaternion qx qy qz qw'
+POSE_FORMAT = 'seven numbers, x y z [m] and a unit quaternion qx qy qz qw'
 
 
 def is_pose(values: Sequence[float]) -> bool:

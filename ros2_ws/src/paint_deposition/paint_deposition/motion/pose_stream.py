@@ -9,7 +9,7 @@ from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Two hours at 250 Hz, 64 bytes a pose.
-DEFAULT_LIMIT_POSES = 2_000_000
+DEFAULT_POSE_MEMORY = 2_000_000
 # So few at once that other threads have their turn in between.
 BATCH_POSES = 256
 
@@ -65,14 +65,14 @@ class MotionLog:
     """Poses as received and trigger changes in the order in which they came.
 
     One thread may write while others read what is there already. Memory is bounded: beyond
-    ``limit_poses`` the log closes, is no longer ``complete`` and forgets what it has.
+    ``pose_memory`` the log closes, is no longer ``complete`` and forgets what it has.
 
     Attributes:
         poses, changes: how many came.
     """
 
-    def __init__(self, limit_poses: int = DEFAULT_LIMIT_POSES) -> None:
-        self.limit_poses = limit_poses
+    def __init__(self, pose_memory: int = DEFAULT_POSE_MEMORY) -> None:
+        self.pose_memory = pose_memory
         self.poses = 0
         self.complete = True
         # With room for more than came.
@@ -91,7 +91,7 @@ class MotionLog:
         if isinstance(event, TriggerChange):
             self._changes.append((self.poses, event))
             return
-        if self.poses + len(event) > self.limit_poses:
+        if self.poses + len(event) > self.pose_memory:
             self.complete = False
             self._kept, self._changes = NO_POSES, []
         else:

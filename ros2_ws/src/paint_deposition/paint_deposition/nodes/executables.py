@@ -1,4 +1,4 @@
-"""The executables of the nodes: they say in one line what is missing where there is no ROS 2."""
+"""The executables of the nodes; without ROS 2 they print one line on what is missing."""
 
 import importlib
 import os
@@ -18,7 +18,7 @@ REMEDIES = {
 
 def _run(name: str, folder: str, node_class: str) -> int:
     """Load a node's module and run it; returns the process's exit code."""
-    # Libraries catch what is raised while they are imported, so a signal is only noted.
+    # Libraries may swallow an exception while they are imported, so a signal is only recorded.
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: signals.append(number))

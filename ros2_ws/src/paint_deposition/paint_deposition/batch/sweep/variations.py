@@ -16,7 +16,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, did_you_mean
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
@@ -123,7 +123,7 @@ def _require_kind(name: str, value: Any) -> None:
     if name in INPUTS:
         holds, expected = isinstance(value, str), 'the name of a file'
     elif name == 'part_pose':
-        holds, expected = all(map(_is_number, many)) and is_pose(many), POSE_WORDS
+        holds, expected = all(map(_is_number, many)) and is_pose(many), POSE_FORMAT
     elif name == 'effects':
         holds = isinstance(value, list) and all(isinstance(one, str) for one in value)
         expected = 'a list of effects of the model, [] for none'

@@ -16,7 +16,7 @@ from paint_deposition.files.rapid.parser import Call, Module, Reference
 
 # Quaternions are written with four digits; further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01
-# Of the records whose parts programs name: robtarget, pose, tooldata, wobjdata, speeddata.
+# Index of each component in its record: robtarget, pose, tooldata, wobjdata, speeddata.
 COMPONENTS = {
     'trans': 0, 'rot': 1, 'robconf': 2, 'extax': 3, 'x': 0, 'y': 1, 'z': 2,
     'q1': 0, 'q2': 1, 'q3': 2, 'q4': 3, 'v_tcp': 0, 'v_ori': 1,
@@ -46,7 +46,7 @@ class RapidData:
         raise RecordingError(f'{self._source} line {self.line}: {reason}')
 
     def value(self, expression: object) -> Any:
-        """What an expression stands for."""
+        """The value of an expression."""
         if isinstance(expression, list):
             return [self.value(item) for item in expression]
         if isinstance(expression, Call):
@@ -56,7 +56,7 @@ class RapidData:
         return expression
 
     def number(self, expression: object, name: str) -> float:
-        """The number that an expression stands for; `name` is for the refusal."""
+        """The value of an expression that must be a number; `name` is for the error message."""
         value = self.value(expression)
         if not _is_number(value):
             self.fail(f'{name} is {value!r}; a number expected')
@@ -66,8 +66,8 @@ class RapidData:
         *path, last = [target.name, *self._path(target)]
         place: Any = self._values
         for key in path:
-            place = _part(place, key)
-        if path and _part(place, last) is None:
+            place = _element(place, key)
+        if path and _element(place, last) is None:
             self.fail(f'{target.name} has no such part to assign to')
         place[last] = value
 
@@ -129,12 +129,12 @@ class RapidData:
         return position + rotation.apply(object_position), rotation * object_rotation
 
     def tool_is_held(self, name: str) -> bool:
-        return _part(self._values.get(name), 0) is not False
+        return _element(self._values.get(name), 0) is not False
 
     # --- names and functions
 
     def _predefined(self, expression: object) -> str:
-        """The name of what the controller predefines, '' where the module has its own value."""
+        """The name of predefined data, '' if the module declares its own of that name."""
         name = expression.name if isinstance(expression, Reference) else ''
         return '' if name in self._values else name
 
@@ -153,7 +153,7 @@ class RapidData:
             self.fail(f'{reference.name} is not declared in this module')
         value: Any = self._values[reference.name]
         for index in self._path(reference):
-            value = _part(value, index)
+            value = _element(value, index)
             if value is None:
                 self.fail(f'{reference.name} has no such part')
         return copy.deepcopy(value)
@@ -187,8 +187,8 @@ def _are_numbers(value: object, count: int) -> bool:
     return _is_record(value, count) and all(map(_is_number, value))
 
 
-def _part(value: Any, index: Any) -> Any:
-    """A part of an array or record, a datum of all; None if there is no such thing."""
+def _element(value: Any, index: Any) -> Any:
+    """The element of an array or record, or the named value of a dict; None if it is missing."""
     if isinstance(value, dict):
         return value.get(index)
     return value[index] if isinstance(value, list) and index in range(len(value)) else None

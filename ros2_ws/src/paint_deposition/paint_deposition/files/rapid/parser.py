@@ -1,7 +1,7 @@
 """ABB RAPID modules as data: declarations, and procedures as lists of instructions.
 
-RAPID ignores case; every name is kept in lower case here. Blocks (IF, FOR, WHILE, TEST) are not
-executed: an instruction inside one knows it, so that a reader can refuse what it cannot follow.
+RAPID ignores case: names are converted to lower case. Blocks (IF, FOR, WHILE, TEST) are not
+evaluated; an instruction inside one names it, so that the interpreter can refuse it.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ TOKEN = re.compile(
   | (?P<string>"(?:[^"\n]|"")*")
   | (?P<name>[A-Za-z_]\w*)
   | (?P<symbol>:=|<=|>=|<>|[][(){},;:\\+\-*/=<>.?])
-  | (?P<strange>.)
+  | (?P<unknown>.)
     """,
     re.VERBOSE,
 )
-# Operators, and how strongly they bind the values beside them.
-BINDING = {
+# Precedence of the operators.
+PRECEDENCE = {
     '=': 0, '<': 0, '>': 0, '<=': 0, '>=': 0, '<>': 0, 'and': 0, 'or': 0, 'xor': 0, 'div': 0,
     'mod': 0, '+': 1, '-': 1, '*': 2, '/': 2,
 }  # fmt: skip
@@ -39,12 +39,12 @@ class Token(NamedTuple):
 
     @property
     def word(self) -> str:
-        """The text as RAPID compares it, without case; texts of strings keep their quotes."""
+        """The text in lower case, for comparisons; strings keep their quotes."""
         return self.text.lower()
 
 
 class Reference(NamedTuple):
-    """A datum by name, with the indexes and components that follow it."""
+    """A reference to a datum by name, with indexes and components."""
 
     name: str
     indexes: tuple = ()
@@ -52,17 +52,17 @@ class Reference(NamedTuple):
 
 
 class Call(NamedTuple):
-    """A function of values, or an operator: `offs`, '+', '-', '*', '/'."""
+    """A call of a function or operator: `offs`, '+', '-', '*', '/'."""
 
     function: str
     arguments: list
     options: dict
 
 
-def tokens(text: str, source: str) -> Iterator[Token]:
+def tokenize(text: str, source: str) -> Iterator[Token]:
     line = 1
     for match in TOKEN.finditer(text):
-        if match.lastgroup == 'strange':
+        if match.lastgroup == 'unknown':
             raise RecordingError(f'{source} line {line}: {match[0]!r} is not RAPID')
         if match.lastgroup != 'space':
             yield Token(str(match.lastgroup), match[0], line)
@@ -75,7 +75,7 @@ BLOCK_END = {'if': 'endif', 'for': 'endfor', 'while': 'endwhile', 'test': 'endte
 HEADER_END = {
     'else': 'else', 'elseif': 'then', 'case': ':', 'default': ':', 'for': 'do', 'while': 'do',
 }  # fmt: skip
-SKIPPED_TO = {'func': 'endfunc', 'trap': 'endtrap', 'record': 'endrecord', 'alias': ';'}
+SKIPPED_UNTIL = {'func': 'endfunc', 'trap': 'endtrap', 'record': 'endrecord', 'alias': ';'}
 HANDLERS = ('error', 'undo', 'backward')
 
 
@@ -92,7 +92,7 @@ class Instruction:
 
 @dataclass(frozen=True)
 class Declaration:
-    """A datum's type, its value, None where there is none, and the line that declares it."""
+    """The type, value (None without one) and line of a declared datum."""
 
     type: str
     value: object
@@ -101,7 +101,7 @@ class Declaration:
 
 @dataclass
 class Module:
-    """A module's own declarations, and its procedures with their local ones."""
+    """The declarations of a module, local ones included, and its procedures."""
 
     name: str
     data: dict[str, Declaration] = field(default_factory=dict)
@@ -109,178 +109,178 @@ class Module:
 
 
 class ModuleParser:
-    """Reads a module; refuses, with the line, where RAPID ends and something else begins."""
+    """A recursive-descent parser of a module; errors name the line."""
 
     def __init__(self, text: str, source: str) -> None:
-        self._tokens = list(tokens(text, source))
-        self._at = 0
+        self._tokens = list(tokenize(text, source))
+        self._index = 0
         self._source = source
 
     @property
-    def _now(self) -> Token:
-        return self._tokens[self._at]
+    def _current(self) -> Token:
+        return self._tokens[self._index]
 
-    def _next(self) -> Token:
-        token = self._now
-        self._at += token.kind != 'end'
+    def _advance(self) -> Token:
+        token = self._current
+        self._index += token.kind != 'end'
         return token
 
-    def _takes(self, *words: str) -> bool:
-        taken = self._now.word in words
+    def _accept(self, *words: str) -> bool:
+        taken = self._current.word in words
         if taken:
-            self._next()
+            self._advance()
         return taken
 
     def _expect(self, word: str) -> None:
-        if not self._takes(word):
-            self._fail(f'{word!r} expected, found {self._now.text or "the end"!r}')
+        if not self._accept(word):
+            self._fail(f'{word!r} expected, found {self._current.text or "the end"!r}')
 
-    def _name(self, what: str = 'a name') -> str:
-        if self._now.kind != 'name':
-            self._fail(f'{what} expected, found {self._now.text or "the end"!r}')
-        return self._next().word
+    def _expect_name(self, what: str = 'a name') -> str:
+        if self._current.kind != 'name':
+            self._fail(f'{what} expected, found {self._current.text or "the end"!r}')
+        return self._advance().word
 
     def _skip_past(self, word: str) -> None:
-        while not self._takes(word):
-            if self._next().kind == 'end':
+        while not self._accept(word):
+            if self._advance().kind == 'end':
                 self._fail(f'{word} expected before the end')
 
     def _fail(self, reason: str) -> NoReturn:
-        raise RecordingError(f'{self._source} line {self._now.line}: {reason}')
+        raise RecordingError(f'{self._source} line {self._current.line}: {reason}')
 
     # --- values
 
-    def _expression(self, least_binding: int = 0) -> object:
-        value = self._operand()
-        while BINDING.get(self._now.word, -1) >= least_binding:
-            operator = self._next().word
-            value = Call(operator, [value, self._expression(BINDING[operator] + 1)], {})
+    def _parse_expression(self, min_precedence: int = 0) -> object:
+        value = self._parse_operand()
+        while PRECEDENCE.get(self._current.word, -1) >= min_precedence:
+            operator = self._advance().word
+            value = Call(operator, [value, self._parse_expression(PRECEDENCE[operator] + 1)], {})
         return value
 
-    def _operand(self) -> object:
-        if self._takes('-'):
-            value = self._operand()
+    def _parse_operand(self) -> object:
+        if self._accept('-'):
+            value = self._parse_operand()
             return -value if isinstance(value, float) else Call('-', [0.0, value], {})
-        if self._takes('+'):
-            return self._operand()
-        if self._takes('not'):
-            return Call('not', [self._operand()], {})
-        if self._takes('['):
-            return self._arguments(']')[0]
-        if self._takes('('):
-            value = self._expression()
+        if self._accept('+'):
+            return self._parse_operand()
+        if self._accept('not'):
+            return Call('not', [self._parse_operand()], {})
+        if self._accept('['):
+            return self._parse_arguments(']')[0]
+        if self._accept('('):
+            value = self._parse_expression()
             self._expect(')')
             return value
-        if self._now.kind == 'number':
-            return float(self._next().text)
-        if self._now.kind == 'string':
-            return self._next().text[1:-1].replace('""', '"')
-        name = self._name('a value')
+        if self._current.kind == 'number':
+            return float(self._advance().text)
+        if self._current.kind == 'string':
+            return self._advance().text[1:-1].replace('""', '"')
+        name = self._expect_name('a value')
         if name in ('true', 'false'):
             return name == 'true'
-        if self._takes('('):
-            return Call(name, *self._arguments(')'))
-        return self._reference(name)
+        if self._accept('('):
+            return Call(name, *self._parse_arguments(')'))
+        return self._parse_reference(name)
 
-    def _arguments(self, end: str) -> tuple[list, dict]:
-        """Values up to `end`, which is taken too, and options: True for a mere switch."""
+    def _parse_arguments(self, end: str) -> tuple[list, dict]:
+        """Values and options up to and including `end`; an option without a value is True."""
         values: list = []
         options: dict = {}
-        if self._takes(end):
+        if self._accept(end):
             return values, options
         while True:
-            # Options come behind their argument, or before the first one.
-            if self._now.text != '\\':
-                values.append(self._expression())
-            while end in (')', ';') and self._takes('\\'):
-                name = self._name()
-                options[name] = self._expression() if self._takes(':=') else True
-            if not self._takes(','):
+            # Options follow their argument, or precede the first one.
+            if self._current.text != '\\':
+                values.append(self._parse_expression())
+            while end in (')', ';') and self._accept('\\'):
+                name = self._expect_name()
+                options[name] = self._parse_expression() if self._accept(':=') else True
+            if not self._accept(','):
                 self._expect(end)
                 return values, options
 
-    def _reference(self, name: str) -> Reference:
-        indexes = self._arguments('}')[0] if self._takes('{') else []
+    def _parse_reference(self, name: str) -> Reference:
+        indexes = self._parse_arguments('}')[0] if self._accept('{') else []
         components = []
-        while self._takes('.'):
-            components.append(self._name())
+        while self._accept('.'):
+            components.append(self._expect_name())
         return Reference(name, tuple(indexes), tuple(components))
 
     # --- declarations and procedures
 
     def module(self) -> Module:
-        """The whole module."""
+        """Parse the module."""
         self._expect('module')
-        module = Module(self._name())
-        if self._takes('('):
+        module = Module(self._expect_name())
+        if self._accept('('):
             self._skip_past(')')
-        while not self._takes('endmodule'):
-            word = self._now.word
-            if self._takes(*STORAGE):
-                self._declaration(module.data)
-            elif self._takes('proc'):
-                self._procedure(module)
-            elif word in SKIPPED_TO:
-                self._skip_past(SKIPPED_TO[word])
-            elif not self._takes('local', 'task'):
-                self._fail(f'{self._now.text or "the end"!r} is no declaration')
+        while not self._accept('endmodule'):
+            word = self._current.word
+            if self._accept(*STORAGE):
+                self._parse_declaration(module.data)
+            elif self._accept('proc'):
+                self._parse_procedure(module)
+            elif word in SKIPPED_UNTIL:
+                self._skip_past(SKIPPED_UNTIL[word])
+            elif not self._accept('local', 'task'):
+                self._fail(f'{self._current.text or "the end"!r} is no declaration')
         return module
 
-    def _declaration(self, data: dict[str, Declaration]) -> None:
-        line, kind = self._now.line, self._name()
+    def _parse_declaration(self, data: dict[str, Declaration]) -> None:
+        line, kind = self._current.line, self._expect_name()
         while True:
-            name = self._name()
-            if self._takes('{'):
+            name = self._expect_name()
+            if self._accept('{'):
                 self._skip_past('}')
-            value = self._expression() if self._takes(':=') else None
+            value = self._parse_expression() if self._accept(':=') else None
             data[name] = Declaration(kind, value, line)
-            if not self._takes(','):
+            if not self._accept(','):
                 break
         self._expect(';')
 
-    def _procedure(self, module: Module) -> None:
-        name = self._name()
+    def _parse_procedure(self, module: Module) -> None:
+        name = self._expect_name()
         self._expect('(')
         self._skip_past(')')
         body: list[Instruction] = []
         module.procedures[name] = body
         blocks: list[str] = []
-        while not self._takes('endproc'):
-            if self._takes(*STORAGE):
-                self._declaration(module.data)
-            elif self._now.word in HANDLERS and not blocks:
+        while not self._accept('endproc'):
+            if self._accept(*STORAGE):
+                self._parse_declaration(module.data)
+            elif self._current.word in HANDLERS and not blocks:
                 self._skip_past('endproc')
                 break
             else:
-                self._statement(blocks, body)
+                self._parse_statement(blocks, body)
 
     # --- statements
 
-    def _statement(self, blocks: list[str], body: list[Instruction]) -> None:
-        word = self._now.word
-        if blocks and self._takes(BLOCK_END[blocks[-1]]):
+    def _parse_statement(self, blocks: list[str], body: list[Instruction]) -> None:
+        word = self._current.word
+        if blocks and self._accept(BLOCK_END[blocks[-1]]):
             blocks.pop()
-            self._takes(';')
+            self._accept(';')
         elif word in HEADER_END:
             if word in BLOCK_END:
                 blocks.append(word)
             self._skip_past(HEADER_END[word])
-        elif self._takes('if', 'test'):
-            self._expression()
-            if word == 'if' and not self._takes('then'):
-                body.append(self._instruction('if'))  # the compact form
+        elif self._accept('if', 'test'):
+            self._parse_expression()
+            if word == 'if' and not self._accept('then'):
+                body.append(self._parse_instruction('if'))  # the compact form
             else:
                 blocks.append(word)
-        elif self._now.kind == 'name' and self._tokens[self._at + 1].text == ':':
-            self._at += 2  # a label
+        elif self._current.kind == 'name' and self._tokens[self._index + 1].text == ':':
+            self._index += 2  # a label
         else:
-            body.append(self._instruction(blocks[-1] if blocks else ''))
+            body.append(self._parse_instruction(blocks[-1] if blocks else ''))
 
-    def _instruction(self, block: str) -> Instruction:
-        line = self._now.line
-        target = self._reference(self._name())
-        if self._takes(':='):
-            value = self._expression()
+    def _parse_instruction(self, block: str) -> Instruction:
+        line = self._current.line
+        target = self._parse_reference(self._expect_name())
+        if self._accept(':='):
+            value = self._parse_expression()
             self._expect(';')
             return Instruction(':=', [target, value], {}, line, block)
-        return Instruction(target.name, *self._arguments(';'), line, block)
+        return Instruction(target.name, *self._parse_arguments(';'), line, block)

@@ -1,1 +1,1 @@
-"""Bags: ROS 1 and rosbag2 in, MCAP runs in and out, recovery of broken ones."""
+"""Reading ROS 1 and rosbag2 bags, writing MCAP runs, recovering damaged ones."""

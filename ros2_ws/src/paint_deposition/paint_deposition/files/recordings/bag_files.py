@@ -1,7 +1,7 @@
-"""Reading bags of every kind alike: ROS 1 .bag, rosbag2 folder (sqlite3, MCAP), lone .mcap.
+"""One interface to all bags: ROS 1 .bag, rosbag2 folder (sqlite3, MCAP), single .mcap.
 
-Only the types of the topics that are read are parsed: one exotic topic, such as the service
-events that rosbags does not understand, does not make the poses beside it unreadable.
+Only the types of the topics that are read are parsed: a topic that rosbags does not support, such
+as service events, does not make the others unreadable.
 """
 
 import re
@@ -23,7 +23,7 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
 
-# The key of a bag's custom data under which a plan says which topic is its trigger.
+# The key under which the custom data of a plan's bag names its trigger topic.
 TRIGGER = 'trigger_topic'
 ROS2_SUFFIXES = ('.mcap', '.db3')
 
@@ -38,7 +38,7 @@ class BagTopic:
 
 
 class RawMessage(NamedTuple):
-    """A message as the middleware carries it: CDR, also for bags of ROS 1."""
+    """A serialised message, in CDR also for ROS 1 bags."""
 
     topic: str
     type: str
@@ -57,7 +57,7 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
-        # In order of their names, those without messages included.
+        # Sorted by name, topics without messages included.
         self.topics = [BagTopic(*key, count) for key, count in sorted(counts.items())]
 
     def topics_of(self, *types: str) -> list[BagTopic]:
@@ -70,9 +70,7 @@ class Bag:
         return next((topic for topic in self.topics if topic.name.lstrip('/') == wanted), None)
 
     def choose(self, name: str, types: Sequence[str], kind: str) -> BagTopic:
-        """The named topic if it is of one of these types; else a RecordingError names those there
-        are.
-        """
+        """The named topic, which must have one of these types; the error lists those that do."""
         listed = listed_topics(self.topics_of(*types), kind)
         topic = self.find(name)
         if topic is None:
@@ -85,17 +83,17 @@ class Bag:
 
     def type_hash(self, topic: BagTopic) -> str:
         """RIHS01 hash of a topic's type as the bag defines it."""
-        with _reading(self.path):
+        with _read_errors(self.path):
             return self._types(topic.name).hash_rihs01(topic.type)
 
     def decode(self, message: RawMessage) -> Any:
         """The message object of rosbags for one of this bag's messages."""
-        with _reading(self.path):
+        with _read_errors(self.path):
             return self._types(message.topic).deserialize_cdr(message.cdr, message.type)
 
     def messages(self, topics: Sequence[str] = ()) -> Iterator[RawMessage]:
         """Messages of these topics (all, if none are named) in the order of their log time."""
-        with _reading(self.path):
+        with _read_errors(self.path):
             chosen = [c for c in self._reader.connections if not topics or c.topic in topics]
             for connection, log_time_ns, data in self._reader.messages(connections=chosen):
                 topic, type_ = connection.topic, connection.msgtype
@@ -105,12 +103,12 @@ class Bag:
     def decoded(self, topics: Sequence[str]) -> Iterator[tuple[str, int, Any]]:
         """(topic, log time [ns], message object of rosbags) of these topics."""
         # Entered once: for each message it takes as long as decoding.
-        with _reading(self.path):
+        with _read_errors(self.path):
             for topic, type_, log_time_ns, cdr in self.messages(topics):
                 yield topic, log_time_ns, self._types(topic).deserialize_cdr(cdr, type_)
 
     def _types(self, topic: str) -> Typestore:
-        """What a topic's messages consist of; ROS 1's headers as in ROS 2, without a number."""
+        """The types of a topic's messages; headers of ROS 1 as in ROS 2, without `seq`."""
         if topic not in self._stores:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
@@ -133,7 +131,7 @@ def _definitions(connection: Connection) -> dict:
 
 
 def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
-    """The topics of a kind in words."""
+    """The topics of a kind, for a message."""
     if not topics:
         return f'it has no {kind} topic'
     return f'its {kind} topics: {" ".join(topic.name for topic in topics)}'
@@ -141,10 +139,10 @@ def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
 
 @contextmanager
 def open_bag(path: Path | str) -> Iterator[Bag]:
-    """Open a bag; RecordingErrors say what it lacks and the remedy, also while it is read."""
+    """Open a bag; errors, also while it is read, are RecordingErrors with a remedy."""
     path = Path(path)
-    _refuse_what_is_no_bag(path)
-    with _reading(path):
+    _require_bag(path)
+    with _read_errors(path):
         reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
@@ -154,16 +152,16 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 
 def custom_data(path: Path) -> dict[str, str]:
-    """Texts by name that the writer of a rosbag2 folder put into its metadata.yaml."""
+    """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
     try:
         metadata = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
         return dict(metadata['rosbag2_bagfile_information'].get('custom_data') or {})
-    except Exception:  # of an older version, damaged, or no bag: whoever reads it says so
+    except Exception:  # an older version, damaged, or no bag, which reading it reports
         return {}
 
 
 def mcap_files(path: Path) -> list[Path]:
-    """The MCAP files of a run in their order, or the one file given; several runs are refused."""
+    """The MCAP files of a run in order, or the single file; several runs are refused."""
     if path.is_file():
         return [path]
     files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=_number)
@@ -180,7 +178,7 @@ def _number(file: Path) -> tuple[int, str]:
 
 
 def _is_unfinished(path: Path) -> bool:
-    """True for a file that begins as MCAP and does not end as one."""
+    """Whether a file begins as MCAP and does not end as MCAP."""
     length = len(MCAP0_MAGIC)
     with path.open('rb') as stream:
         if stream.read(length) != MCAP0_MAGIC:
@@ -189,7 +187,7 @@ def _is_unfinished(path: Path) -> bool:
         return stream.read() != MCAP0_MAGIC
 
 
-def _refuse_what_is_no_bag(path: Path) -> None:
+def _require_bag(path: Path) -> None:
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
     if path.is_dir():
@@ -215,8 +213,8 @@ def _unfinished(path: Path, reason: str) -> str:
 
 
 @contextmanager
-def _reading(path: Path) -> Iterator[None]:
-    """Whatever the readers raise on a file that is not as it should be becomes one line."""
+def _read_errors(path: Path) -> Iterator[None]:
+    """Turn whatever the readers raise into a RecordingError of one line."""
     try:
         yield
     except RecordingError:

@@ -1,4 +1,4 @@
-"""What a bag holds, at a glance: its topics, and how good its streams of poses are."""
+"""A summary of a bag: its topics, and the quality of its streams of poses."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +29,7 @@ class PoseStream:
 
 @dataclass(frozen=True)
 class BagSummary:
-    """Topics of a bag, its pose streams, and the topics that can serve as trigger."""
+    """Topics of a bag, its pose streams, and the possible trigger topics."""
 
     path: str
     topics: list[BagTopic]
@@ -38,7 +38,7 @@ class BagSummary:
 
 
 def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
-    """Look at every topic of a bag and read its poses; a longer interval is counted as a gap."""
+    """Summarise a bag; an interval longer than ``max_pose_gap_s`` is a gap."""
     with open_bag(path) as bag:
         topics = bag.topics
         triggers = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]

@@ -1,4 +1,4 @@
-"""A bag's poses and trigger as a trajectory, and a trajectory as a bag."""
+"""Reading a trajectory, poses and trigger, from a bag, and writing one."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_to
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE, TF_TYPES
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_switching, unused_triggers
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -27,16 +27,16 @@ if TYPE_CHECKING:
 POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
 POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
-# A trigger may have no stamp; the time it was logged at stands in for it as long as the poses show
-# that the recorder's clock is the robot's.
+# For a trigger without stamps the log times are used, if those of the poses show that recorder and
+# robot have the same clock.
 MAX_CLOCK_OFFSET_S = 1.0
-WRITTEN_DEPTH = 500
+QUEUE_DEPTH = 500
 
 
-def read_trajectory(path: Path | str, *what: Any, **more: Any) -> Trajectory:
-    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a lone .mcap."""
+def read_trajectory(path: Path | str, *args: Any, **kwargs: Any) -> Trajectory:
+    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a single .mcap."""
     with open_bag(path) as bag:
-        return trajectory_of(bag, *what, **more)
+        return trajectory_of(bag, *args, **kwargs)
 
 
 def trajectory_of(
@@ -49,11 +49,11 @@ def trajectory_of(
     """The atomizer's motion from a bag: poses as recorded, unscreened, stamps in nanoseconds.
 
     Args:
-        pose_topic: PoseStamped, or the robot's joint states; None takes the only one.
-        state_topic: see ``read_switching``; None: the gun always sprays, and topics that could be
-            its trigger are noted.
-        tf: [target, source] of transforms instead of poses: source, the TCP, in target.
-        robot: whose joint states are read instead of poses.
+        pose_topic: PoseStamped, or the robot's joint states; None: the only one.
+        state_topic: see ``read_trigger``; None: the gun always sprays, and a note lists the
+            topics that could be its trigger.
+        tf: [target, source] frames of the transforms to read instead of poses; source is the TCP.
+        robot: the robot whose joint states to read instead of poses.
 
     Raises:
         RecordingError: one line that names the bag, what is wrong and what to do.
@@ -70,7 +70,7 @@ def trajectory_of(
         trajectory, log_times_ns = _read_poses(bag, choose_pose_topic(bag, pose_topic))
     if not state_topic:
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
-    gun = read_switching(bag, state_topic)
+    gun = read_trigger(bag, state_topic)
     offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
     if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
         raise RecordingError(
@@ -85,7 +85,7 @@ def trajectory_of(
 
 
 def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
-    """The named PoseStamped topic of a bag, or its only one; the errors list those there are."""
+    """The named PoseStamped topic of a bag, or its only one; errors list the candidates."""
     if not name:
         candidates = bag.topics_of(POSE_TYPE)
         if len(candidates) != 1:
@@ -99,7 +99,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
 
 def _other_motion(bag: Bag) -> str:
-    """What else in a bag has a motion, for a message."""
+    """Other sources of motion in a bag, for a message."""
     moves = []
     if bag.topics_of(*TF_TYPES):
         moves.append('transforms (--tf TARGET SOURCE)')
@@ -146,10 +146,10 @@ def write_pose_bag(
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
 ) -> Path:
-    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped, and its trigger before them.
+    """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped and the trigger.
 
-    The trigger is Bool, or AtomizerState where there is another flow than 0 or 1, or a brush with
-    a number. ``part`` is name and pose of the part's frame, for /tf_static.
+    The trigger is Bool, or AtomizerState for other flows than 0 and 1 and for numbered brushes.
+    ``part`` is name and pose of the part's frame, for /tf_static.
     """
     poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
@@ -161,7 +161,7 @@ def write_pose_bag(
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
     numbers = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
     state_type = STATE_TYPE if levels or numbers.any() else BOOL_TYPE
-    # Behind the time, what comes first of those at one time.
+    # (time, rank at equal times, content): the trigger before the pose.
     entries: list[tuple[int, int, Any]] = [
         (time_ns, 0, (*gun, trajectory.set_points_of(row)))
         for row, (time_ns, *gun) in enumerate(trajectory.triggers)
@@ -175,14 +175,14 @@ def write_pose_bag(
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
             begin_ns, (child, place) = min(time_ns for time_ns, *_ in entries), part
             header = _header(types, begin_ns, trajectory.frame_id)
-            transform = _placed(types, 'Transform', 'Vector3', place.values)
+            transform = _pose_message(types, 'Transform', 'Vector3', place.values)
             stamped = types.types['geometry_msgs/msg/TransformStamped'](header, child, transform)
             cdr = types.serialize_cdr(types.types[TF_TYPES[0]]([stamped]), TF_TYPES[0])
             run.write('/tf_static', bytes(cdr), begin_ns, begin_ns)
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
             header = _header(types, time_ns, trajectory.frame_id)
             if is_pose:
-                pose = _placed(types, 'Pose', 'Point', poses[content].tolist())
+                pose = _pose_message(types, 'Pose', 'Point', poses[content].tolist())
                 cdr = types.serialize_cdr(types.types[POSE_TYPE](header, pose), POSE_TYPE)
             else:
                 cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
@@ -191,14 +191,14 @@ def write_pose_bag(
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
-    qos = [offered_qos(1 if latched else WRITTEN_DEPTH, latched=latched)]
+    qos = [offered_qos(1 if latched else QUEUE_DEPTH, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 
 def _state(
     types: Typestore, kind: str, header: Any, flow: float, brush: int, set_points: tuple
 ) -> Any:
-    """The gun with flow, relative to the calibrated one, brush and set-points."""
+    """A Bool or an AtomizerState with relative flow, brush and set-points."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
     unknown = float('nan')
@@ -206,8 +206,8 @@ def _state(
     return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
 
 
-def _placed(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:
-    """A Pose of a Point or a Transform of a Vector3, with its quaternion."""
+def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:
+    """A Pose with a Point, or a Transform with a Vector3, from x y z qx qy qz qw."""
     make = types.types
     turn = make['geometry_msgs/msg/Quaternion'](*values[3:])
     at = make[f'geometry_msgs/msg/{place}'](*values[:3])

@@ -1,9 +1,9 @@
-"""Headers and set-points of messages, whoever decoded them."""
+"""Stamps and set-points of messages, decoded by rosbags or by rclpy."""
 
 import math
 from typing import Any
 
-# Set-points of a state, in the order of those of a trajectory.
+# Fields of AtomizerState with set-points, in the order of a trajectory's set-points.
 SET_POINTS = ('flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 
 
@@ -13,6 +13,6 @@ def stamp_ns(header: Any) -> int:
 
 
 def set_points_of(state: Any) -> tuple[float, ...]:
-    """The set-points of a state, as those of a trajectory; 0 where it has none."""
+    """The set-points of a state in the order of a trajectory's; 0 for missing ones."""
     known = (abs(float(getattr(state, name, 0.0))) for name in SET_POINTS)
     return tuple(value if math.isfinite(value) else 0.0 for value in known)

@@ -1,4 +1,4 @@
-"""The motion of a robot's tip from its joints: JointState messages and the URDF of the robot."""
+"""Forward kinematics of recorded joint states, by the URDF of the robot."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.motion.trajectory import Trajectory
 
-USUAL_TIP = 'tool0'
+DEFAULT_TIP = 'tool0'
 
 
 @dataclass(frozen=True)
 class Robot:
-    """The chain of joints from a robot's base link to its tip link, as of pytransform3d."""
+    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d."""
 
     path: Path
     base: str
@@ -32,8 +32,8 @@ class Robot:
     def read(path: Path, tip: str | None = None, base: str | None = None) -> Robot:
         """Read a URDF.
 
-        ``tip`` is the TCP, by default tool0 or the only last link; ``base`` the link in which the
-        poses are, by default the root. Raises RecordingError without such links.
+        ``tip`` is the link of the TCP, by default tool0 or the only last link; ``base`` is the
+        frame of the poses, by default the root. Raises RecordingError without such links.
         """
         from pytransform3d.urdf import parse_urdf
 
@@ -52,9 +52,9 @@ class Robot:
         parents = nx.DiGraph([(joint.child, joint.parent, {'joint': joint}) for joint in joints])
         parents.add_nodes_from(link.name for link in links)
         last = sorted(link for link in parents if not parents.in_degree(link))
-        if tip is None and USUAL_TIP not in parents and len(last) != 1:
+        if tip is None and DEFAULT_TIP not in parents and len(last) != 1:
             raise RecordingError(f'{path} ends in {" ".join(last)}; name one with --tip')
-        tip = tip or (USUAL_TIP if USUAL_TIP in parents else last[0])
+        tip = tip or (DEFAULT_TIP if DEFAULT_TIP in parents else last[0])
         base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
             if name not in parents:
@@ -66,7 +66,7 @@ class Robot:
         return Robot(path, base, tip, [parents.edges[pair]['joint'] for pair in way][::-1])
 
     @property
-    def moving(self) -> list[str]:
+    def moving_joints(self) -> list[str]:
         """Names of the joints that move."""
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
 
@@ -93,10 +93,10 @@ class Robot:
 def read_joint_poses(
     bag: Bag, robot: Robot, topic_name: str | None
 ) -> tuple[Trajectory, np.ndarray]:
-    """The motion of a robot's tip from joint states, and when they were logged (N,) [ns].
+    """The motion of a robot's tip from joint states, and their log times (N,) [ns].
 
-    Joints in messages of their own are interpolated at the times of the one that comes most often.
-    Raises RecordingError without joint states of all joints.
+    Joints in separate messages are interpolated at the times of the most frequent one. Raises
+    RecordingError without joint states of all joints.
     """
     if not topic_name:
         topics = [topic for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]
@@ -105,7 +105,7 @@ def read_joint_poses(
             raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
         topic_name = topics[0].name
     topic = bag.choose(topic_name, (JOINT_TYPE,), 'JointState')
-    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving}
+    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving_joints}
     seen: set[str] = set()
     for _, log_time_ns, message in bag.decoded([topic.name]):
         stamp = stamp_ns(message.header)
@@ -132,7 +132,7 @@ def read_joint_poses(
     positions, quaternions = robot.poses(np.stack(values, axis=1))
     note = (
         f"joints: pose of '{robot.tip}' in '{robot.base}' by {robot.path.name}, from "
-        f'{" ".join(robot.moving)} on {topic.name}, {len(stamps)} poses'
+        f'{" ".join(robot.moving_joints)} on {topic.name}, {len(stamps)} poses'
     )
     trajectory = Trajectory(stamps, positions, quaternions, robot.base, notes=(note,))
     return trajectory, log_times[known]

@@ -1,4 +1,4 @@
-"""Unfinished or damaged MCAP runs: what can still be read, as a whole rosbag2 folder."""
+"""Recovery of unfinished or damaged MCAP runs into a complete rosbag2 folder."""
 
 import shutil
 import struct
@@ -27,7 +27,7 @@ from paint_deposition.files.recordings.message_definitions import Definition
 
 MAX_CHUNK_BYTES = 256 * 1024 * 1024
 HEAD_BYTES = 9  # opcode and length of a record
-# What the readers raise on bytes that are not what they should be.
+# Exceptions of the readers on damaged data.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
     OverflowError,
@@ -36,13 +36,13 @@ DAMAGE = (
 
 @dataclass
 class Recovery:
-    """What came out of a damaged run.
+    """The result of a recovery.
 
     Attributes:
         folder: the new run. counts: messages by topic.
-        damaged_chunks: chunks left out because their content is broken.
-        breaks: where and why reading stopped, a line for each file that is not whole.
-        skipped_topics: those that no rosbag2 folder can hold (not CDR, or without a schema).
+        damaged_chunks: number of chunks left out because their content is damaged.
+        breaks: where and why reading stopped, one line for each incomplete file.
+        skipped_topics: topics that a rosbag2 folder cannot hold (not CDR, or without a schema).
     """
 
     folder: Path
@@ -64,7 +64,7 @@ def recover(
 ) -> Recovery:
     """Copy every readable message of an .mcap file or a run's folder into the new run `folder`.
 
-    QoS, type hashes, custom data and distribution come along.
+    QoS, type hashes, custom data and distribution are copied as well.
 
     Args:
         on_bytes: called with the number of bytes read, for a progress bar.
@@ -102,24 +102,24 @@ def _copy(
 ) -> None:  # fmt: skip
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
-    try:  # the chunk that introduces a channel may be damaged; the end of a file repeats them
+    try:  # the summary repeats all channels, in case the chunk that defines one is damaged
         with file.open('rb') as stream:
             reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
             if summary := reader.get_summary():
                 schemas, channels = dict(summary.schemas), dict(summary.channels)
-    except (*DAMAGE, OSError):  # too short for an end, too
+    except (*DAMAGE, OSError):  # no summary
         pass
     for record in _records(file, recovery, on_bytes):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Metadata) and record.name == 'rosbag2':
-            _take_information(record, writer)
+            _copy_metadata(record, writer)
         elif isinstance(record, Channel):
             channels[record.id] = record
         if isinstance(record, Channel | Message):
             channel = record if isinstance(record, Channel) else channels.get(record.channel_id)
             if channel is not None and (not topics or channel.topic in topics):
-                kept = _is_kept(channel, schemas.get(channel.schema_id), writer, recovery)
+                kept = _ensure_topic(channel, schemas.get(channel.schema_id), writer, recovery)
                 if kept and isinstance(record, Message):
                     writer.write(channel.topic, record.data, record.log_time, record.publish_time)
 
@@ -127,13 +127,16 @@ def _copy(
 def _records(
     file: Path, recovery: Recovery, on_bytes: Callable[[int], None]
 ) -> Iterator[McapRecord]:
-    """Records up to the break, which is noted, those of chunks among them."""
+    """The records up to the break, which is noted, including those in chunks."""
     size, start = file.stat().st_size, len(MCAP0_MAGIC)
     with file.open('rb') as stream:
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
-                yield from _opened(record, recovery) if isinstance(record, Chunk) else [record]
+                if isinstance(record, Chunk):
+                    yield from _chunk_records(record, recovery)
+                else:
+                    yield record
                 if isinstance(record, Footer):
                     return
                 on_bytes(stream.tell() - start)
@@ -143,10 +146,10 @@ def _records(
             reason = 'the end is missing' if cut else str(error)
             recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
             stream.seek(start)
-            yield from _readable_beginning(stream.read(MAX_CHUNK_BYTES))
+            yield from _truncated_chunk_records(stream.read(MAX_CHUNK_BYTES))
 
 
-def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
+def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
     try:
         if chunk.uncompressed_size > MAX_CHUNK_BYTES:
             raise ValueError('no recorder makes chunks of that size')
@@ -156,10 +159,10 @@ def _opened(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
         return []
 
 
-def _readable_beginning(record: bytes) -> Iterator[McapRecord]:
-    """The whole records in a cut chunk; its checksum covers all of it and cannot be checked.
+def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
+    """The complete records in a truncated chunk, whose checksum cannot be verified.
 
-    Recorders that close a chunk at a megabyte leave half a minute of poses in the last, cut one.
+    With chunks of a megabyte, the last one may hold half a minute of poses.
     """
     if record[:1] != bytes([Opcode.CHUNK]):
         return
@@ -176,8 +179,8 @@ def _readable_beginning(record: bytes) -> Iterator[McapRecord]:
         return
 
 
-def _take_information(record: Metadata, writer: RunWriter) -> None:
-    """Custom data and distribution, as rosbag2 noted them last."""
+def _copy_metadata(record: Metadata, writer: RunWriter) -> None:
+    """Copy custom data and distribution from the metadata record of rosbag2."""
     try:
         content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
         writer.custom_data = {k: str(v) for k, v in (content.get('custom_data') or {}).items()}
@@ -186,10 +189,10 @@ def _take_information(record: Metadata, writer: RunWriter) -> None:
         return
 
 
-def _is_kept(
+def _ensure_topic(
     channel: Channel, schema: Schema | None, writer: RunWriter, recovery: Recovery
 ) -> bool:
-    """Make a channel's topic known to the writer, unless no rosbag2 folder can hold it."""
+    """Add a channel's topic to the writer; False if a rosbag2 folder cannot hold it."""
     if channel.topic in writer.counts:
         return True
     if schema is None or channel.message_encoding != 'cdr':

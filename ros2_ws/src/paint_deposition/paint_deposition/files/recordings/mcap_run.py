@@ -1,4 +1,4 @@
-"""A run on disk: serialised messages in exactly the MCAP layout that rosbag2 writes.
+"""Writing a run: serialised messages in the MCAP layout of rosbag2.
 
 A folder `<run>/` with `<run>_0.mcap` and, once the run is complete, `metadata.yaml` (version 9).
 The folder without `metadata.yaml` is an unfinished run, as it is for rosbag2.
@@ -27,12 +27,12 @@ from paint_deposition.files.recordings.message_definitions import Definition
 
 METADATA_VERSION = 9
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
-# What is not yet in a closed chunk is lost when the process is killed, so chunks are closed by
-# size and by age. At 250 Hz the default megabyte of mcap would hold half a minute of poses.
+# A killed process loses its open chunk, so chunks are closed by size and by age. At 250 Hz the
+# default megabyte of mcap would hold half a minute of poses.
 CHUNK_BYTES = 64 * 1024
 CHUNK_SECONDS = 0.5
 NO_TIME_NS = 2**63 - 1
-# With all indexes, mcap writes the offset of an empty attachment group, which checkers refuse.
+# With all indexes, mcap writes the offset of an empty attachment group, which is invalid.
 INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
 
 FOREVER = QosTime(9223372036, 854775807)
@@ -48,7 +48,7 @@ def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos
 
 @dataclass(frozen=True)
 class RunTopic:
-    """What a bag says of a topic; `qos` are the profiles its publishers offered."""
+    """The metadata of a topic; `qos` are the profiles that its publishers offered."""
 
     name: str
     type: str
@@ -59,10 +59,10 @@ class RunTopic:
 class RunWriter:
     """Writes serialised messages into a new run folder.
 
-    Call `close_old_chunk` a few times a second from a live recorder: a killed process then loses
+    A live recorder calls `close_old_chunk` a few times a second, so that a killed process loses
     at most the last half second and the time to the next call. Any OSError (a full disk) closes
     the file as it is and raises RecordingError; nothing is written after that, and `recover`
-    reads what is there. Use as a context manager: an exception leaves the run unfinished.
+    reads the unfinished run. As a context manager, an exception leaves the run unfinished.
 
     Args:
         folder: the run to create; it must not exist.
@@ -103,7 +103,7 @@ class RunWriter:
         self._writer = Writer(
             self._stream, CHUNK_BYTES, COMPRESSIONS[compression], index_types=INDEXES
         )
-        with self._guarded():
+        with self._write_errors():
             self._writer.start(profile='ros2', library='paint_deposition')
             self._write_metadata_record()
             self._writer.flush()
@@ -113,10 +113,10 @@ class RunWriter:
         return sum(self.counts.values())
 
     def add_topic(self, topic: RunTopic) -> None:
-        """Make a topic known; one that never gets a message is still listed in the metadata."""
+        """Add a topic, which is listed in the metadata even without messages."""
         if topic.name in self._topics:
             raise RecordingError(f'{topic.name} is already recorded in {self.folder}')
-        with self._guarded():
+        with self._write_errors():
             if topic.type not in self._schemas:
                 definition = topic.definition
                 self._schemas[topic.type] = self._writer.register_schema(
@@ -133,8 +133,8 @@ class RunWriter:
         self.counts[topic.name] = 0
 
     def write(self, topic: str, cdr: bytes, log_time_ns: int, publish_time_ns: int) -> None:
-        """Append a message: when it was received, and when its publisher sent it."""
-        with self._guarded():
+        """Append a message, with the times at which it was received and sent."""
+        with self._write_errors():
             self._writer.add_message(
                 self._channels[topic], log_time_ns, cdr, publish_time_ns, self.counts[topic]
             )
@@ -149,7 +149,7 @@ class RunWriter:
         """Hand the open chunk to the operating system if it is older than half a second."""
         opened = self._chunk_opened_s
         if opened is not None and time.monotonic() - opened >= CHUNK_SECONDS:
-            with self._guarded():
+            with self._write_errors():
                 self._writer.flush()
             self._chunk_opened_s = None
 
@@ -157,14 +157,14 @@ class RunWriter:
         """Complete the run and return its folder."""
         if self.complete:
             return self.folder
-        with self._guarded():
+        with self._write_errors():
             self._writer.flush()
             self._write_metadata_record()
             self._writer.finish()
             self._stream.flush()
             os.fsync(self._stream.fileno())
             self._stream.close()
-            information = {'rosbag2_bagfile_information': self._information()}
+            information = {'rosbag2_bagfile_information': self._metadata()}
             write_text(self.folder / 'metadata.yaml', _yaml(information))
         self.complete = True
         return self.folder
@@ -183,8 +183,8 @@ class RunWriter:
             self.abandon()
 
     @contextmanager
-    def _guarded(self) -> Iterator[None]:
-        """Around every write; the first failure is the last write."""
+    def _write_errors(self) -> Iterator[None]:
+        """Turn an OSError into a RecordingError; nothing can be written after the first."""
         if self._failure:
             raise RecordingError(self._failure)
         try:
@@ -194,14 +194,14 @@ class RunWriter:
                 f'{self.folder} is incomplete after {self.message_count} messages: '
                 f'{error.strerror or error}; run `paint recover {self.folder}`'
             )
-            # Closing below the buffer drops what the full disk did not take.
+            # Closing the raw file discards the buffer, which cannot be written.
             self._raw.close()
             raise RecordingError(self._failure) from None
 
     def _write_metadata_record(self) -> None:
-        self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._information())})
+        self._writer.add_metadata('rosbag2', {'serialized_metadata': _yaml(self._metadata())})
 
-    def _information(self) -> dict:
+    def _metadata(self) -> dict:
         duration_ns = self._last_ns - self._first_ns if self.message_count else 0
         times = {
             'starting_time': {'nanoseconds_since_epoch': self._first_ns},

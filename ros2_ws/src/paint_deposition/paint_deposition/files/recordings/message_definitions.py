@@ -1,4 +1,4 @@
-"""Message definitions as rosbag2 stores them beside the messages: text with dependencies, hash."""
+"""Message definitions as rosbag2 stores them: text with dependencies, and type hash."""
 
 import functools
 import json
@@ -13,9 +13,9 @@ from rosbags.typesys.store import Typestore
 from paint_deposition.errors import RecordingError
 
 SEPARATOR = '=' * 80
-# The layout of messages that this package serialises itself, without a ROS installation.
+# Definitions of the messages that are serialised without a ROS installation.
 STANDARD_STORE = Stores.ROS2_KILTED
-# Messages that hold motion beside poses.
+# Other messages with motion than PoseStamped.
 JOINT_TYPE = 'sensor_msgs/msg/JointState'
 TF_TYPES = ('tf2_msgs/msg/TFMessage', 'tf/msg/tfMessage')
 # The state of the atomizer, as `paint_msgs` defines it.
@@ -47,9 +47,9 @@ class Definition:
 
 @functools.cache
 def installed(message_type: str) -> Definition:
-    """Definition of `pkg/msg/Type` from the installation that serialises it.
+    """Definition of `pkg/msg/Type` from the ROS installation.
 
-    Raises RecordingError when the installation has no such message.
+    Raises RecordingError if it has no such message.
     """
     texts: dict[str, str] = {}  # each type once, depth first, as rosbag2 orders them
 
@@ -71,7 +71,7 @@ def installed(message_type: str) -> Definition:
 
 @functools.cache
 def own_types() -> Typestore:
-    """Messages that can be written without any installation: the common ones, and the state."""
+    """Types of messages that can be written without ROS: the common ones and AtomizerState."""
     store = get_typestore(STANDARD_STORE)
     store.register(get_types_from_msg(STATE_TEXT, STATE_TYPE))
     return store
@@ -79,7 +79,7 @@ def own_types() -> Typestore:
 
 @functools.cache
 def standard(message_type: str) -> Definition:
-    """Definition of a message that can be written without any installation."""
+    """Definition of a message that can be written without ROS."""
     store = own_types()
     text, _ = store.generate_msgdef(message_type, ros_version=2)
     return Definition(text, store.hash_rihs01(message_type))

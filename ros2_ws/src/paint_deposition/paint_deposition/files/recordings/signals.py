@@ -1,4 +1,4 @@
-"""A signal of the cell: a number or Bool in a field of any message, and when it means on."""
+"""Signals of the cell: a number or Bool in a field of any message, and when it is on."""
 
 from __future__ import annotations
 
@@ -18,10 +18,10 @@ STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
 
 @dataclass(frozen=True)
 class Signal:
-    """What is meant by ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
+    """A signal such as ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
 
-    ``path`` is '' for a message that has one field, ``data``; ``level`` is that beyond which, or
-    ``below`` which, it is on.
+    ``path`` of the field is '' for the field ``data`` of std_msgs. The signal is on above
+    ``level``, or under it if ``below`` is set.
     """
 
     topic: str
@@ -30,18 +30,18 @@ class Signal:
     level: float = 0.0
 
     @staticmethod
-    def of(text: str) -> Signal | None:
-        """The signal that a text names, None if it names none; a wrong level is refused."""
-        said = SYNTAX.fullmatch(text.strip())
-        if said is None:
+    def parse(text: str) -> Signal | None:
+        """Parse a signal, None for other text; raises RecordingError for an invalid level."""
+        match = SYNTAX.fullmatch(text.strip())
+        if match is None:
             return None
         try:
-            level = float(said['level'] or 0.0)
+            level = float(match['level'] or 0.0)
         except ValueError:
             raise RecordingError(
-                f"{text}: '{said['level']}' is no number; give a level, 12 say"
+                f"{text}: '{match['level']}' is no number; give a level such as 12"
             ) from None
-        return Signal(said['topic'], said['path'], said['side'] == '<', level)
+        return Signal(match['topic'], match['path'], match['side'] == '<', level)
 
     def value(self, message: Any) -> float | None:
         """The number in a message, None where there is none."""
@@ -56,5 +56,5 @@ class Signal:
         return float(value) if known else None
 
     def is_on(self, values: Any) -> Any:
-        """Whether a value, or each of an array, means on."""
+        """Whether the signal is on at a value, or at each of an array."""
         return values < self.level if self.below else values > self.level

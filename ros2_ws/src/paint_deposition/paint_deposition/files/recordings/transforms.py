@@ -1,4 +1,4 @@
-"""The frames of a recording, from its transforms: /tf_static, part_pose, and /tf over time."""
+"""The transforms of a recording: /tf_static, part_pose, and /tf over time."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
 
 @dataclass(frozen=True, eq=False)
 class Edge:
-    """A frame in its parent's: (N,) int64 stamps, (N,) log times, (N, 7) x y z qx qy qz qw."""
+    """Poses of a frame in its parent: (N,) stamps, (N,) log times, (N, 7) x y z qx qy qz qw."""
 
     parent: str
     child: str
@@ -33,7 +33,7 @@ class Edge:
 
 
 def part_pose_topics(bag: Bag) -> list[str]:
-    """The topics of a bag on which painting nodes published where the part stood."""
+    """The topics of a bag on which painting nodes published the pose of the part."""
     topics = [topic.name for topic in bag.topics_of(PART_POSE_TYPE)]
     return [name for name in topics if name.rsplit('/', 1)[-1] == PART_POSE_TOPIC]
 
@@ -52,13 +52,13 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
                 t, q = transform.transform.translation, transform.transform.rotation
                 pose = t.x, t.y, t.z, q.x, q.y, q.z, q.w
                 found[pair].append((stamp_ns(transform.header), log_time_ns, pose))
-    for (parent, child), placings in parts.items():
-        if len({pose for *_, pose in placings}) > 1:
+    for (parent, child), poses in parts.items():
+        if len({pose for *_, pose in poses}) > 1:
             raise RecordingError(
                 f"{bag.path}: '{child}' was placed anew in '{parent}' while the run was recorded; "
                 'give --part-pose'
             )
-    # Of a static transform that is sent again, the last holds, as in tf2.
+    # The last static transform replaces earlier ones, as in tf2.
     last = slice(-1, None) if static else slice(None)
     return [_edge(*pair, its[last]) for pair, its in (parts | rows).items()]
 
@@ -69,8 +69,8 @@ def _edge(parent: str, child: str, rows: list[tuple]) -> Edge:
     return Edge(parent, child, stamps[first], log_times[first], poses[first].astype(float))
 
 
-def _pairs(graph: nx.Graph, begin: str, end: str) -> list[tuple[str, str]]:
-    """The steps from one frame to another, none where they are not connected."""
+def _edges_between(graph: nx.Graph, begin: str, end: str) -> list[tuple[str, str]]:
+    """The edges from one frame to another, none if they are not connected."""
     try:
         return list(nx.utils.pairwise(nx.shortest_path(graph, begin, end)))
     except (nx.NodeNotFound, nx.NetworkXNoPath):
@@ -78,8 +78,8 @@ def _pairs(graph: nx.Graph, begin: str, end: str) -> list[tuple[str, str]]:
 
 
 @dataclass(frozen=True)
-class _Way:
-    """The edges from one frame to another, and those of them that move."""
+class _Chain:
+    """The chain of transforms from one frame to another, and those of them that move."""
 
     source: str
     target: str
@@ -87,18 +87,18 @@ class _Way:
     moving: list[Edge]
 
     @staticmethod
-    def in_bag(bag: Bag, source: str, target: str) -> tuple[_Way | None, list[str]]:
-        """The way, None where the frames are not connected, and the names of all frames."""
+    def from_bag(bag: Bag, source: str, target: str) -> tuple[_Chain | None, list[str]]:
+        """The chain, None if the frames are not connected, and the names of all frames."""
         graph = nx.Graph()
         for moves in (False, True):
             for edge in _edges(bag, static=not moves):
                 graph.add_edge(edge.parent, edge.child, edge=edge, moves=moves)
         source, target = source.lstrip('/'), target.lstrip('/')
-        steps = [graph.edges[pair] for pair in _pairs(graph, source, target)]
+        steps = [graph.edges[pair] for pair in _edges_between(graph, source, target)]
         if not steps:
             return None, sorted(graph)
         edges, moving = ([s['edge'] for s in steps if s['moves'] or not m] for m in (False, True))
-        return _Way(source, target, edges, moving), sorted(graph)
+        return _Chain(source, target, edges, moving), sorted(graph)
 
     def poses(self, stamps_ns: np.ndarray) -> np.ndarray:
         """Poses (N, 7) of the source in the target at these times, x y z qx qy qz qw."""
@@ -112,7 +112,7 @@ class _Way:
 
         frames = TemporalTransformManager()
         for edge in self.edges:
-            # It takes the scalar of a quaternion first.
+            # pytransform3d has the scalar of a quaternion first.
             scalar_first = edge.poses[:, [0, 1, 2, 6, 3, 4, 5]]
             moved: Any = StaticTransform(transform_from_pq(scalar_first[0]))
             if len(edge.stamps_ns) > 1:
@@ -125,7 +125,7 @@ class _Way:
 
 
 def _covered(moving: list[Edge], stamps_ns: np.ndarray) -> np.ndarray:
-    """Whether all that moves is known at these times (N,)."""
+    """Whether all moving transforms are known at these times (N,)."""
     known = np.ones(len(stamps_ns), dtype=bool)
     for edge in moving:
         known &= (stamps_ns >= edge.stamps_ns[0]) & (stamps_ns <= edge.stamps_ns[-1])
@@ -133,34 +133,34 @@ def _covered(moving: list[Edge], stamps_ns: np.ndarray) -> np.ndarray:
 
 
 def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.ndarray]:
-    """The motion of ``source``, the TCP, in ``target``, and when its poses were logged (N,) [ns].
+    """The motion of ``source``, the TCP, in ``target``, and the log times (N,) [ns].
 
-    It lasts while all transforms of the way are known; between those that come most often the
-    others are interpolated. Raises RecordingError for frames that are not there, not connected, or
-    do not move.
+    It covers the time in which all transforms of the chain are known, with the stamps of the most
+    frequent one; others are interpolated. Raises RecordingError for frames that are missing, not
+    connected, or do not move.
     """
     target, source = target.lstrip('/'), source.lstrip('/')
-    way, frames = _Way.in_bag(bag, source, target)
+    chain, frames = _Chain.from_bag(bag, source, target)
     for name in (target, source):
         if name not in frames:
             known = did_you_mean(name, frames)
             raise RecordingError(f"{bag.path} has no frame '{name}' in its transforms; {known}")
-    if way is None:
+    if chain is None:
         raise RecordingError(f"{bag.path}: no transforms lead from '{source}' to '{target}'")
-    if not way.moving or max(len(edge.stamps_ns) for edge in way.moving) < 2:
+    if not chain.moving or max(len(edge.stamps_ns) for edge in chain.moving) < 2:
         raise RecordingError(f"{bag.path}: '{source}' does not move in '{target}'")
-    clock = max(way.moving, key=lambda edge: len(edge.stamps_ns))
-    moving = [edge for edge in way.moving if len(edge.stamps_ns) > 1]
+    clock = max(chain.moving, key=lambda edge: len(edge.stamps_ns))
+    moving = [edge for edge in chain.moving if len(edge.stamps_ns) > 1]
     covered = _covered(moving, clock.stamps_ns)
     stamps = clock.stamps_ns[covered]
     if len(stamps) < 2:
         raise RecordingError(
             f"{bag.path}: the transforms from '{source}' to '{target}' are never known together"
         )
-    poses = way.poses(stamps)
+    poses = chain.poses(stamps)
     note = f"tf: pose of '{source}' in '{target}', {len(stamps)} poses"
-    if more := len(way.moving) - 1:
-        longest_s = max(np.diff(edge.stamps_ns).max(initial=0) for edge in way.moving) * 1e-9
+    if more := len(chain.moving) - 1:
+        longest_s = max(np.diff(edge.stamps_ns).max(initial=0) for edge in chain.moving) * 1e-9
         note += f', {more} more transforms interpolated over up to {longest_s:.3g} s'
     trajectory = Trajectory(stamps, poses[:, :3], poses[:, 3:], target, notes=(note,))
     return trajectory, clock.log_times_ns[covered]
@@ -169,19 +169,19 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
 def poses_over_time(
     bag: Bag, frame: str, parent: str, stamps_ns: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """Which of these times (N,) the transforms of a frame in another cover, and its poses (M, 7).
+    """Which of these times (N,) the transforms cover, and the poses (M, 7) of the frame then.
 
-    None where the frames are not connected.
+    None if the frames are not connected.
     """
-    way, _ = _Way.in_bag(bag, frame, parent)
-    if way is None:
+    chain, _ = _Chain.from_bag(bag, frame, parent)
+    if chain is None:
         return None
-    known = _covered(way.moving, stamps_ns)
-    return known, way.poses(stamps_ns[known]) if known.any() else np.empty((0, 7))
+    known = _covered(chain.moving, stamps_ns)
+    return known, chain.poses(stamps_ns[known]) if known.any() else np.empty((0, 7))
 
 
 class StaticFrames:
-    """Frames that stand still to one another."""
+    """The static transforms of a recording."""
 
     def __init__(self, edges: Sequence[Edge]) -> None:
         self._graph = nx.Graph()
@@ -190,30 +190,31 @@ class StaticFrames:
             self._graph.add_edge(edge.parent, edge.child, child=edge.child, place=place)
 
     @staticmethod
-    def in_bag(bag: Bag) -> StaticFrames:
-        """Those of /tf_static and part_pose."""
+    def from_bag(bag: Bag) -> StaticFrames:
+        """The transforms of /tf_static and part_pose."""
         return StaticFrames(_edges(bag, static=True))
 
     @property
     def places(self) -> list[tuple[str, str, Rigid]]:
-        """Each frame in its parent's: (parent, child, pose)."""
+        """All transforms: (parent, child, pose)."""
         return [
             (a if edge['child'] == b else b, edge['child'], edge['place'])
             for a, b, edge in self._graph.edges(data=True)
         ]
 
     def pose_of(self, frame: str, parent: str) -> Rigid | None:
-        """The pose of a frame in another, None where they are not connected."""
+        """The pose of a frame in another, None if they are not connected."""
         found = None
-        for here, there in _pairs(self._graph, parent.lstrip('/'), frame.lstrip('/')):
+        for here, there in _edges_between(self._graph, parent.lstrip('/'), frame.lstrip('/')):
             edge = self._graph.edges[here, there]
             step = edge['place'] if edge['child'] == there else edge['place'].inverse()
             found = found @ step if found else Rigid.of([0, 0, 0, 0, 0, 0, 1]) @ step
         return found
 
     def words(self, frame_id: str) -> str:
-        """The frames that could be the part's, for a message; nothing where there is none."""
-        if frame_id.lstrip('/') not in self._graph:
+        """The frames that are static relative to this one, for a message; '' without any."""
+        name = frame_id.lstrip('/')
+        if name not in self._graph:
             return ''
-        known = nx.node_connected_component(self._graph, frame_id.lstrip('/'))
-        return f' (it stands still to {", ".join(sorted(known - {frame_id.lstrip("/")}))})'
+        others = nx.node_connected_component(self._graph, name) - {name}
+        return f' (static transforms connect it to {", ".join(sorted(others))})'

@@ -1,4 +1,4 @@
-"""When the gun was on: AtomizerState, Bool, or a number in any field of any message."""
+"""The trigger of a recording: AtomizerState, Bool, or a number in a field of any message."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from paint_deposition.motion.trajectory import numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
-# What a state says of the process while the gun sprays.
+# Fields of AtomizerState that are summarised while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 MOST_FIELDS = 12
 
 
 @dataclass(frozen=True)
-class Switching:
-    """How the gun was switched.
+class RecordedTrigger:
+    """The trigger changes of a recording.
 
     Attributes:
-        stamps_ns: (M,) int64 times of the changes, those of the log where ``by_log_time``.
-        flow: (M,) from then on.
-        brush: (M,) int64 from then on; empty where it is not recorded.
-        set_points: (M, 4) as those of a trajectory; empty where none are recorded.
-        settings: median of each setting in the states.
-        notes: what was understood, a line each.
+        stamps_ns: (M,) int64 times of the changes; log times if ``by_log_time``.
+        flow: (M,) relative flow from then on.
+        brush: (M,) int64 brush from then on; empty if it is not recorded.
+        set_points: (M, 4) as in a trajectory; empty if none are recorded.
+        settings: median of each setting while the gun sprays.
+        notes: how the trigger was interpreted, one line each.
     """
 
     stamps_ns: np.ndarray
@@ -51,8 +51,8 @@ def choose_state_topic(bag: Bag, name: str) -> BagTopic:
 
 
 def unused_triggers(bag: Bag) -> tuple[str, ...]:
-    """One note that names the topics that could be the trigger; none where there are none."""
-    # States say what they are, a Bool may be anything: the first is the likeliest trigger.
+    """A note on the topics that could be the trigger, if any."""
+    # AtomizerState is listed first, since a Bool may be anything.
     topics = [topic for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE) if topic.message_count]
     if not topics:
         return ()
@@ -64,18 +64,18 @@ def unused_triggers(bag: Bag) -> tuple[str, ...]:
     )
 
 
-def read_switching(bag: Bag, name: str) -> Switching:
-    """How a topic of AtomizerState (header stamps) or Bool (log times) switched the gun.
+def read_trigger(bag: Bag, name: str) -> RecordedTrigger:
+    """Read the trigger from a topic of AtomizerState (header stamps) or Bool (log times).
 
-    Or a field of other messages and, where it is not 0, the level beyond which the gun is on:
-    ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``. Raises RecordingError where there is
-    no such topic or field, or it is no switch.
+    Or from a field of other messages, with the level beyond which the gun is on unless it is 0:
+    ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``. Raises RecordingError if there is no
+    such topic or field, or if it is no number.
     """
-    signal = Signal.of(name)
+    signal = Signal.parse(name)
     topic = bag.find(signal.topic) if signal else None
     if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
         return _states(bag, choose_state_topic(bag, name))
-    rows = sorted(_values(bag, topic, signal), key=lambda row: row[0])
+    rows = sorted(_signal_values(bag, topic, signal), key=lambda row: row[0])
     known = [row for row in rows if math.isfinite(row[1])]
     if not known:
         raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
@@ -87,11 +87,12 @@ def read_switching(bag: Bag, name: str) -> Switching:
     if left_out := len(rows) - len(known):
         note += f'; {left_out} values that are no number are left out'
     on, by_log = signal.is_on(values), not all(stamped for *_, stamped in rows)
-    return Switching(stamps, on.astype(float), numbered([]), by_log_time=by_log, notes=(note,))
+    flow = on.astype(float)
+    return RecordedTrigger(stamps, flow, numbered([]), by_log_time=by_log, notes=(note,))
 
 
-def _states(bag: Bag, topic: BagTopic) -> Switching:
-    """Changes of AtomizerState or Bool; a state without a brush is of the only one."""
+def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
+    """The changes on a topic of AtomizerState or Bool; without a brush, the only one."""
     changes: list[tuple[int, float, int, tuple[float, ...]]] = []
     settings: dict[str, list[float]] = {}
     without_flow = 0
@@ -117,7 +118,7 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     changes.sort(key=lambda change: change[0])
     set_points = np.array([points for *_, points in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
-    return Switching(
+    return RecordedTrigger(
         np.array([stamp for stamp, *_ in changes], dtype=np.int64),
         np.array([flow for _, flow, *_ in changes], dtype=float),
         numbered([brush for _, _, brush, _ in changes]),
@@ -128,19 +129,19 @@ def _states(bag: Bag, topic: BagTopic) -> Switching:
     )
 
 
-def _values(bag: Bag, topic: BagTopic, signal: Signal) -> Iterator[tuple[int, float, bool]]:
-    """(time, value, whether the time is the message's own stamp) of each message."""
+def _signal_values(bag: Bag, topic: BagTopic, signal: Signal) -> Iterator[tuple[int, float, bool]]:
+    """(time, value, whether the time is a header stamp) of each message."""
     for _, log_time_ns, message in bag.decoded([topic.name]):
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         value = signal.value(message)
         if value is None:
-            raise RecordingError(_no_field(bag, topic, message, signal.path))
+            raise RecordingError(_missing_field(bag, topic, message, signal.path))
         yield stamp or log_time_ns, value, bool(stamp)
 
 
-def _no_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:
-    """What is wrong with a field, and those that could be meant."""
-    found = [f'{topic.name}{switch}' for switch in _switches(message)]
+def _missing_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:
+    """The error message for a missing field, with those that exist."""
+    found = [f'{topic.name}{switch}' for switch in _numeric_fields(message)]
     listed = ' '.join(found[:MOST_FIELDS]) + (' ...' if len(found) > MOST_FIELDS else '')
     if not path:
         return f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
@@ -148,14 +149,14 @@ def _no_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:
     return f'{topic.name} in {bag.path} has no number or Bool at {path}; {remedy}'
 
 
-def _switches(value: Any, path: str = '') -> Iterator[str]:
+def _numeric_fields(value: Any, path: str = '') -> Iterator[str]:
     """Paths to the numbers and Bools in a message."""
     if isinstance(value, bool | int | float | np.bool_ | np.number):
         yield path
     elif is_dataclass(value):
         for item in fields(value):
             if item.name not in ('header', '__msgtype__'):
-                yield from _switches(getattr(value, item.name), f'{path}.{item.name}')
+                yield from _numeric_fields(getattr(value, item.name), f'{path}.{item.name}')
     elif isinstance(value, list | np.ndarray):
         for index, inner in enumerate(value[: MOST_FIELDS + 1]):
-            yield from _switches(inner, f'{path}[{index}]')
+            yield from _numeric_fields(inner, f'{path}[{index}]')

@@ -1,1 +1,1 @@
-"""The node that sets gauge readings against the film."""
+"""The node that compares gauge readings with the film."""

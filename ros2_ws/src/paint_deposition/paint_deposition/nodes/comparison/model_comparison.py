@@ -1,4 +1,4 @@
-"""Node `model_comparison`: gauge readings against the film of a model, as the part is painted."""
+"""Node `model_comparison`: compares gauge readings with the film of a model during painting."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.node import OK, Status, Task
-from paint_deposition.nodes.runtime.parameters import NodeParameter, read_to_configure, thickness
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    fixed_while_configured,
+    thickness_parameter,
+)
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -35,29 +39,29 @@ SHARE_OF_READING = 0.25
 
 COMPARISON = dict(
     **PAINTING,
-    **read_to_configure(
+    **fixed_while_configured(
         'the film is painted where they were taken; clean the node up or restart it',
         measurements_file=NodeParameter(
             '', 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]'
         ),
     ),
-    color_max_um=thickness(
+    color_max_um=thickness_parameter(
         'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
     ),
     color_radius_m=NodeParameter(
         0.0,
-        'How far around a reading the surface has its colour; 0: from their spacing [m]',
+        'Radius of the colour around a reading; 0: from the spacing of the readings [m]',
         (0.0, 5.0),
     ),
 )
 
 
 class ModelComparison(PaintingNode):
-    """Paints the points of gauge readings and publishes the residuals there.
+    """Paints the points of gauge readings and publishes their residuals.
 
-    The residual, measured minus predicted, starts as the whole reading and falls to what the
-    model does not explain. It is predicted in double precision at the places of the readings, and
-    spread over the surface around them for display only.
+    A residual, measured minus predicted, starts as the whole reading and falls to what the model
+    does not explain. The film is computed in double precision at the readings; the colours around
+    them are for display only.
     """
 
     PARAMETERS = COMPARISON
@@ -67,17 +71,17 @@ class ModelComparison(PaintingNode):
 
     def _configure(self) -> None:
         super()._configure()
-        self._mesh_out, self._stats_out, self._legend_out = (
+        self._mesh_publisher, self._stats_publisher, self._legend_publisher = (
             self.create_publisher(message, f'comparison/{topic}', topics.LATCHED)
             for message, topic in (
                 (Marker, 'mesh'), (ComparisonStats, 'stats'), (MarkerArray, 'legend'),
             )
         )  # fmt: skip
-        self.offer('~/compare', self._compare)
+        self.create_trigger_service('~/compare', self._compare)
         self._publish_legend()
         self.publish()
 
-    def _tasks(self) -> Mapping[str, Task]:
+    def _diagnostic_tasks(self) -> Mapping[str, Task]:
         return painting_tasks(self) | {'comparison': self._status}
 
     # --- the part and its readings
@@ -92,9 +96,9 @@ class ModelComparison(PaintingNode):
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return self._experiment.points
 
-    def _take_surface(self, surface: Surface) -> None:
+    def _set_surface(self, surface: Surface) -> None:
         self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
-        super()._take_surface(surface)
+        super()._set_surface(surface)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
@@ -107,22 +111,22 @@ class ModelComparison(PaintingNode):
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
-        """Every reading against the film of all poses received."""
-        predicted = self.film.up_to_date().gauge_um[: len(self._experiment)]
+        """The residuals of all readings, with the film of all poses received."""
+        predicted = self.film.snapshot().gauge_um[: len(self._experiment)]
         at_readings = predicted[self._experiment.means.owner]
         return Residuals(self._readings.thickness_um, at_readings, self._noise.sigma_um)
 
     # --- parameters
 
-    def _changed(self, names: set[str]) -> None:
-        super()._changed(names)
+    def _on_change(self, names: set[str]) -> None:
+        super()._on_change(names)
         if 'color_radius_m' in names:
             self._spread_colours()
         if 'color_max_um' in names:
             self._publish_legend()
         self._shown = None
 
-    # --- what is shown
+    # --- publishing
 
     @property
     def _scale(self) -> ColourScale:
@@ -136,23 +140,23 @@ class ModelComparison(PaintingNode):
 
     def publish(self) -> None:
         """Publish the comparison if the film has changed."""
-        self.up_to_date()
-        film = self.film.up_to_date()
+        self.catch_up()
+        film = self.film.snapshot()
         if film == self._shown:
             return
         self._shown = film
         residuals = self.residuals()
         stamp_ns = self.film.newest_ns or 0
-        self._stats_out.publish(self._stats(residuals, stamp_ns))
+        self._stats_publisher.publish(self._stats(residuals, stamp_ns))
         means = self._experiment.means
         at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
         scale = self._scale
         rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._mesh_out.publish(self._mesh.serialised(stamp_ns, scale.palette, rows))
+        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
 
     def _publish_legend(self) -> None:
         bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
-        self._legend_out.publish(bar)
+        self._legend_publisher.publish(bar)
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self._readings.positions_m[residuals.worst].tolist()
@@ -172,7 +176,7 @@ class ModelComparison(PaintingNode):
 
     def _compare(self) -> tuple[bool, str]:
         """The comparison in one line."""
-        self.up_to_date()
+        self.catch_up()
         found = self.residuals()
         x, y, z = self._readings.positions_m[found.worst]
         line = (

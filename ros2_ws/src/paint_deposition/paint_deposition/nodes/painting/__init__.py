@@ -1,1 +1,1 @@
-"""The simulator, and what all nodes share that follow the atomizer."""
+"""The simulator, and the base of all nodes that paint."""

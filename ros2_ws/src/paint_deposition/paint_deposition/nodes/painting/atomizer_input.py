@@ -1,4 +1,4 @@
-"""What a node takes from the cell: poses and states of the atomizer, in batches."""
+"""The subscriptions to a gun's poses and states, which pass poses on in batches."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import time
 from collections import Counter
 from collections.abc import Callable
+from functools import partial
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -16,43 +17,42 @@ from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
-from paint_deposition.nodes.painting.atomizer_topic import AtomizerTopic
+from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, of_gun
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
 
-# Messages are taken together: to wake for each pose would cost more than to paint it.
+# Messages are polled: waking up for each pose would cost more than painting it.
 TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
-POSES_A_BATCH = 50
+POSES_PER_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
 NO_FLOW = 'states that spray with flow 0'
 
 
 class AtomizerInput:
-    """Takes a gun's `atomizer/pose` and `atomizer/state`, and reports on `atomizer/progress`.
+    """Subscribes to a gun's `atomizer/pose` and `atomizer/state`; publishes `atomizer/progress`.
 
-    The gun's name, if it has one, stands before the three topics: `robot_1/atomizer/pose`.
-    States are passed on as they come, poses in batches of fifty or every twentieth of a second.
+    The gun's name, if any, precedes the three topics: `robot_1/atomizer/pose`. States are passed
+    on at once, poses in batches of fifty or every twentieth of a second.
 
     Args:
-        node: makes publishers, timers and subscriptions.
         name: of the gun, '' for the only one of a cell.
-        frame: of the part, into which the poses are brought.
-        on_poses, on_state: get the poses, and the states; a PaintError refuses a state.
+        frame: of the part, into which poses are transformed.
+        on_poses, on_state: callbacks; the latter raises PaintError to refuse a state.
 
     Attributes:
         poses_received, states_received: since the node started.
-        refused_s, pose_s: monotonic times of the last pose refused and of the last one taken.
-        sprays: whether the newest state says that the gun sprays; False before any.
+        refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
+        spraying: whether the gun sprays, by the newest state; False before the first.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
         tf_queue: poses that wait for their transform.
-        refused_frames: poses refused for their frame, by frame; refusal: why the last was.
-        unpainted: poses that came while the node was not active.
-        odd: other poses and states with which something is wrong, by what it is, in words.
-        refusals_of_states: why states were refused, each reason once.
-        intervals, jumps: of the stamps, and steps that no robot makes. These and all counts from
+        refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
+        unpainted: poses received while the node was not active.
+        anomalies: other poses and states with something wrong, counted by its description.
+        state_errors: why states were refused, each reason once.
+        intervals, jumps: between stamps, and steps that no robot makes. These and all counts from
             `refused_frames` on are since the last reset.
     """
 
@@ -67,30 +67,29 @@ class AtomizerInput:
         self._node, self._frame = node, frame
         self._on_poses, self._on_state = on_poses, on_state
         self.name = name
-        self._pose_topic = of_gun(name, 'atomizer/pose')
-        self._state_topic = of_gun(name, 'atomizer/state')
+        self._pose_topic = gun_topic(name, 'atomizer/pose')
+        self._state_topic = gun_topic(name, 'atomizer/state')
         self.poses_received = self.states_received = 0
         self.refused_s = self.pose_s = -math.inf
-        self.sprays = False
+        self.spraying = False
         self.speed = SpeedNow()
         self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         self._flushed_s = -math.inf
-        # The poses to pass on next.
+        # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
-        self.tf_queue = TfQueue(self._place, self._refuse)
-        self.count_from_zero()
+        self.tf_queue = TfQueue(self._transform, self._reject)
+        self.reset_counts()
         depth = node.values['pose_queue_depth']
+        subscribe = partial(AdaptiveSubscription, node, depth=depth)
         self._topics = [
-            AtomizerTopic(node, PoseStamped, self._pose_topic, self._take_pose, depth=depth),
-            # The last state holds until the next one, whenever it was published.
-            AtomizerTopic(
-                node, AtomizerState, self._state_topic, self._take_state, depth=depth, latched=True
-            ),
+            subscribe(PoseStamped, self._pose_topic, self._take_pose),
+            # A latched state from before the node started is still in effect.
+            subscribe(AtomizerState, self._state_topic, self._take_state, latched=True),
         ]
         self._progress = node.create_publisher(
-            PoseProgress, of_gun(name, PROGRESS_TOPIC), topics.PROGRESS
+            PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
         node.create_steady_timer(TAKE_PERIOD_S, self._take)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -102,76 +101,76 @@ class AtomizerInput:
 
     @property
     def messages_lost(self) -> int:
-        """Messages that the middleware says it lost."""
+        """Messages that the middleware reported as lost."""
         return sum(topic.lost for topic in self._topics)
 
     def reset(self) -> None:
-        """Count from zero; poses that were not passed on yet are dropped."""
-        self.count_from_zero()
+        """Reset the counts; poses that were not passed on yet are dropped."""
+        self.reset_counts()
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
             self._held[:] = [kept for kept in self._held if isinstance(kept, AtomizerState)]
 
-    def count_from_zero(self) -> None:
-        """Forget what was wrong so far."""
+    def reset_counts(self) -> None:
+        """Set the counts to zero and forget what was wrong."""
         self.refused_frames: Counter[str] = Counter()
         self.refusal = ''
-        self.odd: Counter[str] = Counter()
-        self.refusals_of_states: set[str] = set()
+        self.anomalies: Counter[str] = Counter()
+        self.state_errors: set[str] = set()
         self.unpainted = 0
         self.intervals = Intervals()
         self.jumps = Jumps()
 
-    def not_painted(self, poses: int) -> None:
-        """Count poses that came while the node is not active."""
+    def count_unpainted(self, poses: int) -> None:
+        """Count poses received while the node is not active."""
         if not self.unpainted:
             self._node.get_logger().warning(
-                f'{self._pose_topic}: poses come and are not painted, because the node is inactive'
+                f'{self._pose_topic}: poses arrive and are not painted: the node is inactive'
             )
         self.unpainted += poses
 
     # --- holding
 
     def hold(self) -> None:
-        """Keep what comes from now on, in its own frame, until `release`."""
+        """Keep all messages, untransformed, until `release`."""
         if self._held is None:
             self._held = []
 
     def release(self) -> None:
-        """Pass on what was kept, as if it came now."""
+        """Process the messages that were kept, as if they were received now."""
         held, self._held = self._held or [], None
         for message in held:
-            self._use(message)
+            self._process(message)
         self.flush()
 
-    def _use(self, message: PoseStamped | AtomizerState) -> None:
+    def _process(self, message: PoseStamped | AtomizerState) -> None:
         if self._held is not None:
             self._held.append(message)
         elif isinstance(message, AtomizerState):
-            self._use_state(message)
+            self._process_state(message)
         else:
             self.tf_queue.add(message, time.monotonic())
 
-    # --- taking and passing on
+    # --- batches
 
-    def take_waiting(self) -> None:
-        """Take all that has come so far and pass it on."""
+    def take_pending(self) -> None:
+        """Take all messages in the queues and pass them on."""
         for topic in self._topics:
-            topic.take_waiting()
+            topic.take_pending()
         self.flush()
 
     def _take(self) -> None:
         for topic in self._topics:
-            topic.take_waiting()
+            topic.take_pending()
         waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
-        if waited or len(self._poses) >= POSES_A_BATCH:
+        if waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
 
     def flush(self) -> None:
-        """Pass on the poses that were taken, except those that wait for their transform."""
+        """Pass on the next batch; poses that wait for their transform are not in it."""
         self._flushed_s = time.monotonic()
-        self.tf_queue.release(self._flushed_s)
+        self.tf_queue.process(self._flushed_s)
         if not self._poses:
             return
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
@@ -193,22 +192,22 @@ class AtomizerInput:
         self.poses_received += 1
         self._newest = message
         self.pose_s = time.monotonic()
-        self._use(message)
-        if self.poses_received % POSES_A_BATCH == 0:
+        self._process(message)
+        if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
-    def _place(self, message: PoseStamped) -> None:
+    def _transform(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
         stamp = stamp_ns(message.header)
         p, q = message.pose.position, message.pose.orientation
         pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
         if self._frame.is_own(frame_id):
-            self.odd['poses without a frame'] += not frame_id
+            self.anomalies['poses without a frame'] += not frame_id
         else:
-            pose = self._frame.transform_from(frame_id, stamp).applied(*pose)
+            pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
         self._poses.append((stamp, *pose))
 
-    def _refuse(self, message: PoseStamped, missing: NoTransform) -> None:
+    def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
         self.refusal = str(missing)
         self.refused_s = time.monotonic()
@@ -223,9 +222,9 @@ class AtomizerInput:
 
     def _take_state(self, message: AtomizerState) -> None:
         self.states_received += 1
-        self._use(message)
+        self._process(message)
 
-    def _use_state(self, message: AtomizerState) -> None:
+    def _process_state(self, message: AtomizerState) -> None:
         stamp = stamp_ns(message.header)
         try:
             if stamp == 0:
@@ -233,16 +232,16 @@ class AtomizerInput:
             flow = relative_flow(message.spraying, message.flow)
             self._on_state(TriggerChange(stamp, flow, message.brush, set_points_of(message)))
         except PaintError as error:
-            if str(error) not in self.refusals_of_states:
+            if str(error) not in self.state_errors:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
-            self.refusals_of_states.add(str(error))
-            self.odd['states refused'] += 1
+            self.state_errors.add(str(error))
+            self.anomalies['states refused'] += 1
             return
         if message.spraying and flow == 0.0:
-            if not self.odd[NO_FLOW]:
+            if not self.anomalies[NO_FLOW]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
-            self.odd[NO_FLOW] += 1
-        self.sprays = flow > 0.0
+            self.anomalies[NO_FLOW] += 1
+        self.spraying = flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     def _report_progress(self) -> None:

@@ -14,17 +14,17 @@ from rclpy.callback_groups import ReentrantCallbackGroup
 from paint_deposition.errors import PaintError
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
 from paint_deposition.nodes.painting.film_display import FilmDisplay
-from paint_deposition.nodes.painting.film_files import film_to_save
+from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
-from paint_deposition.nodes.painting.part_change import PartChange, version_of
+from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
 from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
-    read_to_configure,
+    fixed_while_configured,
     require_file_name,
-    thickness,
+    thickness_parameter,
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -32,33 +32,36 @@ from paint_deposition.part.surface import Surface
 SIMULATOR = PAINTING | {
     'publish_rate_hz': NodeParameter(
         5.0,
-        'How often statistics go out while the film changes, and large messages at the most [Hz]',
+        'Rate of the statistics while the film changes, and highest rate of large messages [Hz]',
         (0.1, 30.0),
     ),
-    **read_to_configure(
-        'the film so far was summed in it; clean the node up or restart it',
+    **fixed_while_configured(
+        'the film so far was computed in it; clean the node up or restart it',
         precision=NodeParameter(
             'single',
             'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
             choices=('single', 'double'),
         ),
     ),
-    'color_min_um': thickness('Film at the lower end of the colours; both ends 0: automatic [µm]'),
-    'color_max_um': thickness('Film at the upper end of the colours; both ends 0: automatic [µm]'),
-    'painted_above_um': thickness(
+    'color_min_um': thickness_parameter(
+        'Film at the lower end of the colours; both ends 0: automatic [µm]'
+    ),
+    'color_max_um': thickness_parameter(
+        'Film at the upper end of the colours; both ends 0: automatic [µm]'
+    ),
+    'painted_above_um': thickness_parameter(
         'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
     ),
-    'target_um': thickness('Film wanted; 0: none [µm]'),
-    'target_tolerance_um': thickness('Difference from the target that is allowed [µm]'),
+    'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
+    'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
     'publish_mesh': NodeParameter(
         True,
-        'Publish the coloured mesh; of 275,000 vertices it takes 65 MB for each listener '
-        '[true/false]',
+        'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]',
     ),
     'output_directory': NodeParameter(
         'runs',
         'Where ~/save_film writes [path]',
-        fixed_because='the network does not choose where files are written; restart the node',
+        fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
 }
 
@@ -66,8 +69,8 @@ SIMULATOR = PAINTING | {
 class DepositionSimulator(PaintingNode):
     """Paints a mesh from `atomizer/pose` and `atomizer/state` and publishes the film.
 
-    Statistics and legend are latched. Mesh (a Marker), cloud, field and changes go to whoever
-    listens, as often as the link takes them. Everything shows all poses received.
+    Statistics and legend are latched. Mesh (a Marker), cloud and field are published while
+    somebody subscribes, as often as the link allows. All include every pose received.
 
     Attributes:
         display: publishes the film.
@@ -81,7 +84,7 @@ class DepositionSimulator(PaintingNode):
 
     def _configure(self) -> None:
         super()._configure()
-        # In a group of its own: while it waits for the disk, poses must not wait for it.
+        # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
         self.create_service(SaveFilm, '~/save_film', self._save_film, callback_group=saving)
         self._saving = ThreadPoolExecutor(max_workers=1, thread_name_prefix='saving')
@@ -94,17 +97,17 @@ class DepositionSimulator(PaintingNode):
         self.parts.close()
         self._saving.shutdown()
 
-    def _tasks(self) -> Mapping[str, Task]:
-        return painting_tasks(self, self.display.details) | {'part': self.parts.status}
+    def _diagnostic_tasks(self) -> Mapping[str, Task]:
+        return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return surface.points()
 
     def _read_part(self) -> None:
-        self._mesh_version = version_of(self.mesh_file)
+        self._mesh_version = mesh_version(self.mesh_file)
 
-    def _check(self, values: Mapping[str, Any]) -> None:
-        super()._check(values)
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        super()._validate(values)
         low, high = values['color_min_um'], values['color_max_um']
         if (low, high) != (0.0, 0.0) and low >= high:
             raise PaintError(
@@ -112,23 +115,23 @@ class DepositionSimulator(PaintingNode):
             )
 
     def publish(self) -> None:
-        """Publish the film if it has changed, or somebody does not have it yet."""
-        self.up_to_date()
-        film = self.film.up_to_date()
+        """Publish the film if it has changed, or to new subscribers."""
+        self.catch_up()
+        film = self.film.snapshot()
         changed, self._shown = film != self._shown, film
         self.display.show(film, changed, self.parts.part.run)
 
     async def _save_film(
         self, request: SaveFilm.Request, response: SaveFilm.Response
     ) -> SaveFilm.Response:
-        """Write in a thread: poses keep coming meanwhile."""
+        """Write in a thread, so that poses are taken meanwhile."""
         stem = request.name or time.strftime('film_%Y%m%d_%H%M%S')
         try:
             require_file_name('name', stem)
-            self.up_to_date()
-            write = film_to_save(self, Path(self.values['output_directory']), stem)
-            paths = await self.in_a_thread(self._saving.submit(write))
-        except Exception as error:  # the caller of the service gets it
+            self.catch_up()
+            write = film_writer(self, Path(self.values['output_directory']), stem)
+            paths = await self.result_of(self._saving.submit(write))
+        except Exception as error:  # reported to the caller of the service
             response.message = str(error)
             return response
         response.success = True

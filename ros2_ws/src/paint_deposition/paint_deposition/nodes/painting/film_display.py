@@ -1,4 +1,4 @@
-"""What the simulator publishes of its film."""
+"""The publishers of the simulator's film: statistics, legend, mesh, cloud and field."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import CommonFilm
-from paint_deposition.nodes.painting.film_files import figures_of, laid_by, shares
+from paint_deposition.nodes.painting.film_files import shares, statistics_of, volume_by_gun
 from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
-from paint_deposition.nodes.runtime.topics import of_gun
+from paint_deposition.nodes.runtime.topics import gun_topic
 from paint_deposition.part.surface import Surface
 
-# Of one core that making and sending a large message may take.
-SHARE = 0.2
-# A listener that acknowledges nothing for so long does not hold up the others.
-PATIENCE_S = 5.0
-POINT = ('x', 'y', 'z', 'thickness_um')
-FIGURES = (
+# The share of a core that building and publishing a large message may take.
+MAX_CORE_SHARE = 0.2
+# A subscriber that acknowledges nothing for so long does not delay the others.
+ACKNOWLEDGE_TIMEOUT_S = 5.0
+CLOUD_FIELDS = ('x', 'y', 'z', 'thickness_um')
+STATS_FIELDS = (
     'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
 
 
-def cloud_of(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
-    """x, y, z [m] and thickness_um (V,) of all vertices."""
+def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
+    """A cloud of all vertices, x, y, z [m], with their film (V,) as thickness_um."""
     points = np.column_stack([surface.vertices_m, film_um]).astype(np.float32)
     kind = PointField.FLOAT32
     return PointCloud2(
@@ -50,71 +50,71 @@ def cloud_of(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
         width=len(points),
         fields=[
             PointField(name=name, offset=4 * k, datatype=kind, count=1)
-            for k, name in enumerate(POINT)
+            for k, name in enumerate(CLOUD_FIELDS)
         ],
         is_bigendian=sys.byteorder == 'big',
-        point_step=4 * len(POINT),
+        point_step=4 * len(CLOUD_FIELDS),
         row_step=points.nbytes,
         data=array('B', points.tobytes()),
         is_dense=True,
     )
 
 
-def field_of(surface: Surface, film_um: np.ndarray, at: Header) -> ThicknessField:
-    """(V,) film [um] in the order of the vertices."""
+def field_message(surface: Surface, film_um: np.ndarray, at: Header) -> ThicknessField:
+    """A field of the film (V,) in the order of the vertices."""
     thickness_um = array('f', film_um.astype(np.float32).tobytes())
     return ThicknessField(header=at, mesh_id=surface.mesh_id, thickness_um=thickness_um)
 
 
 class LargeTopic:
-    """Publishes when somebody listens who does not have the newest edition yet.
+    """Publishes large messages, only when a subscriber lacks the newest version.
 
-    The next message waits until all reliable subscribers have acknowledged the last one: a slow
-    link gets fewer of them, never a queue. It also waits for as long as keeps the work within
-    ``SHARE`` of a core.
+    The next message waits until all reliable subscribers have acknowledged the last one, so that
+    a slow link gets fewer messages instead of a queue. It also waits as long as needed to keep
+    the work within ``MAX_CORE_SHARE`` of a core.
     """
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
-        self._listeners = self._newcomers = 0
+        self._subscribers = self._new_subscribers = 0
         self._publisher: Publisher = node.create_publisher(
             message, topic, profile,
-            event_callbacks=PublisherEventCallbacks(matched=self._count_listeners),
+            event_callbacks=PublisherEventCallbacks(matched=self._count_subscribers),
         )  # fmt: skip
-        # The last edition sent, and how many newcomers there had been.
+        # The last version sent, and the total number of subscribers by then.
         self._sent: tuple[int, int] | None = None
-        self._sent_s = self._rested_s = 0.0
+        self._sent_s = self._next_allowed_s = 0.0
 
-    def offer(self, edition: int, make: Callable[[], Any]) -> None:
-        """Publish an edition, if it is wanted and the link is free; otherwise offer it again."""
-        # Not the publisher's own count: it grows before the newcomer is counted.
-        wanted = edition, self._newcomers
-        if not self._listeners or wanted == self._sent or not self._is_free():
+    def publish_if_wanted(self, version: int, make: Callable[[], Any]) -> None:
+        """Publish a version if a subscriber lacks it and the link is free; else call it again."""
+        # Not the publisher's own count, which grows before the event of a new subscriber.
+        wanted = version, self._new_subscribers
+        if not self._subscribers or wanted == self._sent or not self._is_free():
             return
         began_s = time.monotonic()
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
-        self._rested_s = began_s + (self._sent_s - began_s) / SHARE
+        self._next_allowed_s = began_s + (self._sent_s - began_s) / MAX_CORE_SHARE
 
-    def _count_listeners(self, event: Any) -> None:
-        self._listeners = event.current_count
-        self._newcomers += event.total_count_change
+    def _count_subscribers(self, event: Any) -> None:
+        self._subscribers = event.current_count
+        self._new_subscribers += event.total_count_change
 
     def _is_free(self) -> bool:
         now_s = time.monotonic()
-        if now_s < self._rested_s:
+        if now_s < self._next_allowed_s:
             return False
         acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
-        return acknowledged or now_s > self._sent_s + PATIENCE_S
+        return acknowledged or now_s > self._sent_s + ACKNOWLEDGE_TIMEOUT_S
 
 
 class FilmDisplay:
-    """Publishes `thickness/...`: statistics, legend, and the large messages to who listens."""
+    """Publishes `thickness/...`: statistics, legend, and the large messages if subscribed to."""
 
     def __init__(self, node: PaintingNode) -> None:
         self._node = node
-        # Of several guns the film of each, too.
+        # With several guns the film of each is published, too.
         names = node.gun_names if len(node.gun_names) > 1 else []
-        self._share_topics = [of_gun(name, 'thickness/field') for name in names]
+        self._share_topics = [gun_topic(name, 'thickness/field') for name in names]
         self._legend = node.create_publisher(MarkerArray, 'thickness/legend', topics.LATCHED)
         self._figures = node.create_publisher(ThicknessStats, 'thickness/stats', topics.LATCHED)
         self._large = {
@@ -130,45 +130,45 @@ class FilmDisplay:
         self._mesh: ColouredMesh | None = None
         self._stats = ThicknessStats()
         self._counts: tuple | None = None
-        # Counts what has been shown: another film, or the same in other colours.
-        self._edition = 0
+        # Counts the films shown, and changes of their colours.
+        self._version = 0
         self._film_um = np.empty(0)
         self._scale = film_scale(self._film_um)
         self._legend_ends: tuple[float, float] | None = None
-        self._took_s = 0.0
+        self._publish_duration_s = 0.0
 
-    def details(self) -> dict[str, object]:
-        """What the diagnostics say of the film beside part and model."""
+    def diagnostic_values(self) -> dict[str, object]:
+        """Values for the diagnostics of the film."""
         parts = zip(self._stats.atomizers, self._stats.atomizer_share, strict=True)
         each = {f'share of {gun}': f'{share:.1%}' for gun, share in parts if gun}
-        return {'last publication [ms]': f'{self._took_s * 1e3:.0f}', **each}
+        return {'last publication [ms]': f'{self._publish_duration_s * 1e3:.0f}', **each}
 
     def show(self, film: CommonFilm, changed: bool, run: str) -> None:
-        """Publish the film if it has changed, or to those who do not have it yet."""
+        """Publish the film if it has changed, or to new subscribers."""
         began_s = time.monotonic()
         if self._surface is not self._node.surface:  # another part, or the same turned
             self._surface, self._mesh, self._legend_ends = self._node.surface, None, None
         at = header(self._node.frame.frame_id, self._node.film.newest_ns or 0)
         if changed:
-            self._sum_up(film, run, at)
-        self._offer(film, at)
+            self._update_stats(film, run, at)
+        self._publish_large(film, at)
         if changed:
-            self._took_s = time.monotonic() - began_s
+            self._publish_duration_s = time.monotonic() - began_s
         self._publish_stats()
 
-    def _sum_up(self, film: CommonFilm, run: str, at: Header) -> None:
+    def _update_stats(self, film: CommonFilm, run: str, at: Header) -> None:
         node, values = self._node, self._node.values
-        self._edition += 1
+        self._version += 1
         self._film_um = film.film_um
-        figures = figures_of(values, node.surface, self._film_um, film.emitted_cm3)
-        laid_cm3 = laid_by(node.gun_names, node.surface, film)
+        figures = statistics_of(values, node.surface, self._film_um, film.emitted_cm3)
+        laid_cm3 = volume_by_gun(node.gun_names, node.surface, film)
         self._stats = ThicknessStats(
             header=at,
             run=run,
             atomizers=list(laid_cm3),
             atomizer_volume_cm3=list(laid_cm3.values()),
             atomizer_share=list(shares(laid_cm3).values()),
-            **{name: getattr(figures, name) for name in FIGURES},
+            **{name: getattr(figures, name) for name in STATS_FIELDS},
         )
         self._counts = None
         self._scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
@@ -177,7 +177,7 @@ class FilmDisplay:
             self._legend_ends = ends
             self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
 
-    def _offer(self, film: CommonFilm, at: Header) -> None:
+    def _publish_large(self, film: CommonFilm, at: Header) -> None:
         film_um, surface, values = self._film_um, self._node.surface, self._node.values
 
         def mesh() -> bytes:
@@ -187,19 +187,19 @@ class FilmDisplay:
                 )
             rows = self._scale.rows(film_um, film_um > values['painted_above_um'])
             stamp_ns = self._node.film.newest_ns or 0
-            return self._mesh.serialised(stamp_ns, self._scale.palette, rows)
+            return self._mesh.serialise(stamp_ns, self._scale.palette, rows)
 
         large: dict[str, Callable[[], Any]] = {
-            'thickness/cloud': lambda: cloud_of(surface, film_um, at),
-            'thickness/field': lambda: field_of(surface, film_um, at),
+            'thickness/cloud': lambda: cloud_message(surface, film_um, at),
+            'thickness/field': lambda: field_message(surface, film_um, at),
         } | {
-            topic: lambda gun=gun: field_of(surface, film.shares_um[gun], at)
+            topic: lambda gun=gun: field_message(surface, film.shares_um[gun], at)
             for gun, topic in enumerate(self._share_topics)
         }
         if values['publish_mesh']:
             large['thickness/mesh'] = mesh
         for topic, make in large.items():
-            self._large[topic].offer(self._edition, make)
+            self._large[topic].publish_if_wanted(self._version, make)
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""

@@ -1,4 +1,4 @@
-"""The film on its way to the disk, and its figures."""
+"""Saving the film of a node, and its statistics."""
 
 from __future__ import annotations
 
@@ -15,36 +15,35 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.film import write_film
 
 
-def figures_of(
+def statistics_of(
     values: Mapping[str, Any], surface: Surface, film_um: np.ndarray, emitted_cm3: float
 ) -> FilmStatistics:
-    """The figures of a film (V,) with the target and the limit that the parameters set."""
+    """The statistics of a film (V,), by the target and the thresholds among the parameters."""
     chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}
     return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, **chosen)
 
 
-def laid_by(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
-    """Solids on the part by the name of the gun that laid them [cm3]."""
+def volume_by_gun(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
+    """Solids that each gun laid on the part, by its name [cm3]."""
     return dict(zip(guns, film.laid_cm3(surface.vertex_areas_m2).tolist(), strict=True))
 
 
 def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
-    """Each gun's share of the paint on the part, 0 to 1; all 0 where there is none."""
+    """Each gun's share of the paint on the part, 0 to 1; 0 for all without paint."""
     total = sum(laid_cm3.values())
     return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
-def film_to_save(
+def film_writer(
     node: PaintingNode, folder: Path, stem: str, part: Mapping[str, Any] | None = None
 ) -> Callable[[], list[Path]]:
-    """A function that writes the film as it is now, in any thread, and returns the paths.
+    """A function that writes the film as it is now and returns the paths; for any thread.
 
     Args:
-        node: that has painted it.
-        folder, stem: where to.
-        part: what to say of the part in the statistics.
+        folder, stem: of the files.
+        part: description of the part for the statistics file.
     """
-    film, surface, values = node.film.up_to_date(), node.surface, dict(node.values)
+    film, surface, values = node.film.snapshot(), node.surface, dict(node.values)
     names, counts = node.gun_names, [gun.counts.to_dict() for gun in node.film.guns]
     refused = [source.refused_frames.items() for source in node.inputs]
     details = {
@@ -60,7 +59,7 @@ def film_to_save(
     }
 
     def write() -> list[Path]:
-        laid_cm3 = laid_by(names, surface, film)
+        laid_cm3 = volume_by_gun(names, surface, film)
         files = values['model_files'] or [values['model_file']] * len(names)
         details['atomizers'] = [
             {
@@ -76,7 +75,7 @@ def film_to_save(
             )
         ]
         film_um = film.film_um
-        figures = figures_of(values, surface, film_um, film.emitted_cm3)
+        figures = statistics_of(values, surface, film_um, film.emitted_cm3)
         if any(gun.model.brushes for gun in film.guns):
             details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
         return write_film(

@@ -1,4 +1,4 @@
-"""Poses in other frames than the part's are transformed where a transform is known."""
+"""Transforming poses into the frame of the part."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 
-GIVE_FRAMES = 'set part_pose and part_parent_frame, or frame_id'
-# A transform comes on another topic than the poses and is often some milliseconds late, a static
-# one a little after the start; one that is not there after so long will not come.
-TIMEOUT_S = 0.5
-LONGEST = 5000
+FRAME_REMEDY = 'set part_pose and part_parent_frame, or frame_id'
+# Transforms, static ones at the start included, may arrive later than the poses. One that is still
+# missing after so long is not waited for any longer.
+TF_TIMEOUT_S = 0.5
+MAX_WAITING = 5000
 
 
 class NoTransform(Exception):
-    """There is no transform for a pose; `may_come` says whether waiting can help."""
+    """There is no transform for a pose, though with `may_come` there may be one later."""
 
     def __init__(self, reason: str, may_come: bool = False) -> None:
         super().__init__(reason)
@@ -32,10 +32,10 @@ class NoTransform(Exception):
 
 
 class PartFrame:
-    """Brings poses into the part's frame.
+    """The frame of the part, and the transforms into it.
 
-    Known are the part's own frame, the one in which its pose was given, and whatever tf2 knows,
-    where tf2 is installed. A pose without any frame is taken to be in the part's.
+    They come from the parameter `part_pose` or from tf2, where it is installed. A pose without a
+    frame is taken to be in that of the part.
     """
 
     def __init__(self, node: Node, frame_id: str) -> None:
@@ -44,7 +44,7 @@ class PartFrame:
         self._from_parent: Rigid | None = None
         self._node = node
         self._publisher: Publisher | None = None
-        # What listens to tf, where tf2 is installed.
+        # None where tf2 is not installed.
         self._buffer: Any = None
         with contextlib.suppress(ImportError):
             import tf2_ros
@@ -52,10 +52,10 @@ class PartFrame:
             self._buffer = tf2_ros.Buffer(node=node)
             self._buffer.listener = tf2_ros.TransformListener(self._buffer, node)
 
-    def place(self, parent_frame: str, part_pose: Sequence[float]) -> None:
+    def set_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
         """Set the part's pose [x y z qx qy qz qw] in another frame, [] for none.
 
-        It is published on `part_pose`, so that a recording can be used without the node.
+        It is published on `part_pose`, so that recordings contain it.
         """
         self._parent = parent_frame.lstrip('/')
         self._from_parent = Rigid.of(part_pose).inverse() if len(part_pose) else None
@@ -72,11 +72,11 @@ class PartFrame:
         self._publisher.publish(placed)
 
     def is_own(self, frame_id: str) -> bool:
-        """Whether a pose in this frame can be taken as it is."""
+        """Whether poses in this frame need no transform."""
         return is_frame(frame_id, self.frame_id)
 
-    def transform_from(self, frame_id: str, stamp_ns: int) -> Rigid:
-        """The transform from another frame at that time.
+    def lookup_transform(self, frame_id: str, stamp_ns: int) -> Rigid:
+        """The transform from another frame into the part's at that time.
 
         Raises:
             NoTransform: there is none, or none yet.
@@ -84,7 +84,7 @@ class PartFrame:
         if self._from_parent is not None and frame_id.lstrip('/') == self._parent:
             return self._from_parent
         if self._buffer is None:
-            raise NoTransform(f'no transform between them is known; {GIVE_FRAMES}')
+            raise NoTransform(f'no transform between them is known; {FRAME_REMEDY}')
         import tf2_ros
 
         try:
@@ -93,7 +93,7 @@ class PartFrame:
             )
         except tf2_ros.TransformException as error:
             words = ' '.join(str(error).split())
-            reason = f'tf knows no transform between them ({words}); {GIVE_FRAMES}'
+            reason = f'tf knows no transform between them ({words}); {FRAME_REMEDY}'
             if isinstance(error, tf2_ros.ExtrapolationException):
                 reason = (
                     f'tf does not cover the time of the poses ({words}); publish it by the same '
@@ -105,43 +105,44 @@ class PartFrame:
 
 
 class TfQueue:
-    """A queue of poses that leave it in the order in which they came, at most `TIMEOUT_S` late.
+    """Poses that wait, in order, for their transform; as tf2's MessageFilter does.
 
-    A pose without a transform holds back all behind it. It is refused when its transform cannot
-    come, has not come in time, or more than `LONGEST` poses wait. Times are monotonic seconds.
+    A pose without a transform delays all behind it. It is rejected if the transform cannot come
+    any more, after `TF_TIMEOUT_S`, or if more than `MAX_WAITING` poses wait. Times are
+    monotonic seconds.
 
     Args:
-        place: takes a pose, and raises NoTransform where that cannot be done yet.
-        refuse: gets the others.
+        transform: transforms a pose and passes it on, or raises NoTransform.
+        reject: called with the poses that are rejected, and why.
     """
 
     def __init__(
         self,
-        place: Callable[[PoseStamped], None],
-        refuse: Callable[[PoseStamped, NoTransform], None],
+        transform: Callable[[PoseStamped], None],
+        reject: Callable[[PoseStamped, NoTransform], None],
     ) -> None:
-        self._place, self._refuse = place, refuse
+        self._transform, self._reject = transform, reject
         self._waiting: deque[tuple[float, PoseStamped]] = deque()
 
     def __len__(self) -> int:
         return len(self._waiting)
 
     def add(self, pose: PoseStamped, now_s: float) -> None:
-        """Queue a pose that came just now, and place what can be placed."""
+        """Queue a pose received now, and process the queue."""
         self._waiting.append((now_s, pose))
-        self.release(now_s)
+        self.process(now_s)
 
-    def release(self, now_s: float) -> None:
-        """Place what can be placed."""
+    def process(self, now_s: float) -> None:
+        """Transform poses, from the oldest on, until one has to wait."""
         while self._waiting:
             since_s, pose = self._waiting[0]
             try:
-                self._place(pose)
+                self._transform(pose)
             except NoTransform as missing:
-                in_time = now_s - since_s < TIMEOUT_S and len(self._waiting) <= LONGEST
+                in_time = now_s - since_s < TF_TIMEOUT_S and len(self._waiting) <= MAX_WAITING
                 if missing.may_come and in_time:
                     return
-                self._refuse(pose, missing)
+                self._reject(pose, missing)
             self._waiting.popleft()
 
     def clear(self) -> None:

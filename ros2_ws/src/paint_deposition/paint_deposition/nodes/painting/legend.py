@@ -1,4 +1,4 @@
-"""The colour bar beside the part, for viewers that have none of their own."""
+"""A colour bar beside the part, for viewers without one of their own."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a node that paints says of its health."""
+"""The diagnostics of the nodes that paint."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
-from paint_deposition.nodes.runtime.topics import of_gun
+from paint_deposition.nodes.runtime.topics import gun_topic
 
-# Real-time factor above which there is little time left for anything but painting.
+# Real-time factor above which the node has little time for anything but painting.
 BUSY = 0.8
-# So long after it a refusal is no longer what is the matter now.
+# A pose refused longer ago is no longer an ERROR.
 RECENT_S = 5.0
-# A gun that sprays is moved; a robot that only slows down still sends poses.
+# Without poses for so long, a gun that sprays is reported.
 SILENT_S = 2.0
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
-# What happened to poses and states, in words, by the name of its count.
-IN_WORDS = {
+# Labels of the counts of poses and states.
+COUNT_LABELS = {
     'gaps': 'gaps',
     'restarts': 'restarts of the stream',
     'repeated_stamps': 'repeated stamps',
@@ -33,13 +33,13 @@ IN_WORDS = {
 
 
 def poses_status(node: PaintingNode, number: int) -> Status:
-    """A gun's motion since the last reset: what came and what was wrong with it."""
+    """The status of a gun's poses and states since the last reset."""
     source, film = node.inputs[number], node.film.guns[number]
     counts, rhythm_ns = film.counts, source.intervals.typical_ns
-    counted = {words: getattr(counts, name) for name, words in IN_WORDS.items()}
-    counted |= {'steps faster than a robot': source.jumps.count, **source.odd}
+    counted = {words: getattr(counts, name) for name, words in COUNT_LABELS.items()}
+    counted |= {'steps faster than a robot': source.jumps.count, **source.anomalies}
     programmed = source.programmed_m_per_s
-    gun = _gun_in_words(film)
+    gun = _gun_text(film)
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
@@ -70,19 +70,19 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         return Status(ERROR, words, values)
     wrong = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
     silent_s = now_s - source.pose_s
-    if source.sprays and silent_s > SILENT_S:
+    if source.spraying and silent_s > SILENT_S:
         since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
         wrong.append(f'the gun sprays, and no pose has come {since}')
     counted['poses refused for their frame'] = source.poses_refused
     wrong += [f'{count} {words}' for words, count in counted.items() if count]
-    wrong += sorted(source.refusals_of_states)
+    wrong += sorted(source.state_errors)
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     return Status(OK, 'waiting for poses' if silent_s > SILENT_S else 'painting', values)
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
-    """Part and model."""
+    """The status of part, model and computing time."""
     guns = node.film.guns
     factor = node.real_time_factor
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
@@ -110,7 +110,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
 
 
-def _gun_in_words(film: LiveFilm) -> str:
+def _gun_text(film: LiveFilm) -> str:
     if film.flow is None:
         return NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
     number = str(film.brush) if film.brush < BETWEEN else 'between those calibrated'
@@ -121,9 +121,9 @@ def _gun_in_words(film: LiveFilm) -> str:
 def painting_tasks(
     node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
 ) -> dict[str, Callable[[], Status]]:
-    """The tasks by name; `film_values` are added to those of the film."""
+    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
     poses = {
-        of_gun(source.name, 'poses'): functools.partial(poses_status, node, number)
+        gun_topic(source.name, 'poses'): functools.partial(poses_status, node, number)
         for number, source in enumerate(node.inputs)
     }
     return {**poses, 'film': lambda: film_status(node, film_values())}

@@ -1,4 +1,4 @@
-"""Parameters that the nodes which paint have in common, and what is made as they say."""
+"""The parameters that all painting nodes share, and the parts and films built from them."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.part_frame import POSE_WORDS, is_pose
-from paint_deposition.motion.pose_stream import DEFAULT_LIMIT_POSES
+from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
+from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
-    atomizer_names,
-    direction,
+    atomizers_parameter,
+    direction_parameter,
+    fixed_while_configured,
     mesh_parameters,
-    read_to_configure,
 )
 from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
@@ -30,11 +30,11 @@ from paint_deposition.part.surface import Surface
 
 PAINTING = dict(
     **MANAGED,
-    **read_to_configure(
+    **fixed_while_configured(
         'the film so far lies on this mesh, in this frame; clean the node up or restart it for '
         'another part',
         **mesh_parameters(max_edge_length_m=0.01),
-        down=direction(
+        down=direction_parameter(
             'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
             'stands or lies, -y for one drawn flat at z = 0 [-]'
         ),
@@ -42,7 +42,7 @@ PAINTING = dict(
     part_pose=NodeParameter(
         [],
         'Pose of the mesh in part_parent_frame, x y z qx qy qz qw; empty: not known [m, -]',
-        constraints=f'{POSE_WORDS}, or none',
+        constraints=f'{POSE_FORMAT}, or none',
         allows=lambda value: not value or is_pose(value),
         element=float,
     ),
@@ -57,22 +57,22 @@ PAINTING = dict(
     ),
     trigger_latency_s=NodeParameter(
         0.1,
-        'How much later than the poses of the same time a state may come and still switch the gun '
-        'at its own stamp [s]',
+        'How late a state may arrive, by the stamps of the poses, and still switch the gun at its '
+        'own stamp [s]',
         (0.0, 10.0),
     ),
-    **read_to_configure(
+    **fixed_while_configured(
         'the subscriptions and the pose memory are made with it; clean the node up or restart it',
-        atomizers=atomizer_names('that paint this part'),
+        atomizers=atomizers_parameter('that paint this part'),
         pose_queue_depth=NodeParameter(
             5000,
-            'Poses that may wait while the node is busy; too few lose paint [poses]',
+            'Depth of the queue of poses; if it overflows, paint is lost [poses]',
             (1, 100_000),
         ),
         pose_memory=NodeParameter(
-            DEFAULT_LIMIT_POSES,
-            'Poses kept, 64 bytes each, to paint the motion again with another model; '
-            'beyond, a new model paints from then on only [poses]',
+            DEFAULT_POSE_MEMORY,
+            'Poses kept, 64 bytes each, for repainting with another model; with more poses, a new '
+            'model paints from then on only [poses]',
             (10_000, 100_000_000),
         ),
     ),
@@ -88,14 +88,14 @@ PAINTING = dict(
         'Paint the motion so far again with a new model; false: from then on only [true/false]',
     ),
     publish_rate_hz=NodeParameter(
-        2.0, 'How often what is shown goes out while the film changes [Hz]', (0.1, 30.0)
+        2.0, 'Rate of the messages while the film changes [Hz]', (0.1, 30.0)
     ),
 )
 
 
 @dataclass(frozen=True)
 class PreparedPart:
-    """A part that can be painted at once: its refined surface, the points on it, a bare film."""
+    """A part ready to be painted: its refined surface, the points on it, an unpainted film."""
 
     surface: Surface
     points: SurfacePoints
@@ -103,7 +103,7 @@ class PreparedPart:
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
-    """The surface of a mesh, refined and turned as a node's parameters say.
+    """The surface of a mesh, refined and oriented by a node's parameters.
 
     Raises:
         PaintError: there is no mesh, or it cannot be read.
@@ -114,23 +114,22 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
 
 
-def bare_films(
+def unpainted_films(
     surface: Surface,
     points: SurfacePoints,
     models: Iterable[DepositionModel],
     values: Mapping[str, Any],
 ) -> LiveFilms:
-    """Films of a model for each gun, without paint, as a node's parameters say."""
+    """An unpainted film for the model of each gun, by a node's parameters."""
     options: dict[str, Any] = {
         'precision': values.get('precision', 'double'),
         'occluder': surface.occluder,
-        'limit_poses': values['pose_memory'],
-        **{name: values[name] for name in ('max_pose_gap_s', 'trigger_latency_s')},
+        **{n: values[n] for n in ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')},
     }
     return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
 
 
 def warm_up(surface: Surface, film: LiveFilms) -> None:
-    """Compile and compute what painting needs, for a large part a second's work."""
+    """Compile and compute what painting needs; a large part takes a second."""
     film.warm_up()
-    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # what is looked up along a gun's axis
+    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for rays along a gun's axis

@@ -1,4 +1,4 @@
-"""Passes on a part as an action: feedback while they are planned, and a cancel."""
+"""The action server that plans passes on a part."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.planning.plan import Plan
 
 FEEDBACK_PERIOD_S = 0.1
-# Of a goal, named as the parameters that they stand for.
-FIELDS = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction')
+# Fields of a goal that replace the parameters of the same names.
+GOAL_FIELDS = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction')
 
-# What is being done, and the share of it that is done, 0 to 1; it may raise to end the work.
+# (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]
-# Plans with other values of parameters, and publishes the passes.
-PlanAndShow = Callable[[Mapping[str, Any], Progress], tuple[Plan, Path]]
+# (parameters to replace, progress) -> plan, published path.
+PlanAndPublish = Callable[[Mapping[str, Any], Progress], tuple[Plan, Path]]
 
 
 class PassesAction:
-    """Offers the action `plan_passes`; its goals are worked off one after the other, in a thread.
+    """The action server `plan_passes`, which executes one goal at a time, in a thread.
 
-    A goal that is cancelled ends where the work next reports its progress. A PaintError aborts
-    it; the result then says why. The executor of the node must run.
+    A cancelled goal ends at the next report of progress. A PaintError aborts the goal and is the
+    message of its result.
     """
 
-    def __init__(self, node: PaintNode, plan_and_show: PlanAndShow) -> None:
-        self._node, self._plan_and_show = node, plan_and_show
+    def __init__(self, node: PaintNode, plan_and_publish: PlanAndPublish) -> None:
+        self._node, self._plan_and_publish = node, plan_and_publish
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
         self._closed = False
         self._server = ActionServer(
@@ -44,7 +44,7 @@ class PassesAction:
         )  # fmt: skip
 
     def close(self) -> None:
-        """Break off what is being done, and end the server."""
+        """Cancel the running goal and destroy the server."""
         self._closed = True
         self._thread.shutdown(cancel_futures=True)
         self._server.destroy()
@@ -63,7 +63,7 @@ class PassesAction:
 
         work = self._thread.submit(self._plan, goal.request, progress)
         try:
-            result = await self._node.in_a_thread(work)
+            result = await self._node.result_of(work)
         except CancelledError:
             goal.canceled()
             return PlanPasses.Result(message='cancelled')
@@ -75,10 +75,10 @@ class PassesAction:
 
     def _plan(self, goal: PlanPasses.Goal, progress: Progress) -> PlanPasses.Result:
         progress('begin', 0.0)
-        given = {name: getattr(goal, name) for name in FIELDS if getattr(goal, name)}
+        given = {name: getattr(goal, name) for name in GOAL_FIELDS if getattr(goal, name)}
         if 'target_um' in given and 'speed_m_per_s' not in given:
-            given['speed_m_per_s'] = 0.0  # the target chooses it, not the parameter
-        planned, path = self._plan_and_show(given, progress)
+            given['speed_m_per_s'] = 0.0  # from the target, not from the parameter
+        planned, path = self._plan_and_publish(given, progress)
         return PlanPasses.Result(
             success=True,
             message=planned.sentence,

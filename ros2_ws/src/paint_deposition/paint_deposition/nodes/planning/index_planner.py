@@ -20,24 +20,24 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.planning.actions import PassesAction, Progress
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.model_parameters import model_parameters, read_chosen_model
+from paint_deposition.nodes.runtime.model_parameters import model_from_parameters, model_parameters
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
-    direction,
-    fixed,
+    direction_parameter,
+    fixed_while_running,
     mesh_parameters,
-    thickness,
+    thickness_parameter,
 )
 from paint_deposition.planning.plan import Plan, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest, PlanRequest
 
 SPACING_M = 0.02
-# Of a request for an index, and of passes; 0 stands for none.
-ASKED = ('speed_m_per_s', 'target_um', 'index_min_m', 'index_max_m', 'tolerance')
-PLANNED_IF_GIVEN = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
-PLANNED = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
+# 0 stands for none in fields of a service request and in optional parameters.
+REQUEST_FIELDS = ('speed_m_per_s', 'target_um', 'index_min_m', 'index_max_m', 'tolerance')
+OPTIONAL_PARAMETERS = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
+REQUIRED_PARAMETERS = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
 
 PLANNER = dict(
     **model_parameters(''),
@@ -67,7 +67,7 @@ PLANNER = dict(
         'Turn the gun by 180 deg for every return pass; else it keeps its orientation and '
         'lays the same profile both ways [true/false]',
     ),
-    **fixed(
+    **fixed_while_running(
         'passes are planned once, when the node starts; restart the node with the new value',
         **mesh_parameters(max_edge_length_m=0.02),
         direction=NodeParameter(
@@ -78,19 +78,19 @@ PLANNER = dict(
         speed_m_per_s=NodeParameter(
             0.3, 'Speed of planned passes; 0: from target_um [m/s]', (0.0, FASTEST_M_PER_S)
         ),
-        target_um=thickness('Mean film of planned passes where speed_m_per_s is 0 [µm]'),
+        target_um=thickness_parameter('Mean film of planned passes where speed_m_per_s is 0 [µm]'),
         index_m=NodeParameter(
             0.0, 'Distance between planned passes; 0: the most even [m]', (0.0, 10.0)
         ),
         smoothing_radius_m=NodeParameter(
             PlanRequest.model_fields['smoothing_radius_m'].default,
-            'What is finer than this on the part is not followed [m]',
+            'Radius over which the surface is smoothed; finer shapes are not followed [m]',
             (0.005, 2.0),
         ),
         acceleration_m_per_s2=NodeParameter(
             2.0, 'Acceleration of the robot [m/s^2]', (0.05, 50.0)
         ),
-        outward=direction(
+        outward=direction_parameter(
             'Direction from the part to the gun, any length; empty: the mean normal [-]'
         ),
     ),
@@ -98,9 +98,9 @@ PLANNER = dict(
 
 
 class IndexPlanner(PaintNode):
-    """Answers `recommend_index` for its model; plans and publishes passes if it has a mesh.
+    """Provides `recommend_index` and `plan_passes`; with a mesh, plans passes at the start.
 
-    The planned motion goes out latched on `planned_path`, in the frame of the mesh.
+    The planned motion is published on `planned_path`, latched, in the frame of the mesh.
     """
 
     PARAMETERS = PLANNER
@@ -113,8 +113,8 @@ class IndexPlanner(PaintNode):
         self._action = PassesAction(self, self._plan)
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
-    def _prepare(self) -> None:
-        self._model = read_chosen_model(self.values)
+    def _load_files(self) -> None:
+        self._model = model_from_parameters(self.values)
         self._path_publisher = self.create_publisher(Path, 'planned_path', topics.LATCHED)
         if self.values['mesh_file']:
             self._plan({})
@@ -122,8 +122,8 @@ class IndexPlanner(PaintNode):
     def close(self) -> None:
         self._action.close()
 
-    def _of_brush(self) -> DepositionModel:
-        """The model, or the brush of it that is set."""
+    def _selected_model(self) -> DepositionModel:
+        """The model, with the brush of the parameters if there is one."""
         brush = self.values['brush']
         return self._model.with_brush(brush) if brush else self._model
 
@@ -133,7 +133,7 @@ class IndexPlanner(PaintNode):
         self._requests += 1
         values = self.values
         # In requests and parameters 0 stands for none.
-        asked = {name: getattr(request, name) or None for name in ASKED}
+        asked = {name: getattr(request, name) or None for name in REQUEST_FIELDS}
         try:
             index_request = IndexRequest(
                 **asked,
@@ -144,18 +144,18 @@ class IndexPlanner(PaintNode):
                 standoff_m=values['standoff_m'] or None,
                 travel_rad=values['travel_rad'],
             )
-            answer = recommend(self._of_brush(), index_request)
+            answer = recommend(self._selected_model(), index_request)
         except PaintError as error:
             self._last = Status(WARN, str(error))
             response.message = str(error)
             return response
         self._last = Status(OK, answer.sentence)
-        return _fill(response, answer)
+        return _fill_response(response, answer)
 
     def _plan(
         self, changed: Mapping[str, Any], progress: Progress = lambda stage, share: None
     ) -> tuple[Plan, Path]:
-        """Plan passes with other values of parameters, and publish them."""
+        """Plan passes, with some parameters replaced, and publish them."""
         values = self.values | dict(changed)
         if not values['mesh_file']:
             raise PlanError('mesh_file is empty: name the mesh of the part')
@@ -165,24 +165,24 @@ class IndexPlanner(PaintNode):
         for note in surface.notes:
             self.get_logger().warning(note)
         request = PlanRequest(
-            **{name: values[name] or None for name in PLANNED_IF_GIVEN},
-            **{name: values[name] for name in PLANNED},
+            **{name: values[name] or None for name in OPTIONAL_PARAMETERS},
+            **{name: values[name] for name in REQUIRED_PARAMETERS},
             outward=tuple(values['outward']) or None,
         )
         frame_id = values['frame_id'].lstrip('/')
-        planned = plan(surface, self._of_brush(), request, frame_id, progress)
+        planned = plan(surface, self._selected_model(), request, frame_id, progress)
         self.get_logger().info(planned.sentence)
         path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
         self._path_publisher.publish(path)
         return planned, path
 
-    # --- state
+    # --- parameters and diagnostics
 
-    def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
+    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
         if 'model_file' in names:
-            self._next_model = read_chosen_model(values)
+            self._next_model = model_from_parameters(values)
 
-    def _changed(self, names: set[str]) -> None:
+    def _on_change(self, names: set[str]) -> None:
         if 'model_file' in names:
             self._model = self._next_model
 
@@ -195,7 +195,9 @@ class IndexPlanner(PaintNode):
         return Status(self._last.level, self._last.message, values)
 
 
-def _fill(response: RecommendIndex.Response, answer: Recommendation) -> RecommendIndex.Response:
+def _fill_response(
+    response: RecommendIndex.Response, answer: Recommendation
+) -> RecommendIndex.Response:
     response.success = True
     response.message = '; '.join([answer.sentence, *answer.notes])
     for name in ('index_m', 'sigma_n', 'mean_um', 'speed_m_per_s', 'travel'):
@@ -218,7 +220,7 @@ def _fill(response: RecommendIndex.Response, answer: Recommendation) -> Recommen
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
-    """Poses about SPACING_M apart, both ends included; stamps count from the start."""
+    """Poses about SPACING_M apart, both ends included, with stamps from ``start_ns`` on."""
     step = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
     travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
     kept = np.append(True, np.diff(travelled) > 0.0)

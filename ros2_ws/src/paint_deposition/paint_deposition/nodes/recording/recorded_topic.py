@@ -1,4 +1,4 @@
-"""One topic of a recorder: its subscription to serialised messages, and what it counted."""
+"""A recorded topic: the subscription to its serialised messages, and their counts."""
 
 from __future__ import annotations
 
@@ -26,47 +26,47 @@ TakeMessage = Callable[[str, bytes, int, int], None]
 
 
 class RecordedTopic:
-    """Subscribes to the bytes of a topic.
+    """Subscribes to the serialised messages of a topic.
 
-    `max_gap_ns` is the longest interval between header stamps that is no gap; None for topics
-    whose intervals say nothing.
+    `max_gap_ns` is the longest interval between header stamps that is no gap; None: gaps are not
+    counted.
 
     Attributes:
-        in_run: what the run says of the topic; name: the topic's.
-        messages: that came, in all runs.
-        missed: that never arrived, by the jumps of the publishers' sequence numbers.
-        unnumbered: messages that the middleware gave no number, whose losses nobody can count.
+        run_topic: the topic as the run stores it; name: of the topic.
+        messages: number of messages received, in all runs.
+        missed: messages lost, by the gaps in the publishers' sequence numbers.
+        unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
     """
 
     def __init__(
-        self, node: Node, in_run: RunTopic, take: TakeMessage, max_gap_ns: int | None
+        self, node: Node, run_topic: RunTopic, take: TakeMessage, max_gap_ns: int | None
     ) -> None:
-        self.in_run, self.name = in_run, in_run.name
+        self.run_topic, self.name = run_topic, run_topic.name
         self.messages = 0
-        self.count_from_zero()
+        self.reset_counts()
         self._sequence: dict[bytes, int] = {}
         self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
-        self._message_class = message_class(in_run.type)
+        self._message_class = message_class(run_topic.type)
         self._take = take
         self._max_gap_ns = max_gap_ns
         self._subscription: Subscription | None = None
 
-    def count_from_zero(self) -> None:
-        """Another run begins."""
+    def reset_counts(self) -> None:
+        """Set the counts of the run to zero."""
         self.missed = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
 
     @property
     def losses(self) -> str:
-        """What never arrived, in words."""
+        """The number of lost messages, as text."""
         return 'losses cannot be counted' if self.unnumbered else f'{self.missed} missed'
 
     def subscribe(self, profile: QoSProfile) -> None:
-        """Subscribe, or subscribe anew, with this quality of service."""
+        """Subscribe with this quality of service, instead of the one before if any."""
         if self._subscription:
             self.drain()
             self._node.destroy_subscription(self._subscription)
@@ -76,7 +76,7 @@ class RecordedTopic:
         )
 
     def drain(self) -> None:
-        """Take what waits in the queue; the executor would, but it is being stopped."""
+        """Take all messages in the queue, without the executor."""
         if self._subscription is None:
             return
         handle = self._subscription.handle
@@ -89,7 +89,7 @@ class RecordedTopic:
         self._count_missed(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
-        # Readers order messages by it; a busy middleware's times of receipt go back a little.
+        # Log times order the messages; times of receipt may go back a little under load.
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
         self._take(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
@@ -111,20 +111,20 @@ class RecordedTopic:
         self.newest_stamp_ns = stamp_ns
 
 
-def as_recorded(profile: QoSProfile) -> Qos:
-    """A publisher's profile, as the middleware reports it, the way bags store it."""
+def bag_qos(profile: QoSProfile) -> Qos:
+    """A publisher's QoS profile in the form in which bags store it."""
     return Qos(
         QosHistory[profile.history.name],
         profile.depth,
         QosReliability[profile.reliability.name],
         QosDurability[profile.durability.name],
-        _as_time(profile.deadline),
-        _as_time(profile.lifespan),
+        _qos_time(profile.deadline),
+        _qos_time(profile.lifespan),
         QosLiveliness[profile.liveliness.name],
-        _as_time(profile.liveliness_lease_duration),
+        _qos_time(profile.liveliness_lease_duration),
         profile.avoid_ros_namespace_conventions,
     )
 
 
-def _as_time(duration: Duration) -> QosTime:
+def _qos_time(duration: Duration) -> QosTime:
     return QosTime(*divmod(duration.nanoseconds, 10**9))

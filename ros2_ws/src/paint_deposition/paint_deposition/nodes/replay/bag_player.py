@@ -1,4 +1,4 @@
-"""Node `bag_player`: replays a bag's poses and trigger, in time or as fast as they are taken."""
+"""Node `bag_player`: replays the poses and the trigger of a bag."""
 
 from __future__ import annotations
 
@@ -27,12 +27,12 @@ from paint_deposition.nodes.replay.replayed_messages import (
 )
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
 CLOCK_PERIOD_S = 0.01
-STOP_NOTICED_S = 0.05
+STOP_POLL_S = 0.05
 
-PLAYER = fixed(
+PLAYER = fixed_while_running(
     'the replay has begun with it; start another player',
     bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
     pose_topic=NodeParameter(
@@ -61,19 +61,19 @@ PLAYER = fixed(
 class BagPlayer(PaintNode):
     """Publishes `atomizer/pose`, `atomizer/state` and transforms as recorded, and /clock.
 
-    Every pose goes out as the bytes that were recorded, in the recorded order, whatever the rate;
-    a std_msgs/Bool trigger becomes an AtomizerState stamped with its log time. At rate 0 the
-    player stays at most `window` poses ahead of the slowest node that reports PoseProgress on
-    `atomizer/progress`; nodes that do not report get what their queues hold. When looping, the
-    stamps jump back to the start of the bag with every round. /clock runs on between the messages,
-    and says the same time over and over while the replay stands still.
+    At any rate, poses are published in the recorded order as the recorded bytes. A std_msgs/Bool
+    trigger becomes an AtomizerState stamped with its log time. At rate 0 the player stays at most
+    `window` poses ahead of the slowest node that reports PoseProgress on `atomizer/progress`; a
+    node that does not report may lose what overflows its queue. In a loop the stamps jump back to
+    the start of the bag each time. /clock advances between the messages as well, and repeats the
+    same time while the replay is paused.
     """
 
     PARAMETERS = PLAYER
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
-        # Reliable, so that it knows of acknowledgements.
+        # Reliable, so that subscribers acknowledge.
         profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._state_publisher = self.create_publisher(AtomizerState, 'atomizer/state', profile)
@@ -83,10 +83,10 @@ class BagPlayer(PaintNode):
         if self.values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(CLOCK_PERIOD_S, self._publish_clock)
-        self.offer('~/pause', self._pause)
-        self.offer('~/resume', self._resume)
+        self.create_trigger_service('~/pause', self._pause)
+        self.create_trigger_service('~/resume', self._resume)
         self._stopped = threading.Event()
-        self._awaited = self.values['wait_for_subscribers']
+        self._subscribers_to_await = self.values['wait_for_subscribers']
         window = self.values['window']
         self._flow_control = FlowControl(self, self._pose_publisher, window, self._stopped)
         self.poses_published = self.states_published = 0
@@ -107,20 +107,20 @@ class BagPlayer(PaintNode):
         self._stopped.set()
         self._thread.join()
 
-    def _prepare(self) -> None:
+    def _load_files(self) -> None:
         values = self.values
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
         with open_bag(values['bag']) as bag:
             self._transforms = ReplayedTransforms(self, bag)
-            self._poses_in_bag = choose_pose_topic(bag, values['pose_topic'])
-            self._states_in_bag: BagTopic | None = None
+            self._pose_topic = choose_pose_topic(bag, values['pose_topic'])
+            self._state_topic: BagTopic | None = None
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
-                self._states_in_bag = choose_state_topic(bag, values['state_topic'])
-                if self._states_in_bag.type == BOOL_TYPE:
-                    # Its log times only serve where the recorder's clock is the robot's.
-                    read_trajectory(values['bag'], self._poses_in_bag.name, values['state_topic'])
+                self._state_topic = choose_state_topic(bag, values['state_topic'])
+                if self._state_topic.type == BOOL_TYPE:
+                    # Raises an error unless recorder and robot had the same clock.
+                    read_trajectory(values['bag'], self._pose_topic.name, values['state_topic'])
             elif unused:
                 known = ' '.join(unused)
                 self.get_logger().info(
@@ -141,16 +141,16 @@ class BagPlayer(PaintNode):
 
     def _status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
-            jumps = 'another node publishes /clock, too: nodes with use_sim_time see the time jump'
+            jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
-        doing = self._flow_control.doing if self._time.running else 'paused'
+        status = self._flow_control.status if self._time.running else 'paused'
         values = {
             'bag': self.values['bag'],
             'poses published': self.poses_published,
             'states published': self.states_published,
             'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
         }
-        return Status(WARN if doing.startswith('waiting') else OK, doing, values)
+        return Status(WARN if status.startswith('waiting') else OK, status, values)
 
     # --- the replay's own thread
 
@@ -169,26 +169,26 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            topics = (self._poses_in_bag, self._states_in_bag, self._transforms.topics)
+            topics = (self._pose_topic, self._state_topic, self._transforms.topics)
             for message in replay_messages(bag, *topics):
                 if not begun:
                     begun = True
-                    self._time.stand_at(message.log_time_ns)
-                    self._flow_control.wait_for_subscribers(self._awaited)
-                    self._awaited = 0  # in further rounds
-                    self._time.begin()
-                self._wait_for_turn(message.log_time_ns)
+                    self._time.stop_at(message.log_time_ns)
+                    self._flow_control.wait_for_subscribers(self._subscribers_to_await)
+                    self._subscribers_to_await = 0  # when looping
+                    self._time.start()
+                self._wait_until_due(message.log_time_ns)
                 if self._stopped.is_set():
                     return
-                self._time.reach(message.log_time_ns)
+                self._time.jump_to(message.log_time_ns)
                 self._publish(message)
-        self._time.end()
+        self._time.stop()
         self._publish_clock()
 
-    def _wait_for_turn(self, log_time_ns: int) -> None:
-        """Wait while paused, and until a message's time has come or there is room for it."""
+    def _wait_until_due(self, log_time_ns: int) -> None:
+        """Wait for the end of a pause, the time of a message, and the flow control."""
         while not self._stopped.is_set():
-            if self._time.wait_for(log_time_ns, timeout_s=STOP_NOTICED_S):
+            if self._time.wait_for(log_time_ns, timeout_s=STOP_POLL_S):
                 break
         if self.values['rate'] == 0.0:
             self._flow_control.wait_for_room()
@@ -197,7 +197,7 @@ class BagPlayer(PaintNode):
         if message.transform:
             self._transforms.publish(message.transform)
         elif message.is_pose:
-            self._flow_control.sent(message.stamp_ns)
+            self._flow_control.add_sent(message.stamp_ns)
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
         else:

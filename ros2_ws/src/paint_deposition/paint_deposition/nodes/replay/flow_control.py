@@ -1,4 +1,4 @@
-"""Flow control of a replay: it waits for the nodes that take its poses."""
+"""Flow control of a replay: it waits for the subscribers of the poses."""
 
 from __future__ import annotations
 
@@ -15,64 +15,62 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, endpoint_name
+from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
-# Discovery brings a node's subscriptions and its progress publisher one after the other.
-SETTLED_S = 0.5
+# Subscriptions and progress publisher of a node are not discovered at the same moment.
+STABLE_S = 0.5
 GRAPH_PERIOD_S = 0.1
-NOTICE_PERIOD_S = 5.0
+LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
-# A subscriber that has reported the same pose for so long while none was sent has got all that
-# will ever reach it.
-LOST_AFTER_S = 5.0
-# One that has never reported is not waited for after so long; nodes report as soon as they run.
-UNHEARD_AFTER_S = 20.0
-# More poses than the largest window, by which reports are known.
-REMEMBERED = 20_000
+# If a subscriber reports the same pose for so long while none is sent, later poses are lost to it.
+LOST_TIMEOUT_S = 5.0
+# A subscriber that has not reported at all is waited for no longer than this.
+NO_REPORT_TIMEOUT_S = 20.0
+# Larger than the largest window; reports refer to poses by their stamps.
+MAX_STAMPS = 20_000
 
 
 @dataclass
 class Subscriber:
-    """Poses taken, when the last of them was, and when it last reported.
+    """Number of poses taken, monotonic times of the last progress and the last report.
 
-    `lost` poses never reached it; one that is `unheard` has never reported and is not waited for.
+    `lost` poses never reached it; with `never_reported` it is no longer waited for.
     """
 
     taken: int
     advanced_s: float
     reported_s: float | None = None
     lost: int = 0
-    unheard: bool = False
+    never_reported: bool = False
 
 
 class PoseWindow:
-    """Poses that were published, and which of them each reporting subscriber has taken.
+    """The poses that were sent, and how many of them each reporting subscriber has taken.
 
-    A subscriber is known by its full name; one that joins late, or again, starts with what is
-    published after. Its reports name the newest pose it took by stamp: what was lost before that
-    one does not matter any more. All times are monotonic seconds. Safe to use from several
-    threads.
+    A subscriber that joins, or joins again, starts with the next pose. Its reports identify the
+    newest pose it has taken by the stamp; poses lost before that one are not waited for. All
+    times are monotonic seconds. Thread-safe.
 
     Attributes:
-        subscribers: those that are there, by name.
+        subscribers: those present, by their full names.
     """
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._published = 0
         self._published_s = 0.0
-        self._stamps: deque[int] = deque(maxlen=REMEMBERED)
+        self._stamps: deque[int] = deque(maxlen=MAX_STAMPS)
         self.subscribers: dict[str, Subscriber] = {}
 
-    def publish(self, stamp_ns: int, now_s: float) -> None:
-        """Note that the pose of this stamp was sent."""
+    def add_sent(self, stamp_ns: int, now_s: float) -> None:
+        """Add a pose that was sent, by its stamp."""
         with self._lock:
             self._published += 1
             self._published_s = now_s
             self._stamps.append(stamp_ns)
 
-    def present(self, names: Iterable[str], now_s: float) -> None:
-        """Note which subscribers are there now: others are no longer waited for."""
+    def set_subscribers(self, names: Iterable[str], now_s: float) -> None:
+        """Set the subscribers that are present now; others are no longer waited for."""
         with self._lock:
             known = self.subscribers
             self.subscribers = {
@@ -81,48 +79,48 @@ class PoseWindow:
             }
 
     def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
-        """Note the newest pose that a subscriber has taken; without a name, all of them."""
+        """Set the newest pose that a subscriber has taken, or all of them without a name."""
         with self._lock:
-            # Of equal stamps the newest pose is meant.
+            # Of poses with equal stamps, the newest.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
             taken = 0 if back is None else self._published - back
             for known, subscriber in self.subscribers.items():
                 if name in (None, known):
-                    subscriber.reported_s, subscriber.unheard = now_s, False
+                    subscriber.reported_s, subscriber.never_reported = now_s, False
                     if taken > subscriber.taken:
                         subscriber.taken, subscriber.advanced_s = taken, now_s
 
-    def behind(self, now_s: float) -> dict[str, int]:
-        """Poses that subscribers have not taken yet, of those that are waited for."""
+    def lag(self, now_s: float) -> dict[str, int]:
+        """Number of poses that each subscriber still has to take, if it is waited for."""
         with self._lock:
             waited_for = {}
             for name, subscriber in self.subscribers.items():
                 if subscriber.taken < self._published:
-                    self._drop_hopeless(subscriber, now_s)
-                if subscriber.taken < self._published and not subscriber.unheard:
+                    self._time_out(subscriber, now_s)
+                if subscriber.taken < self._published and not subscriber.never_reported:
                     waited_for[name] = self._published - subscriber.taken
             return waited_for
 
-    def _drop_hopeless(self, subscriber: Subscriber, now_s: float) -> None:
+    def _time_out(self, subscriber: Subscriber, now_s: float) -> None:
         quiet_since_s = max(self._published_s, subscriber.advanced_s)
         if subscriber.reported_s is None:
-            subscriber.unheard |= now_s - quiet_since_s > UNHEARD_AFTER_S
+            subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
         elif (
-            now_s - quiet_since_s > LOST_AFTER_S
-            # It still reports; one that is silent may be busy.
-            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_AFTER_S
+            now_s - quiet_since_s > LOST_TIMEOUT_S
+            # Without reports in this time it may be busy.
+            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
         ):
             subscriber.lost += self._published - subscriber.taken
             subscriber.taken = self._published
 
 
 class FlowControl:
-    """Holds a publisher of poses back until its subscribers have taken them.
+    """Keeps a publisher of poses at most `window` poses ahead of its subscribers.
 
-    Nodes that take the poses and publish PoseProgress on `atomizer/progress` are waited for, pose
-    by pose; of all others only the acknowledgement by their middleware is known. The waiting
-    methods are for one thread beside the executor; they return early once `stopped` is set.
-    `doing` says in words what is waited for.
+    It waits for each pose to be reported by the subscribers that publish PoseProgress on
+    `atomizer/progress`, and for the middleware's acknowledgement by the others. The waiting
+    methods are for one thread beside the executor, and return early once `stopped` is set.
+    `status` describes what is waited for.
     """
 
     def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
@@ -130,93 +128,95 @@ class FlowControl:
         self._limit, self._stopped = window, stopped
         self._window = PoseWindow()
         self._sent = 0
-        self._looked_s = -math.inf
-        self._unheard: set[str] = set()
-        self.doing = 'starting'
+        self._discovered_s = -math.inf
+        self._never_reported: set[str] = set()
+        self.status = 'starting'
         node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
 
     @property
     def poses_ahead(self) -> int:
         """Poses that the slowest reporting subscriber has not taken yet."""
-        return max(self._window.behind(time.monotonic()).values(), default=0)
+        return max(self._window.lag(time.monotonic()).values(), default=0)
 
-    def sent(self, pose_stamp_ns: int) -> None:
-        """Note a pose that is about to be published."""
+    def add_sent(self, pose_stamp_ns: int) -> None:
+        """Add a pose that is about to be published."""
         self._sent += 1
-        self._window.publish(pose_stamp_ns, time.monotonic())
+        self._window.add_sent(pose_stamp_ns, time.monotonic())
 
     def wait_for_subscribers(self, wanted: int) -> None:
-        """Wait for so many subscribers, and until no more turn up at the same moment."""
-        seen, since_s, notice_s = None, time.monotonic(), 0.0
+        """Wait until there are so many subscribers and no more appear for a moment."""
+        seen, since_s, logged_s = None, time.monotonic(), 0.0
         while wanted and not self._stopped.is_set():
             count = self._publisher.get_subscription_count()
-            present = count, self._look_around()
+            present = count, self._discover()
             now_s = time.monotonic()
             if present != seen:
                 seen, since_s = present, now_s
-            if count >= wanted and now_s - since_s >= SETTLED_S:
+            if count >= wanted and now_s - since_s >= STABLE_S:
                 break
-            if count < wanted and now_s - notice_s > NOTICE_PERIOD_S:
-                notice_s = now_s
+            if count < wanted and now_s - logged_s > LOG_PERIOD_S:
+                logged_s = now_s
                 topic = self._publisher.topic_name
-                self._notice(f'waiting for {wanted} subscribers on {topic}, {count} there')
+                self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
             self._stopped.wait(GRAPH_PERIOD_S)
-        self._look_around()
+        self._discover()
 
     def wait_for_room(self) -> None:
-        """Let the subscribers come so near that one more pose is within the window."""
+        """Wait until one more pose fits into the window."""
         if self._sent % self._limit == 0:
             self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
-        self._wait_until_ahead_is_less_than(self._limit)
+        self._wait_for_lag_below(self._limit)
 
     def wait_until_taken(self) -> None:
-        """Wait until every pose was taken, or is known never to be."""
-        self._wait_until_ahead_is_less_than(1)
-        deadline_s = time.monotonic() + NOTICE_PERIOD_S
+        """Wait until every pose is taken or known to be lost."""
+        self._wait_for_lag_below(1)
+        deadline_s = time.monotonic() + LOG_PERIOD_S
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
         for name, subscriber in self._window.subscribers.items():
             if subscriber.lost:
-                self._node.get_logger().warning(f'{name} never got {subscriber.lost} poses')
+                self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
 
-    def _wait_until_ahead_is_less_than(self, limit: int) -> None:
-        notice_s = time.monotonic()
+    def _wait_for_lag_below(self, limit: int) -> None:
+        logged_s = time.monotonic()
         while not self._stopped.is_set():
             now_s = time.monotonic()
-            if now_s - self._looked_s > GRAPH_PERIOD_S:
-                self._look_around()
-            behind = self._window.behind(now_s)
+            if now_s - self._discovered_s > GRAPH_PERIOD_S:
+                self._discover()
+            behind = self._window.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            unheard = {name for name, s in self._window.subscribers.items() if s.unheard}
-            for name in unheard - self._unheard:
+            never_reported = {
+                name for name, s in self._window.subscribers.items() if s.never_reported
+            }
+            for name in never_reported - self._never_reported:
                 self._node.get_logger().warning(
                     f'{name} has never reported its progress: it is no longer waited for, and '
-                    'may lose what its queue does not hold'
+                    'may lose poses when its queue overflows'
                 )
-            self._unheard = unheard
-            if now_s - notice_s > NOTICE_PERIOD_S:
-                notice_s = now_s
+            self._never_reported = never_reported
+            if now_s - logged_s > LOG_PERIOD_S:
+                logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
-                self._notice(f'waiting for {late}')
+                self._log_status(f'waiting for {late}')
             self._stopped.wait(0.001)
-        self.doing = 'playing'
+        self.status = 'playing'
 
-    def _notice(self, doing: str) -> None:
-        self.doing = doing
-        self._node.get_logger().info(doing)
+    def _log_status(self, status: str) -> None:
+        self.status = status
+        self._node.get_logger().info(status)
 
     def _take_report(self, progress: PoseProgress) -> None:
         stamp = stamp_ns(progress.header)
         self._window.report(progress.reporter or None, stamp, time.monotonic())
 
-    def _look_around(self) -> frozenset[str]:
-        """Full names of the nodes that take the poses and can report progress."""
-        self._looked_s = time.monotonic()
+    def _discover(self) -> frozenset[str]:
+        """Full names of the subscribers that also publish progress."""
+        self._discovered_s = time.monotonic()
         takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
         progress = self._node.resolve_topic_name(PROGRESS_TOPIC)
         reporters = self._node.get_publishers_info_by_topic(progress)
-        names = frozenset(map(endpoint_name, takers)) & frozenset(map(endpoint_name, reporters))
-        self._window.present(names, self._looked_s)
+        names = frozenset(map(node_name, takers)) & frozenset(map(node_name, reporters))
+        self._window.set_subscribers(names, self._discovered_s)
         return names

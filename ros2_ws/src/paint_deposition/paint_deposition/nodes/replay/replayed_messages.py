@@ -1,4 +1,4 @@
-"""What a bag player publishes, in order: poses as recorded, the trigger as states, transforms."""
+"""The messages that a bag player publishes: poses, states of the atomizer, transforms."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ DOUBLES = [name for name, kind in STATE_FIELDS.items() if kind == 'double']
 
 
 class ReplayMessage(NamedTuple):
-    """One serialised message; `stamp_ns` is its header's. `transform` is set for those of tf."""
+    """A serialised message and the stamp of its header; for tf only `transform` is set."""
 
     log_time_ns: int
     is_pose: bool
@@ -47,7 +47,7 @@ class ReplayMessage(NamedTuple):
 def replay_messages(
     bag: Bag, poses: BagTopic, states: BagTopic | None, transforms: Sequence[str] = ()
 ) -> Iterator[ReplayMessage]:
-    """Poses, states and transforms in the order of their log times, poses last of equal ones."""
+    """Poses, states and transforms by log time; at equal times, poses last."""
     names = [poses.name, *([states.name] if states else []), *transforms]
     as_state = _state_converter(bag, states)
     for _, simultaneous in groupby(bag.messages(names), key=lambda message: message.log_time_ns):
@@ -62,41 +62,43 @@ def replay_messages(
 
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
     if states is None or states.type == BOOL_TYPE:
-        return _state_of_bool
+        return _bool_as_state
     if bag.type_hash(states) == definitions.installed(STATE_TYPE).type_hash:
         return lambda message: message.cdr
-    # Recorded with another version of the message: fields of the same name are taken over.
-    return lambda message: _state_of(bag.decode(message))
+    # Recorded with another version of the message: fields of the same name are copied.
+    return lambda message: _converted_state(bag.decode(message))
 
 
-def _state_of_bool(message: RawMessage) -> bytes:
+def _bool_as_state(message: RawMessage) -> bytes:
     spraying = deserialize_message(message.cdr, Bool).data
-    return _state(header('', message.log_time_ns), spraying, {'flow': relative_flow(spraying)})
+    return _serialised_state(
+        header('', message.log_time_ns), spraying, {'flow': relative_flow(spraying)}
+    )
 
 
-def _state_of(recorded: Any) -> bytes:
+def _converted_state(recorded: Any) -> bytes:
     known = {name: float(getattr(recorded, name)) for name in DOUBLES if hasattr(recorded, name)}
     at = header(recorded.header.frame_id, stamp_ns(recorded.header))
     brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-    return _state(at, bool(recorded.spraying), known, brush)
+    return _serialised_state(at, bool(recorded.spraying), known, brush)
 
 
-def _state(
+def _serialised_state(
     at: Header, spraying: bool, known: Mapping[str, float], brush: int = ONLY_BRUSH
 ) -> bytes:
-    """A serialised state; what is not known is NaN."""
+    """A serialised state; unknown fields are NaN."""
     doubles = dict.fromkeys(DOUBLES, math.nan) | dict(known)
     return serialize_message(AtomizerState(header=at, spraying=spraying, brush=brush, **doubles))
 
 
 class ReplayedTransforms:
-    """Publishes `/tf` and `/tf_static`; a recorded `part_pose` goes out as a static transform.
+    """Publishes `/tf` and `/tf_static`; a recorded `part_pose` becomes a static transform.
 
-    Where tf2_msgs is not installed nothing is published, and a warning says what to give the
-    simulator instead.
+    Without tf2_msgs nothing is published, and a warning names the parameters of the simulator to
+    set instead.
 
     Attributes:
-        topics: of the bag, whose messages are to be published.
+        topics: the topics of the bag to pass to `publish`.
     """
 
     def __init__(self, node: Node, bag: Bag) -> None:
@@ -110,7 +112,7 @@ class ReplayedTransforms:
             self.topics = []
             node.get_logger().warning(
                 f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
-                f'replayed{_instead(bag)}'
+                f'replayed{_part_pose_hint(bag)}'
             )
             return
         self._message = TFMessage
@@ -130,10 +132,12 @@ class ReplayedTransforms:
         self._publishers[static].publish(cdr)
 
 
-def _instead(bag: Bag) -> str:
-    """The parameters of the simulator that stand for what the bag says of the part."""
-    for parent, child, place in StaticFrames.in_bag(bag).places:
+def _part_pose_hint(bag: Bag) -> str:
+    """The parameters of the simulator that replace the transforms, for a warning."""
+    for parent, child, place in StaticFrames.from_bag(bag).places:
         if child == 'part':
             values = ', '.join(f'{value:.9g}' for value in place.values)
-            return f"; give the simulator part_parent_frame: '{parent}' and part_pose: [{values}]"
-    return '; give the simulator part_parent_frame and part_pose'
+            return (
+                f"; set part_parent_frame: '{parent}' and part_pose: [{values}] of the simulator"
+            )
+    return "; set the simulator's part_parent_frame and part_pose"

@@ -1,4 +1,4 @@
-"""Node `atomizer_source`: poses and states of the gun from what a robot's driver publishes."""
+"""Node `atomizer_source`: poses and states of the gun from the topics of a robot driver."""
 
 from __future__ import annotations
 
@@ -15,25 +15,25 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import USUAL_TIP, Robot
+from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
-from paint_deposition.motion.part_frame import POSE_WORDS, Rigid, is_pose
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, JointPoses, TfPoses
 from paint_deposition.nodes.runtime.messages import header, message_class
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH, accepting
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, compatible_qos
 
-# Who comes late must know whether the gun is open; who is slow must miss no change.
+# Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
-# (topic, message, what the middleware says of it)
+# (topic, message, message info of the middleware)
 TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
-SOURCE = fixed(
+SOURCE = fixed_while_running(
     'the subscriptions are made with it when the node starts; restart the node',
     urdf_file=NodeParameter(
         '', 'The robot, URDF, whose joint states give the poses; empty: tf gives them [path]'
@@ -41,20 +41,18 @@ SOURCE = fixed(
     tip_link=NodeParameter(
         '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
     ),
-    base_link=NodeParameter(
-        '', 'Link or frame in which the poses are; empty: the root of urdf_file [name]'
-    ),
+    base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
     tcp_offset=NodeParameter(
         [],
         'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link is '
         'the TCP [m, -]',
-        constraints=f'{POSE_WORDS}, or none',
+        constraints=f'{POSE_FORMAT}, or none',
         allows=lambda value: not value or is_pose(value),
         element=float,
     ),
     trigger=NodeParameter(
-        '', f'What opens the gun: {SIGNAL}; empty: nothing is published on atomizer/state [topic]'
+        '', f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]'
     ),
     flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
     brush=NodeParameter(
@@ -75,8 +73,8 @@ SOURCE = fixed(
 class AtomizerSource(PaintNode):
     """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
-    A pose has the stamp of the joint state or transform that it was computed from. A signal
-    counts from the stamp of its message, or else from the time at which it was sent.
+    A pose has the stamp of its joint state or transform. A signal takes effect at the stamp of
+    its message, or at the time it was sent if there is none.
     """
 
     PARAMETERS = SOURCE
@@ -89,20 +87,20 @@ class AtomizerSource(PaintNode):
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
-        # The joints and the signals that have no publisher yet.
+        # Callbacks of the topics that have no publisher yet.
         self._missing: dict[str, Callable[..., None]] = {
-            signal.topic: self._take_signals for signal in self._signals.values()
+            signal.topic: self._on_signal_message for signal in self._signals.values()
         }
-        self._motion = self._motion_of_robot()
+        self._motion = self._create_motion()
         self._values: dict[str, float] = {}
         self._published = ''
         self._poses = 0
         self._clock_offset_s = 0.0
         self._problem = ''
-        self._find_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._find_topics)
+        self._discovery_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
         Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
 
-    def _check(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any]) -> None:
         if not values['urdf_file'] and not values['base_link']:
             raise PaintError(
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
@@ -110,12 +108,12 @@ class AtomizerSource(PaintNode):
             )
         alone = [name for name in SIGNALS[1:] if values[name] and not values['trigger']]
         if alone:
-            raise PaintError(f'{alone[0]} is given without a trigger: name what opens the gun')
+            raise PaintError(f'{alone[0]} is given without a trigger: name the signal of the gun')
         for name in SIGNALS:
-            if values[name] and Signal.of(values[name]) is None:
+            if values[name] and Signal.parse(values[name]) is None:
                 raise PaintError(f"{name} is '{values[name]}': give {SIGNAL}")
 
-    def _prepare(self) -> None:
+    def _load_files(self) -> None:
         values = self.values
         self._robot = None
         if values['urdf_file']:
@@ -123,15 +121,15 @@ class AtomizerSource(PaintNode):
                 Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
             )
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
-        named = {name: Signal.of(values[name]) for name in SIGNALS}
+        named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
 
-    def _motion_of_robot(self) -> JointPoses | TfPoses:
+    def _create_motion(self) -> JointPoses | TfPoses:
         values = self.values
         if self._robot is None:
-            tip = values['tip_link'] or USUAL_TIP
+            tip = values['tip_link'] or DEFAULT_TIP
             return TfPoses(self, values['base_link'], tip, self._publish_pose)
         joints = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
         self._missing[values['joint_topic']] = joints.take
@@ -148,20 +146,20 @@ class AtomizerSource(PaintNode):
 
     # --- signals
 
-    def _find_topics(self) -> None:
-        """Subscribe to each topic when its type and its quality of service are known."""
+    def _discover_topics(self) -> None:
+        """Subscribe to topics as soon as their type and quality of service are known."""
         for topic, take in tuple(self._missing.items()):
             found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
             if found:
                 message = message_class(found[0].topic_type)
-                profile = accepting([info.qos_profile for info in found], QUEUE_DEPTH)
+                profile = compatible_qos([info.qos_profile for info in found], QUEUE_DEPTH)
                 self.create_subscription(message, topic, partial(take, topic), profile)
                 del self._missing[topic]
         if not self._missing:
-            self._find_timer.cancel()
+            self._discovery_timer.cancel()
 
-    def _take_signals(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
-        """Take trigger, flow and brush, which may be fields of one message."""
+    def _on_signal_message(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
+        """Take trigger, flow, brush and speed, which may be fields of one message."""
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         self._problem = ''
         for name, signal in self._signals.items():
@@ -183,7 +181,7 @@ class AtomizerSource(PaintNode):
             self._publish_state(stamp or now_ns)
 
     def _publish_state(self, stamp: int) -> None:
-        """Publish the state from this time on, if it is known and has changed."""
+        """Publish the state if all signals are known and it has changed."""
         if self._signals.keys() - self._values.keys():
             return
         full = self.values['calibrated_flow']
@@ -199,7 +197,7 @@ class AtomizerSource(PaintNode):
             state.header = header(self._motion.base, stamp)
             self._state_publisher.publish(state)
 
-    # --- health
+    # --- diagnostics
 
     def _robot_status(self) -> Status:
         found = self._motion.status()
@@ -209,12 +207,12 @@ class AtomizerSource(PaintNode):
 
     def _signals_status(self) -> Status:
         values = {
-            f'{name}, {signal.topic}{signal.path}': self._values.get(name, 'not heard')
+            f'{name}, {signal.topic}{signal.path}': self._values.get(name, 'not received')
             for name, signal in self._signals.items()
         }
         if self._problem:
             return Status(ERROR, self._problem, values)
-        missing = [name for name, value in values.items() if value == 'not heard']
+        missing = [name for name, value in values.items() if value == 'not received']
         if missing:
-            return Status(WARN, f'not heard: {" ".join(missing)}', values)
+            return Status(WARN, f'not received: {" ".join(missing)}', values)
         return Status(OK, 'following the signals' if values else 'no signal is named', values)

@@ -22,56 +22,56 @@ from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Stat
 TakePose = Callable[[int, Rigid, int], None]
 SILENT_S = 2.0
 QUEUE_DEPTH = 5000
-# Transforms that are so much older than the newest are of a stream that begins again [ns].
-ANOTHER_STREAM_NS = 1_000_000_000
+# A transform that is older than the newest by more is from a restarted stream [ns].
+STREAM_RESTART_NS = 1_000_000_000
 
 
 class JointPoses:
-    """Computes a pose of frame `tip` in `base` from each joint state, which must have all joints.
+    """Computes the pose of link `tip` in `base` from each joint state, which needs all joints.
 
-    `topic` is that of the joint states, for messages; `take_pose` gets each pose.
+    `topic` is that of the joint states, for messages; `take_pose` is called with each pose.
     """
 
     def __init__(self, robot: Robot, topic: str, take_pose: TakePose) -> None:
         self.base, self.tip = robot.base, robot.tip
         self._robot, self._topic, self._take_pose = robot, topic, take_pose
         self._poses = self._incomplete = 0
-        self._heard_s = time.monotonic()
+        self._received_s = time.monotonic()
 
     def take(self, _topic: str, message: JointState, info: Mapping[str, Any]) -> None:
-        """Take a joint state."""
+        """Compute the pose for a joint state; the callback of its subscription."""
         positions_by_name = dict(zip(message.name, message.position, strict=False))
-        if any(name not in positions_by_name for name in self._robot.moving):
+        if any(name not in positions_by_name for name in self._robot.moving_joints):
             self._incomplete += 1
             return
-        self._heard_s = time.monotonic()
-        values = np.array([[positions_by_name[name] for name in self._robot.moving]])
+        self._received_s = time.monotonic()
+        values = np.array([[positions_by_name[name] for name in self._robot.moving_joints]])
         positions, quaternions = self._robot.poses(values)
         tip = Rigid.of([*positions[0], *quaternions[0]])
         self._poses += 1
         self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
 
     def status(self) -> Status:
-        """Whether joint states come, and have all joints."""
+        """Whether joint states arrive, and have all joints."""
         values = {'robot': self._robot.path, 'joint states without all joints': self._incomplete}
         if self._incomplete and not self._poses:
-            joints = ' '.join(self._robot.moving)
+            joints = ' '.join(self._robot.moving_joints)
             return Status(ERROR, f'no joint state has all of {joints}', values)
-        if time.monotonic() - self._heard_s > SILENT_S:
+        if time.monotonic() - self._received_s > SILENT_S:
             return Status(WARN, f'no joint states on {self._topic}', values)
         return Status(OK, 'following the robot', values)
 
 
 class TfPoses:
-    """Gives a pose for each stamp of a transform that moves between two frames.
+    """Looks up the pose of frame `tip` in `base` at each stamp of a moving transform between them.
 
-    A pose waits until all transforms on the way are known at its time or later; tf2 interpolates
-    those that come at other times.
+    A pose waits until all transforms between the frames are known at its time or later; tf2
+    interpolates those with other stamps.
 
     Args:
-        node: to subscribe with.
-        base, tip: frame of the poses, and whose they are.
-        take_pose: gets each pose, in the order of their stamps.
+        node: subscribes to tf.
+        base, tip: names of the frames.
+        take_pose: called with each pose, in the order of the stamps.
 
     Raises:
         PaintError: tf2 is not installed.
@@ -91,12 +91,12 @@ class TfPoses:
         self._tf2 = tf2_ros
         self._buffer = tf2_ros.Buffer()
         self._parents: dict[str, str] = {}
-        # Stamps of the transforms over time that may lie on the way, by the child's frame.
+        # (stamp, child frame) of the moving transforms whose poses are not published yet.
         self._waiting: deque[tuple[int, str]] = deque(maxlen=QUEUE_DEPTH)
         self._newest_ns: dict[str, int] = {}
-        self._passed_ns = 0
-        self._unknown = 0
-        self._heard_s = time.monotonic()
+        self._published_ns = 0
+        self._failed_lookups = 0
+        self._received_s = time.monotonic()
         latched = DurabilityPolicy.TRANSIENT_LOCAL
         node.create_subscription(
             TFMessage, '/tf_static', self._take_static, QoSProfile(depth=100, durability=latched)
@@ -111,66 +111,66 @@ class TfPoses:
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
         for transform in message.transforms:
             child, stamp = self._connect(transform), stamp_ns(transform.header)
-            if stamp < self._newest_ns.get(child, 0) - ANOTHER_STREAM_NS:
-                self._begin_again()
+            if stamp < self._newest_ns.get(child, 0) - STREAM_RESTART_NS:
+                self._restart()
             self._buffer.set_transform(transform, 'tf')
             self._newest_ns[child] = max(stamp, self._newest_ns.get(child, 0))
             self._waiting.append((stamp, child))
-        self._pass_on(info['source_timestamp'])
+        self._publish_due(info['source_timestamp'])
 
     def _connect(self, transform: Any) -> str:
         child = transform.child_frame_id.lstrip('/')
         self._parents[child] = transform.header.frame_id.lstrip('/')
         return child
 
-    def _begin_again(self) -> None:
+    def _restart(self) -> None:
         self._buffer.clear()  # static transforms stay
         self._waiting.clear()
         self._newest_ns.clear()
-        self._passed_ns = 0
+        self._published_ns = 0
 
-    def _upward(self, frame: str) -> list[str]:
+    def _ancestors(self, frame: str) -> list[str]:
         """A frame, its parent and so on up to the root."""
-        way = [frame]
-        while way[-1] in self._parents and len(way) <= len(self._parents):
-            way.append(self._parents[way[-1]])
-        return way
+        chain = [frame]
+        while chain[-1] in self._parents and len(chain) <= len(self._parents):
+            chain.append(self._parents[chain[-1]])
+        return chain
 
     @property
     def _moving(self) -> set[str]:
-        """The frames on the way that move in their parents; none while no way is known."""
-        from_tip, from_base = self._upward(self.tip), self._upward(self.base)
+        """Frames between tip and base that move in their parents; none if not connected."""
+        from_tip, from_base = self._ancestors(self.tip), self._ancestors(self.base)
         if from_tip[-1] != from_base[-1]:
             return set()
         return (set(from_tip) ^ set(from_base)) & self._newest_ns.keys()
 
-    def _pass_on(self, sent_ns: int) -> None:
+    def _publish_due(self, sent_ns: int) -> None:
         moving = self._moving
         if not moving:
             return
         known_ns = min(self._newest_ns[child] for child in moving)
-        on_the_way = [(at_ns, child) for at_ns, child in self._waiting if child in moving]
-        later = [(at_ns, child) for at_ns, child in on_the_way if at_ns > known_ns]
+        relevant = [(at_ns, child) for at_ns, child in self._waiting if child in moving]
+        later = [(at_ns, child) for at_ns, child in relevant if at_ns > known_ns]
         self._waiting = deque(later, maxlen=QUEUE_DEPTH)
-        due = {at_ns for at_ns, _ in on_the_way if self._passed_ns < at_ns <= known_ns}
+        due = {at_ns for at_ns, _ in relevant if self._published_ns < at_ns <= known_ns}
         for stamp in sorted(due):
-            self._passed_ns = stamp
+            self._published_ns = stamp
             try:
                 found = self._buffer.lookup_transform(self.base, self.tip, Time(nanoseconds=stamp))
             except self._tf2.TransformException:
-                self._unknown += 1
+                self._failed_lookups += 1
                 continue
             t, q = found.transform.translation, found.transform.rotation
-            self._heard_s = time.monotonic()
+            self._received_s = time.monotonic()
             self._take_pose(stamp, Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w]), sent_ns)
 
     def status(self) -> Status:
-        """Whether a way leads from the tip to the base, and its transforms come."""
+        """Whether tf connects tip and base, and transforms arrive."""
         frames = sorted({*self._parents, *self._parents.values()})
         values = {
             'frames': ' '.join(frames) or 'none',
-            'frames that move on the way': ' '.join(sorted(self._moving)) or 'none',
-            'times at which tf knew no pose': self._unknown,
+            'moving frames between tip and base': ' '.join(sorted(self._moving)) or 'none',
+            'failed lookups': self._failed_lookups,
         }
         if not frames:
             return Status(WARN, 'no transforms on /tf', values)
@@ -179,8 +179,8 @@ class TfPoses:
                 known = did_you_mean(name, frames)
                 return Status(ERROR, f"tf has no frame '{name}'; {known}", values)
         if not self._moving:
-            reason = f"no transforms that move lead from '{self.tip}' to '{self.base}'"
+            reason = f"no moving transforms connect '{self.tip}' to '{self.base}'"
             return Status(ERROR, reason, values)
-        if time.monotonic() - self._heard_s > SILENT_S:
+        if time.monotonic() - self._received_s > SILENT_S:
             return Status(WARN, 'no new transforms of the robot on /tf', values)
         return Status(OK, 'following the robot', values)

@@ -1,1 +1,1 @@
-"""What every node has: process, parameters, quality of service, diagnostics."""
+"""The base of every node: process, parameters, quality of service, diagnostics."""

@@ -1,4 +1,4 @@
-"""A managed node: it is configured and activated by itself, or by a lifecycle manager."""
+"""Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
 from __future__ import annotations
 
@@ -9,10 +9,14 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import ERROR, OK, Diagnostics, PaintNode, Status, Task
-from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    ParameterTable,
+    fixed_while_running,
+)
 
-MANAGED = fixed(
-    'it counts when the node starts',
+MANAGED = fixed_while_running(
+    'it is read when the node starts',
     autostart=NodeParameter(
         True,
         'Configure and activate the node when it starts; false: a lifecycle manager does '
@@ -23,136 +27,139 @@ ENTITIES = ('publisher', 'subscription', 'service', 'client', 'timer')
 
 
 class ManagedNode(LifecycleNodeMixin, PaintNode):
-    """A node with the states of a managed node of ROS 2.
+    """A node with the lifecycle of a managed node of ROS 2.
 
-    To configure it reads its files and makes its topics and services; active, it works. What a
-    transition makes on the node is destroyed by the one that leads back. Bad input, a PaintError,
-    leaves the state as it was; any other error leads to `unconfigured`. Both are said in a line.
+    `configure` reads its files and creates its topics and services; `activate` starts its work.
+    The reverse transition destroys whatever publishers, timers and so on a transition created. A
+    PaintError leaves the state as it was; any other error leads to `unconfigured`. Either is
+    logged in one line.
     """
 
     PARAMETERS: ParameterTable = MANAGED
-    # Whether it is just being configured and activated by itself.
-    starts_itself = False
+    # Whether the node is configuring and activating itself right now.
+    autostarting = False
     _failure: Exception | None = None
 
     def __init__(self, name: str, **kwargs: Any):
-        # What was there before it was configured, and before it was activated.
-        self._before: list[set[Any]] = []
-        # The mixin does not pass arguments on; it is initialised when the node is there.
+        # The entities from before `configure`, and those from before `activate`.
+        self._entities_before: list[set[Any]] = []
+        # The mixin does not pass arguments on; it is initialised once the node exists.
         PaintNode.__init__(self, name, **kwargs)
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         LifecycleNodeMixin.__init__(self)
-        self._health = Diagnostics(self, {'state': self._state_status})
-        self.starts_itself = self.values['autostart']
-        if not self.starts_itself:
-            self.get_logger().info('waits for a lifecycle manager to configure it')
+        self._diagnostics = Diagnostics(self, {'state': self._state_status})
+        self.autostarting = self.values['autostart']
+        if not self.autostarting:
+            self.get_logger().info('waiting for a lifecycle manager to configure this node')
             return
         for step in (self.trigger_configure, self.trigger_activate):
             step()
             if self._failure is not None:
                 raise self._failure
-        self.starts_itself = False
+        self.autostarting = False
 
     # --- for the subclass
 
     def _configure(self) -> None:
-        """Make what is there as long as the node is configured; its files have been read."""
+        """Create what the configured node has; its files have been read."""
 
     def _activate(self) -> None:
-        """Begin to work."""
+        """Start working."""
 
     def _deactivate(self) -> None:
-        """Hold the work, all that came before included in it."""
+        """Pause the work, after processing everything received so far."""
 
     def _cleanup(self) -> None:
-        """End threads and the like; what was made on the node goes by itself."""
+        """Stop threads and the like; publishers, timers and so on are destroyed anyway."""
 
-    def _tasks(self) -> Mapping[str, Task]:
-        """The health of the configured node by task, by name."""
+    def _diagnostic_tasks(self) -> Mapping[str, Task]:
+        """The diagnostic tasks of the configured node, by name."""
         return {}
 
     @property
     def configured(self) -> bool:
-        return len(self._before) > 0
+        return len(self._entities_before) > 0
 
     @property
     def active(self) -> bool:
-        """Whether it works."""
-        return len(self._before) > 1
+        """Whether the node is in the state `active`."""
+        return len(self._entities_before) > 1
 
     def close(self) -> None:
-        """Hold the work and clean up, as far as it was begun."""
+        """Deactivate and clean up, if the node is active or configured."""
         if self.active:
-            self._lead_back(self._deactivate)
+            self._leave(self._deactivate)
         if self.configured:
-            self._lead_back(self._clean_up)
+            self._leave(self._run_cleanup)
 
     # --- transitions
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._outcome('configured', lambda: self._lead_on(self._set_up))
+        return self._transition_result('configured', lambda: self._enter(self._load_and_configure))
 
     def on_activate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._outcome('activated', lambda: self._lead_on(self._activate))
+        return self._transition_result('activated', lambda: self._enter(self._activate))
 
     def on_deactivate(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._outcome('deactivated', lambda: self._lead_back(self._deactivate))
+        return self._transition_result('deactivated', lambda: self._leave(self._deactivate))
 
     def on_cleanup(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._outcome('cleaned up', lambda: self._lead_back(self._clean_up))
+        return self._transition_result('cleaned up', lambda: self._leave(self._run_cleanup))
 
     def on_shutdown(self, state: LifecycleState) -> TransitionCallbackReturn:
-        return self._outcome('shut down', self.close)
+        return self._transition_result('shut down', self.close)
 
     def on_error(self, state: LifecycleState) -> TransitionCallbackReturn:
         self.close()
         return TransitionCallbackReturn.SUCCESS
 
-    def _set_up(self) -> None:
+    def _load_and_configure(self) -> None:
         self._load()
         self._configure()
-        self._health.tasks = {**self._tasks(), 'state': self._state_status}
+        self._diagnostics.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
 
-    def _clean_up(self) -> None:
+    def _run_cleanup(self) -> None:
         try:
             self._cleanup()
         finally:
-            # An aggregator takes a status that is no longer sent for that of a node that is gone.
-            for task in self._health.tasks.keys() - {'state'}:
-                self._health.tasks[task] = lambda: Status(OK, 'the node is not configured')
+            # An aggregator would report a status that is no longer published as stale.
+            for task in self._diagnostics.tasks.keys() - {'state'}:
+                self._diagnostics.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
-    def _outcome(self, done: str, transition: Callable[[], None]) -> TransitionCallbackReturn:
+    def _transition_result(
+        self, done: str, transition: Callable[[], None]
+    ) -> TransitionCallbackReturn:
         self._failure = None
         try:
             transition()
         except Exception as error:
             self._failure = error
-            if not self.starts_itself:  # else the process ends with it
-                self.get_logger().error(f'not {done}: {_in_words(error)}')
-            foreseen = isinstance(error, PaintError)
-            return TransitionCallbackReturn.FAILURE if foreseen else TransitionCallbackReturn.ERROR
-        if not self.starts_itself:
+            if not self.autostarting:  # else the process ends with this error
+                self.get_logger().error(f'not {done}: {_error_text(error)}')
+            expected = isinstance(error, PaintError)
+            return TransitionCallbackReturn.FAILURE if expected else TransitionCallbackReturn.ERROR
+        if not self.autostarting:
             self.get_logger().info(done)
         return TransitionCallbackReturn.SUCCESS
 
-    def _lead_on(self, step: Callable[[], None]) -> None:
+    def _enter(self, step: Callable[[], None]) -> None:
         kinds = (getattr(self, f'{kind}s') for kind in ENTITIES)
-        self._before.append({entity for entities in kinds for entity in entities})
+        self._entities_before.append({entity for entities in kinds for entity in entities})
         try:
             step()
         except BaseException:
-            self._destroy_new()
+            self._destroy_entities()
             raise
 
-    def _lead_back(self, step: Callable[[], None]) -> None:
+    def _leave(self, step: Callable[[], None]) -> None:
         try:
             step()
         finally:
-            self._destroy_new()
+            self._destroy_entities()
 
-    def _destroy_new(self) -> None:
-        before = self._before.pop()
+    def _destroy_entities(self) -> None:
+        before = self._entities_before.pop()
         for kind in ENTITIES:
             for entity in set(getattr(self, f'{kind}s')) - before:
                 getattr(self, f'destroy_{kind}')(entity)
@@ -160,11 +167,11 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _state_status(self) -> Status:
         label = self._state_machine.current_state[1]
         if self._failure is not None:
-            return Status(ERROR, f'{label}: {_in_words(self._failure)}')
+            return Status(ERROR, f'{label}: {_error_text(self._failure)}')
         return Status(OK, label)
 
 
-def _in_words(error: Exception) -> str:
-    """The error in a line; of one that nobody foresaw its kind, too."""
+def _error_text(error: Exception) -> str:
+    """The error in one line, with its type unless it is a PaintError."""
     words = ' '.join(str(error).split())
     return words if isinstance(error, PaintError) else f'{type(error).__name__}: {words}'

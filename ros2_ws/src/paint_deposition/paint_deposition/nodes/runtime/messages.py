@@ -16,7 +16,7 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
-# A header begins with its stamp, behind the four bytes that say how the message is encoded.
+# The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
 SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
@@ -30,13 +30,13 @@ def header(frame_id: str, stamp_ns: int) -> Header:
 
 
 def message_class(type_name: str) -> type:
-    """The class of a type as ROS names it: std_msgs/msg/Bool."""
+    """The Python class of a message type such as std_msgs/msg/Bool."""
     package, kind, name = type_name.split('/')
     return getattr(importlib.import_module(f'{package}.{kind}'), name)
 
 
 def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marker:
-    """A marker at its frame's origin; viewers multiply the vertices' colours by its white."""
+    """A marker at the origin of its frame; its white leaves the colours of vertices unchanged."""
     marker = Marker(ns=namespace, id=number, type=kind, header=Header(frame_id=frame_id))
     marker.pose.orientation.w = 1.0
     marker.scale = Vector3(x=1.0, y=1.0, z=1.0)
@@ -64,7 +64,7 @@ class ColouredMesh:
         self, vertices_m: np.ndarray, faces: np.ndarray, frame_id: str, namespace: str
     ) -> None:
         self._corners = faces.ravel()
-        head, tail = _around_the_arrays(frame_id, namespace)
+        head, tail = _marker_head_and_tail(frame_id, namespace)
         points = vertices_m[self._corners].astype(np.float64).tobytes()
         count = struct.pack('=I', len(self._corners))
         gap = b'\0' * (-(len(head) + len(count) - STAMP_OFFSET) % 8)
@@ -75,7 +75,7 @@ class ColouredMesh:
             self._buffer, np.float32, 4 * len(self._corners), len(before_colours)
         ).reshape(-1, 4)
 
-    def serialised(self, stamp_ns: int, palette: np.ndarray, rows: np.ndarray) -> bytes:
+    def serialise(self, stamp_ns: int, palette: np.ndarray, rows: np.ndarray) -> bytes:
         """The message, ready to be published.
 
         Args:
@@ -87,11 +87,11 @@ class ColouredMesh:
         return bytes(self._buffer)
 
 
-def _around_the_arrays(frame_id: str, namespace: str) -> tuple[bytes, bytes]:
-    """What a serialised Marker has before its points' count and after its colours.
+def _marker_head_and_tail(frame_id: str, namespace: str) -> tuple[bytes, bytes]:
+    """The bytes of a serialised Marker before the count of its points, and after its colours.
 
-    The middleware's own serialiser says it: a small marker is serialised and searched for its
-    arrays. Whatever stands behind them keeps its alignment, since a corner takes 40 bytes.
+    They are cut from a small marker that the middleware has serialised. Alignment behind the
+    arrays stays the same, since a corner takes 40 bytes.
     """
     marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
     marker.points = [Point(x=x, y=y, z=z) for x, y, z in SAMPLE_POINTS.tolist()]

@@ -1,4 +1,4 @@
-"""The parameters that choose a node's deposition model, and reading it."""
+"""The parameters that select a node's deposition model, and reading that model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTa
 
 
 def model_parameters(use: str) -> ParameterTable:
-    """The rows `model_file` and `allow_user_effects`; `use` says what a new model does."""
+    """The rows `model_file` and `allow_user_effects`; `use` completes "Setting it reads it"."""
     return {
         'model_file': NodeParameter(
             '',
@@ -33,13 +33,13 @@ def model_parameters(use: str) -> ParameterTable:
     }
 
 
-def read_chosen_model(
+def model_from_parameters(
     values: Mapping[str, Any], load: LoadEffect = load_effect_file
 ) -> DepositionModel:
-    """The model that a node's parameters choose; `load` reads effect files it may name.
+    """The model that a node's parameters select; `load` reads the effect files it names.
 
     Raises:
-        ModelError: the model cannot be used, or names an effect file without being allowed to.
+        ModelError: the model is invalid, or names an effect file without `allow_user_effects`.
     """
     if not values['model_file']:
         return DepositionModel()
@@ -48,24 +48,24 @@ def read_chosen_model(
     )
 
 
-def read_chosen_models(
+def models_from_parameters(
     values: Mapping[str, Any], load: LoadEffect = load_effect_file
 ) -> tuple[DepositionModel, ...]:
-    """The model of each of `atomizers`, at least one, by `model_files` or `model_file`.
+    """The model of each gun, from `model_files` or `model_file`; one model without `atomizers`.
 
     Raises:
-        PaintError: there are not as many models as guns, or as for one model.
+        PaintError: as above, or the number of models is not that of the guns.
     """
     guns, files = values['atomizers'] or [''], values['model_files']
     if not files:
-        return (read_chosen_model(values, load),) * len(guns)
+        return (model_from_parameters(values, load),) * len(guns)
     if len(files) != len(guns) or values['model_file']:
         another = ' and model_file another' if values['model_file'] else ''
         raise PaintError(
             f'model_files names {len(files)} models for {len(guns)} atomizers{another}: give '
             'model_file for all, or model_files one for each of atomizers'
         )
-    models = tuple(read_chosen_model({**values, 'model_file': file}, load) for file in files)
+    models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
     require_one_finish(dict(zip(guns, models, strict=True)))
     return models
 

@@ -1,4 +1,4 @@
-"""The base of every node: parameters, clock, threads, and what it says of its health."""
+"""The base class of all nodes: parameters, timers, threads and diagnostics."""
 
 from __future__ import annotations
 
@@ -32,14 +32,14 @@ ERROR = DiagnosticStatus.ERROR
 
 
 class PaintNode(Node):
-    """A node with a parameter table that can end its process and has something to finish then.
+    """A node with a table of parameters, which can end its process.
 
     Keyword arguments are those of rclpy's Node (context, namespace, parameter_overrides, ...).
 
     Attributes:
         loading: whether a node of this process is reading its files.
-        values: the parameters by name, as they are now.
-        finished: completed when the process is to end, with its exit code or an exception.
+        values: current values of the parameters, by name.
+        finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
     PARAMETERS: ParameterTable = MappingProxyType({})
@@ -51,65 +51,65 @@ class PaintNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
-            self._check(self.values)
-            self._begin()
+            self._validate(self.values)
+            self._start()
         except PaintError:
-            # The subclass is not complete yet: it has nothing of its own to destroy.
+            # The subclass is not constructed yet: it has nothing of its own to destroy.
             super().destroy_node()
             raise
-        self.add_on_set_parameters_callback(self._check_changes)
-        self.add_post_set_parameters_callback(self._apply_changes)
+        self.add_on_set_parameters_callback(self._on_set_parameters)
+        self.add_post_set_parameters_callback(self._after_set_parameters)
 
-    def _begin(self) -> None:
+    def _start(self) -> None:
         self._load()
 
     def _load(self) -> None:
-        """Read the files; a signal breaks it off."""
+        """Read the files; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
         try:
-            self._prepare()
+            self._load_files()
         finally:
             PaintNode.loading = False
 
     # --- for the subclass
 
-    def _check(self, values: Mapping[str, Any]) -> None:
-        """Raise PaintError if these values do not go together."""
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        """Raise PaintError if these values contradict each other."""
 
-    def _prepare(self) -> None:
-        """Read the files that ``self.values`` name; a PaintError ends the node."""
+    def _load_files(self) -> None:
+        """Read the files named in ``self.values``; a PaintError ends the node."""
 
-    def _check_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        """Raise PaintError if the new values of these parameters cannot be taken up now."""
+    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
+        """Raise PaintError if these parameters cannot be changed to the new values now."""
 
-    def _changed(self, names: set[str]) -> None:
-        """Take up the new values of these parameters, which are in ``self.values``."""
+    def _on_change(self, names: set[str]) -> None:
+        """Apply the changes of these parameters; ``self.values`` has the new values."""
 
     def close(self) -> None:
-        """Finish files and the like. Called once, after the last callback; signals are ignored."""
+        """Close files and the like. Called once, after the last callback; signals are ignored."""
 
-    # --- for everybody
+    # --- for all users
 
     @property
     def configured(self) -> bool:
-        """Whether its files have been read."""
+        """Whether the files have been read."""
         return True
 
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
 
-    def offer(self, name: str, answer: Callable[[], tuple[bool, str]]) -> None:
-        """A service std_srvs/Trigger; `answer` says whether all went well, and what happened."""
+    def create_trigger_service(self, name: str, handle: Callable[[], tuple[bool, str]]) -> None:
+        """A std_srvs/Trigger service; `handle` returns success and message."""
 
         def respond(_request: Trigger.Request, response: Trigger.Response) -> Trigger.Response:
-            response.success, response.message = answer()
+            response.success, response.message = handle()
             return response
 
         self.create_service(Trigger, name, respond)
 
-    async def in_a_thread(self, work: concurrent.futures.Future) -> Any:
-        """What a thread's work returns, or raises; other callbacks run meanwhile."""
+    async def result_of(self, work: concurrent.futures.Future) -> Any:
+        """Await work that a thread does; other callbacks run meanwhile."""
         done: Future = Future(executor=self.executor)
         # Completed from another thread, a future does not wake the executor unless it has a
         # callback to run.
@@ -119,12 +119,12 @@ class PaintNode(Node):
         return work.result()
 
     def finish(self, exit_code: int = 0) -> None:
-        """Ask the process to end; the callback that runs is completed first."""
+        """Ask the process to exit; the running callback is completed first."""
         if not self.finished.done():
             self.finished.set_result(exit_code)
 
     def fail(self, error: Exception) -> None:
-        """Ask the process to end with an error, from a thread or a callback that must return."""
+        """Ask the process to exit with an error, where raising it would not end the process."""
         if not self.finished.done():
             self.finished.set_exception(error)
 
@@ -133,7 +133,7 @@ class PaintNode(Node):
     def set_parameters_atomically(
         self, parameter_list: list[Parameter[Any]]
     ) -> SetParametersResult:
-        """Refuse to change what is fixed with the reason, which rclpy leaves out."""
+        """Refuse to change fixed parameters with the reason, which rclpy leaves out."""
         for name in (change.name for change in parameter_list):
             row = self.PARAMETERS.get(name)
             if row and row.fixed_because and self._is_fixed(name, row):
@@ -142,34 +142,34 @@ class PaintNode(Node):
         return super().set_parameters_atomically(parameter_list)
 
     def set_parameters(self, parameter_list: list[Parameter[Any]]) -> list[SetParametersResult]:
-        """As if each were set on its own."""
+        """Set each parameter on its own."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
     def _is_fixed(self, name: str, row: NodeParameter) -> bool:
         if row.is_read_only:
-            # While they are declared, parameters can still be set.
+            # A parameter can be set until its declaration is complete.
             return self.describe_parameter(name).read_only
         return self.configured
 
-    def _check_changes(self, changes: list[Parameter]) -> SetParametersResult:
+    def _on_set_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         new = {change.name: change.value for change in changes}
         try:
-            self._check(self.values | new)
+            self._validate(self.values | new)
             if self.configured:
-                self._check_change(self.values | new, set(new))
+                self._validate_change(self.values | new, set(new))
         except PaintError as error:
             return SetParametersResult(successful=False, reason=str(error))
         return SetParametersResult(successful=True)
 
-    def _apply_changes(self, changes: list[Parameter]) -> None:
+    def _after_set_parameters(self, changes: list[Parameter]) -> None:
         self.values |= {change.name: change.value for change in changes}
         if self.configured:
-            self._changed({change.name for change in changes})
+            self._on_change({change.name for change in changes})
 
 
 @dataclass(frozen=True)
 class Status:
-    """One task's state: `level` is OK, WARN or ERROR (single bytes), values are printed as is."""
+    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
 
     level: bytes
     message: str
@@ -182,8 +182,8 @@ Task = Callable[[], Status]
 class Diagnostics:
     """Publishes the status of every task of a node on /diagnostics.
 
-    `tasks`, which may change, maps a task's name to the function that gives its `Status` each
-    period of the steady clock: a simulated clock that stands still must not silence it.
+    `tasks`, which may change, maps names to functions that return a `Status`. They are called
+    once in each period of the steady clock, even while a simulated clock stands still.
     """
 
     def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
@@ -201,7 +201,7 @@ class Diagnostics:
         for name, status_of in self.tasks.items():
             status = status_of()
             values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
-            # With the namespace: an aggregator distinguishes two cells by it.
+            # Aggregators tell two cells apart by the namespace.
             task = f'{full_name.lstrip("/")}: {name}'
             message.status.append(
                 DiagnosticStatus(

@@ -1,4 +1,4 @@
-"""A node's parameters as one table: declared, described and validated from it alone."""
+"""Tables of node parameters, from which they are declared, described and validated."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ from rclpy.parameter import Parameter
 from paint_deposition.errors import PaintError, did_you_mean
 
 INT64_MAX = 2**63 - 1
-# What rclpy itself declares, or reads while it makes publishers and subscriptions.
+# Declared by rclpy itself, or read by it when publishers and subscriptions are created.
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 RESERVED_PREFIX = 'qos_overrides.'
-RUNS = 'runs'
+RUNS = 'runs'  # `fixed_while`: in every state
 FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
-FILE_NAME_WORDS = "letters, digits, '-', '_' and '.', the last not in front"
-TYPE_WORDS = {
+FILE_NAME_RULE = "letters, digits, '-', '_' and '.', the last not in front"
+TYPE_DESCRIPTIONS = {
     Parameter.Type.BOOL: 'true or false',
     Parameter.Type.INTEGER: 'a whole number',
     Parameter.Type.DOUBLE: 'a number',
@@ -42,11 +42,11 @@ TYPE_WORDS = {
 class NodeParameter:
     """One row of a node's parameter table.
 
-    `default` fixes the type; a list must say its element type with `element` (str or float), for
-    an empty list has none. `description` ends with the unit; where that is `[path]`, a `~` in
-    front of the value is the home folder, as in a shell. `bounds` are inclusive, the upper one
-    may be infinite. `constraints` is the plain English of what `allows` (value -> bool) checks
-    beyond them. `fixed_because` says why it cannot change in the states of `fixed_while`.
+    `default` determines the type; an empty list needs its `element` type (str or float) as well.
+    `description` ends with the unit; with `[path]`, a leading `~` of the value is expanded.
+    `bounds` are inclusive, and the upper one may be infinite. `allows` (value -> bool) is a
+    further check, and `constraints` describes it. `fixed_because` is the reason why the parameter
+    cannot change while the node `fixed_while`.
     """
 
     default: bool | int | float | str | list
@@ -90,9 +90,9 @@ class NodeParameter:
         return descriptor
 
     def coerced(self, value: Any) -> Any:
-        """`value` as its type: YAML says 2 for 2.0, and ROS makes no value of an empty list.
+        """`value` in the parameter's type: YAML may have 2 for 2.0, and ROS None for [].
 
-        No shell has expanded the `~` of a path in a parameter file or behind `:=`.
+        A leading `~` of a path is expanded: no shell does so in parameter files or after `:=`.
         """
         if isinstance(self.default, list) and not isinstance(value, (str, int, float)):
             return [self._coerced_item(item) for item in value or []]
@@ -104,8 +104,8 @@ class NodeParameter:
         is_double = self.ros_type in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY)
         return float(value) if is_double and type(value) is int else value
 
-    def refusal(self, value: Any) -> str | None:
-        """Why a `value` of its type is not acceptable, or None."""
+    def error_for(self, value: Any) -> str | None:
+        """Why a value of the right type is invalid, or None."""
         if isinstance(value, float) and not math.isfinite(value):
             return f'is {value}: give a finite number'
         if self.bounds and not self.bounds[0] <= value <= self.bounds[1]:
@@ -122,12 +122,12 @@ class NodeParameter:
 ParameterTable = Mapping[str, NodeParameter]
 
 
-def thickness(description: str, default: float = 0.0) -> NodeParameter:
+def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter:
     """A row for a film or a difference of films [um]."""
     return NodeParameter(default, description, (0.0, 10_000.0))
 
 
-def direction(description: str) -> NodeParameter:
+def direction_parameter(description: str) -> NodeParameter:
     """A row for a direction of any length; empty is none."""
     return NodeParameter(
         [],
@@ -138,13 +138,13 @@ def direction(description: str) -> NodeParameter:
     )
 
 
-def atomizer_names(what_they_do: str) -> NodeParameter:
-    """A row for the names of several guns; empty is the only gun of a cell."""
+def atomizers_parameter(what_they_do: str) -> NodeParameter:
+    """A row for the names of several guns; empty: the cell has one gun."""
     return NodeParameter(
         [],
-        f'Names of the guns {what_they_do}; the topics of each stand behind its name, as '
+        f'Names of the guns {what_they_do}, which precede their topics, as in '
         'robot_1/atomizer/pose; empty: one gun on atomizer/pose [names]',
-        constraints='different names of letters, digits, _ and /, robot_1 say',
+        constraints='different names of letters, digits, _ and /, such as robot_1',
         allows=lambda names: (
             not names or (len(set(names)) == len(names) and all(map(GUN_NAME.fullmatch, names)))
         ),
@@ -153,7 +153,7 @@ def atomizer_names(what_they_do: str) -> NodeParameter:
 
 
 def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
-    """The rows of a part's mesh, with this default of `max_edge_length_m`."""
+    """The rows that describe a part's mesh, with this default for `max_edge_length_m`."""
     return {
         'mesh_file': NodeParameter('', "The part's mesh: STL, PLY, OBJ, glTF, 3MF or STEP [path]"),
         'mesh_scale': NodeParameter(
@@ -164,24 +164,26 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
         ),
         'frame_id': NodeParameter(
             'part',
-            'Frame of the mesh and of what is published on it [name]',
+            'Frame of the mesh and of the messages about it [name]',
             constraints='a name',
             allows=lambda value: bool(value.strip('/')),
         ),
     }
 
 
-def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> ParameterTable:
-    """The same rows, none of which can change while the node runs, with the reason."""
+def fixed_while_running(
+    because: str, fixed_while: str = RUNS, /, **rows: NodeParameter
+) -> ParameterTable:
+    """The rows, fixed for this reason while the node runs."""
     return {
         name: replace(row, fixed_because=because, fixed_while=fixed_while)
         for name, row in rows.items()
     }
 
 
-def read_to_configure(because: str, **rows: NodeParameter) -> ParameterTable:
-    """The same rows, which can change only while a managed node is not configured."""
-    return fixed(because, 'is configured', **rows)
+def fixed_while_configured(because: str, **rows: NodeParameter) -> ParameterTable:
+    """The rows, fixed for this reason while a managed node is configured."""
+    return fixed_while_running(because, 'is configured', **rows)
 
 
 def _is_direction(value: list[float]) -> bool:
@@ -189,20 +191,18 @@ def _is_direction(value: list[float]) -> bool:
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
-    """Declare every row on `node` with its overrides, keep later changes valid, return the values.
+    """Declare every row on `node`, validate all later changes, and return the values.
 
-    Raises PaintError with one line for a value of the wrong type, out of range or refused, and
-    for an override that no row knows, naming the nearest one.
+    Raises PaintError for an override that is invalid or that no row has; it names the nearest.
     """
-    # rclpy has no public view of the overrides that nobody declared, which is where typing
-    # errors end up.
+    # rclpy has no public access to overrides that are not declared, such as misspelt names.
     overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
     for name in overrides:
         if name not in {*table, *RESERVED_NAMES} and not name.startswith(RESERVED_PREFIX):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
     node.add_pre_set_parameters_callback(
-        lambda changes: [_as_meant(table.get(change.name), change) for change in changes]
+        lambda changes: [_coerced_change(table.get(change.name), change) for change in changes]
     )
     node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
     for name, row in table.items():
@@ -213,13 +213,13 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
 def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
     reason = None
     if value != [] and Parameter.Type.from_parameter_value(value) != row.ros_type:
-        reason = f'is {value!r}: give {TYPE_WORDS[row.ros_type]}'
-    if reason := reason or row.refusal(value):
+        reason = f'is {value!r}: give {TYPE_DESCRIPTIONS[row.ros_type]}'
+    if reason := reason or row.error_for(value):
         raise PaintError(f'{node.get_name()}: {name} {reason}')
     if value != []:
         node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
         return
-    # rclpy takes an empty list for bytes unless the type is declared first and the value set then.
+    # rclpy takes an empty list for bytes unless the type is declared before the value is set.
     writable = row.descriptor()
     writable.read_only = False
     node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
@@ -227,8 +227,8 @@ def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
     node.set_descriptor(name, row.descriptor())
 
 
-def _as_meant(row: NodeParameter | None, change: Parameter) -> Parameter:
-    """The change as its row means it; the command line takes an empty list for any kind."""
+def _coerced_change(row: NodeParameter | None, change: Parameter) -> Parameter:
+    """The change with its value in the type of the row, also for an empty list."""
     if row is None:
         return change
     value = row.coerced(change.value)
@@ -239,17 +239,13 @@ def _as_meant(row: NodeParameter | None, change: Parameter) -> Parameter:
 
 def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:
     for change in changes:
-        reason = table[change.name].refusal(change.value) if change.name in table else None
+        reason = table[change.name].error_for(change.value) if change.name in table else None
         if reason:
             return SetParametersResult(successful=False, reason=f'{change.name} {reason}')
     return SetParametersResult(successful=True)
 
 
 def require_file_name(what: str, name: str) -> None:
-    """Refuse a name that could lead to another folder.
-
-    Raises:
-        PaintError: it is empty, or has other characters than files of a cell need.
-    """
+    """Raise PaintError for a name that is empty or could lead to another folder."""
     if not FILE_NAME.fullmatch(name):
-        raise PaintError(f"{what} '{name}': use {FILE_NAME_WORDS}")
+        raise PaintError(f"{what} '{name}': use {FILE_NAME_RULE}")

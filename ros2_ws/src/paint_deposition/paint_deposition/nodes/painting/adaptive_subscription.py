@@ -1,4 +1,4 @@
-"""A subscription that takes what its publishers offer, also what they said before it was there."""
+"""A subscription that adapts its quality of service to that of its publishers."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import accepting
+from paint_deposition.nodes.runtime.topics import compatible_qos
 
-FOLLOW_PERIOD_S = 0.1
-# More than a publisher keeps for those who come late.
-REMEMBERED = 1000
+QOS_PERIOD_S = 0.1
+# More than a publisher keeps for late subscribers.
+REMEMBERED_MESSAGES = 1000
 
 
-class Polled(CallbackGroup):
-    """Of subscriptions whose messages do not wake the executor: they are taken now and then."""
+class PolledCallbackGroup(CallbackGroup):
+    """A callback group that never runs: its subscriptions are polled and do not wake the node."""
 
     def can_execute(self, _entity: Any) -> bool:
         return False
@@ -32,20 +32,19 @@ class Polled(CallbackGroup):
         """Nothing is ever executed."""
 
 
-class AtomizerTopic:
-    """Subscribes reliably at first, and as the publishers offer once there are any.
+class AdaptiveSubscription:
+    """A polled subscription, reliable until a best-effort publisher appears.
 
-    A best-effort publisher makes the subscription best effort for as long as anybody publishes.
-    Where all publishers keep their messages for those who come late, these are heard too, if
-    `latched`. A message that comes twice because the subscription changes counts once.
+    It then stays best effort as long as there is any publisher. With `latched` it is transient
+    local where all publishers are. A message received twice, because the subscription was
+    replaced, counts once.
 
     Args:
-        node: makes the subscription.
-        take: gets each message, in `take_waiting`.
-        depth: messages that may wait.
+        take: called with each message by `take_pending`.
+        depth: of the queue.
 
     Attributes:
-        lost: messages that the middleware says it lost.
+        lost: messages that the middleware reported as lost.
     """
 
     def __init__(
@@ -61,34 +60,34 @@ class AtomizerTopic:
         self.lost = 0
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._latched = latched
-        self._group = Polled()
-        self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED)
+        self._group = PolledCallbackGroup()
+        self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED_MESSAGES)
         self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
-        self._subscription = self._subscribed()
-        node.create_steady_timer(FOLLOW_PERIOD_S, self._follow_publishers)
+        self._subscription = self._create_subscription()
+        node.create_steady_timer(QOS_PERIOD_S, self._match_qos)
 
-    def take_waiting(self) -> None:
-        """Take what has come."""
+    def take_pending(self) -> None:
+        """Take all messages in the queue."""
         self._drain(self._subscription)
 
-    def _follow_publishers(self) -> None:
-        """Look who publishes, and subscribe anew if another quality of service serves better."""
+    def _match_qos(self) -> None:
+        """Replace the subscription if another quality of service matches the publishers better."""
         publishers = self._node.get_publishers_info_by_topic(self._topic)
-        best = accepting([info.qos_profile for info in publishers], self._profile.depth)
+        best = compatible_qos([info.qos_profile for info in publishers], self._profile.depth)
         if publishers:
-            # More reliable in mid-stream would lose what is sent until both ends have met again.
+            # A switch to reliable would lose what is sent until both ends are matched again.
             best.reliability = max(best.reliability, self._profile.reliability)
         if not (self._latched and publishers):
             best.durability = DurabilityPolicy.VOLATILE
         now = self._profile.reliability, self._profile.durability
         if (best.reliability, best.durability) != now:
             before, self._profile = self._subscription, best
-            # The new one is there before the old one goes: nothing is lost between them.
-            self._subscription = self._subscribed()
+            # The new one is created before the old one is destroyed, so that nothing is lost.
+            self._subscription = self._create_subscription()
             self._drain(before)
             self._node.destroy_subscription(before)
 
-    def _subscribed(self) -> Subscription:
+    def _create_subscription(self) -> Subscription:
         return self._node.create_subscription(
             self._message, self._topic, self._on_message, self._profile,
             callback_group=self._group,
@@ -106,7 +105,7 @@ class AtomizerTopic:
 
     def _on_message(self, message: Any, info: Mapping[str, Any]) -> None:
         publisher = info.get('publisher_gid') or {'data': b''}
-        # A message is known by who sent it and when.
+        # Publisher and time identify a message.
         identity = info['source_timestamp'], bytes(publisher['data'])
         if identity in self._taken:
             return

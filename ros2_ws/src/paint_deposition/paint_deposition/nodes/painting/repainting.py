@@ -1,4 +1,4 @@
-"""Films that are painted again in a thread, with other models, while the node paints on."""
+"""Repainting the motion so far with other models, in a thread beside the live painting."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from concurrent.futures import Future
 
 from paint_deposition.film.common_film import LiveFilms
 
-# So few poses are left to the thread that paints on: it must not be held up.
-REST_POSES = 250
+# At most so many poses are left for the executor's thread, which must not be blocked.
+REMAINING_POSES = 250
 
 
 class Repainting:
-    """The motion so far painted again with other models, which are compiled first.
+    """Compiles models in a thread and repaints the motion so far with them.
 
     Args:
-        current: the films to take over from, one for each gun; they are painted on meanwhile.
-        make: makes the bare new ones; called in the thread.
-        from_start: whether to paint the motion so far, too.
+        current: the films to replace, one for each gun; painting goes on in them meanwhile.
+        make: creates the new, unpainted films; called in the thread.
+        from_start: whether to repaint the motion so far.
     """
 
     def __init__(
@@ -33,36 +33,35 @@ class Repainting:
 
     @property
     def done(self) -> bool:
-        """Whether the films are ready, or never will be."""
+        """Whether the thread has ended, with films or with an error."""
         return self._prepared.done()
 
     def abort(self) -> None:
-        """Stop as soon as possible; a compilation under way still ends first."""
+        """Stop as soon as possible, but after a compilation under way."""
         self._aborted.set()
 
-    def take_over(self, current: LiveFilms) -> LiveFilms | None:
-        """The films, brought up to date; call it once ``done``.
+    def result(self, current: LiveFilms) -> LiveFilms | None:
+        """The films to continue with, up to date; call it once ``done``.
 
         Returns:
-            The films to paint on: the new ones, or ``current`` with the new ones' models where
-            the motion so far is not painted again. None: the motion is another one by now, begin
-            again.
+            The new films, or ``current`` with the new models if the motion so far is not
+            repainted. None if the motion was restarted meanwhile: repaint again.
 
         Raises:
-            Exception: whatever went wrong in the thread.
+            Exception: whatever was raised in the thread.
         """
         films = self._prepared.result()
         if not self._from_start or not self._complete:
             for gun, prepared in zip(current.guns, films.guns, strict=True):
-                gun.use(prepared.model)
+                gun.switch_model(prepared.model)
             return current
         if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
             return None
         for film, gun in zip(films.guns, current.guns, strict=True):
             if gun.log.poses or gun.log.changes:
-                film.follow(gun.log.events(film.log.poses, film.log.changes))
-            else:  # a reset: the gun stays as it was before
-                film.carry_on(gun)
+                film.replay(gun.log.events(film.log.poses, film.log.changes))
+            else:  # after a reset the gun stays on or off
+                film.start_bare_after(gun)
         return films
 
     @property
@@ -74,15 +73,15 @@ class Repainting:
             films = self._make()
             films.warm_up()
             if self._from_start:
-                self._follow(films)
+                self._repaint(films)
             self._prepared.set_result(films)
-        except BaseException as error:  # it is raised again where the films are taken over
+        except BaseException as error:  # raised again by `result`
             self._prepared.set_exception(error)
 
-    def _follow(self, films: LiveFilms) -> None:
+    def _repaint(self, films: LiveFilms) -> None:
         for film, log in zip(films.guns, self._logs, strict=True):
-            while log.poses - film.log.poses > REST_POSES and self._complete:
+            while log.poses - film.log.poses > REMAINING_POSES and self._complete:
                 for event in log.events(film.log.poses, film.log.changes):
                     if self._aborted.is_set():
                         return
-                    film.follow([event])
+                    film.replay([event])

@@ -33,7 +33,7 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
             tmp_path / 'rec', 'run_recorder', output_directory=tmp_path, name='run'
         ) as recorder,
     ):
-        wait_until(lambda: robot.has_listeners(2), what='both')
+        wait_until(lambda: robot.has_subscribers(2), what='both')
         robot.send(MOTION, slice(0, 300))
         wait_until(lambda: viewer.newest('thickness/stats'), what='statistics')
         sim.stall()
