@@ -86,19 +86,21 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where
 
     with Progress('line') as show:
         show('reading')
-        cases, file, model, strays = line_cases(folder)
+        cases, file, model, unmatched = line_cases(folder)
         finished, done, workers = _computed(computed, cases, {}, output, show, **where)
         show('pooling')
         table = finished.table(case.digest for case in cases)
-        found = Line(folder, model, shared_files(folder, file), table, done, workers, strays)
+        found = Line(folder, model, shared_files(folder, file), table, done, workers, unmatched)
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
         files = options.write_results(found, output, pictures=pictures)
     _say_warnings([*found.errors, *found.remarks], output / 'line.json')
-    if strays:
-        more = f' and {len(strays) - MOST_WARNINGS} more' if len(strays) > MOST_WARNINGS else ''
-        named = ', '.join(strays[:MOST_WARNINGS])
+    if unmatched:
+        more = (
+            f' and {len(unmatched) - MOST_WARNINGS} more' if len(unmatched) > MOST_WARNINGS else ''
+        )
+        named = ', '.join(unmatched[:MOST_WARNINGS])
         options.say_all('warning', [f'no recording has the name of {named}{more}; left out'])
     options.say_results(files, as_json, found.lines)
 

@@ -148,10 +148,10 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
                 f'the {1e3 * gun.before_m:.0f} mm before it keep clear of the part'
             )
         return
-    if result.plain:
-        plain, paint = result.plain, result.plain.statistics
+    if result.unoptimised:
+        first, paint = result.unoptimised, result.unoptimised.statistics
         yield (
-            f'without --optimise: {plain.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
+            f'without --optimise: {first.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
             f'of {film.emitted_volume_cm3:.1f} cm3, capture fraction '
             f'{100 * paint.capture_fraction:.0f} %'
         )

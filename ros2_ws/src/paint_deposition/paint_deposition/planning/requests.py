@@ -54,7 +54,7 @@ class PassRequest(FilmBuild):
     )
 
     @model_validator(mode='after')
-    def _says_how_much(self) -> 'PassRequest':
+    def _has_speed_or_target(self) -> 'PassRequest':
         if self.speed_m_per_s is None and self.target_um is None:
             raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
         return self
