@@ -94,8 +94,8 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             own, theirs = _version(), set(client.run(_version).values())
             if theirs != {own}:  # films are the same only by the same code
                 raise ManyError(
-                    f'the workers at {scheduler} have paint_deposition '
-                    f'{", ".join(sorted(theirs)) or "nowhere: there is none"}, this is {own}; '
+                    f'versions of the workers at {scheduler}: '
+                    f'{", ".join(sorted(theirs)) or "no worker"}, this is {own}; '
                     f'start `dask worker {scheduler} --nthreads 1` with the same version'
                 )
             yield client

@@ -32,7 +32,7 @@ class SetPointPower(BaseModel):
         """By how much the amplitudes grow at others, or ModelError that begins with ``whose``."""
         value = getattr(set_points, self.setting)
         if value is None:
-            raise ModelError(f'{whose} does not say its {self.setting}; give it to the brush')
+            raise ModelError(f'{whose} has no {self.setting}; add it to the brush')
         return (value / self.at) ** self.exponent
 
 

@@ -116,7 +116,7 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
     for number, entry in enumerate(said.effects or (), start=1):
         effect = _effect(f'effects, entry {number}', entry, load)
         if effect.id in [other.id for other in effects]:
-            raise ModelError(f'effects: {effect.id!r} is there twice; keep one')
+            raise ModelError(f'effects: {effect.id!r} is listed twice; keep one')
         effects.append(effect)
     if projection.occlusion:
         if any(effect.id == Occlusion.id for effect in effects):
@@ -148,7 +148,7 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
     between: list[tuple[int, dict[str, Any]]] = []
     for number, entry in section.items():
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
-            raise ModelError(f'brushes: {number!r} is no number of a brush; give 1, 2 and so on')
+            raise ModelError(f'brushes: {number!r} is not a brush number; give 1, 2 and so on')
         given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
         at = given.model_dump(exclude={'planar'})
         if given.planar is None:

@@ -127,7 +127,7 @@ class PlanRequest(Limits, PassRequest):
         None, 'Fixes the index [m]; default: most even.', '--index', above=0.0
     )
     smoothing_radius_m: float = given(
-        0.1, 'What is finer than this on the part is not followed.', above=0.0
+        0.1, 'Features of the part smaller than this are not followed.', above=0.0
     )
     overspray_m: float | None = given(
         None,
@@ -190,7 +190,7 @@ class ImproveRequest(Limits):
     )  # fmt: skip
     time_weight: float = given(0.0, 'The same of the time sprayed.', least=0.0)
     smoothness: float = given(
-        1e-2, 'Weight of changes of speed; more gives calmer passes.', least=0.0
+        1e-2, 'Weight of changes of speed; a greater weight gives steadier speeds.', least=0.0
     )
     jerk_m_per_s3: float = given(50.0, 'Of the robot [m/s3].', '--jerk', above=0.0)
     move_min_m: float = given(

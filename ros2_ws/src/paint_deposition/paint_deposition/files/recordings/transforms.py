@@ -55,7 +55,7 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     for (parent, child), placings in parts.items():
         if len({pose for *_, pose in placings}) > 1:
             raise RecordingError(
-                f"{bag.path}: '{child}' was placed anew in '{parent}' while the run was recorded; "
+                f"{bag.path}: '{child}' was moved in '{parent}' while the run was recorded; "
                 'give --part-pose'
             )
     # Of a static transform that is sent again, the last holds, as in tf2.

@@ -166,7 +166,7 @@ def _pattern_reason(
         }.get(int(learned[2]) + int(learned[3]), '')
     row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
     if not learned[row]:
-        return 'its value rests on what bells usually have'
+        return 'its value comes from the prior of usual bells'
     if name in ('sigma1_m', 'sigma2_m') and sigma > LARGEST_SHARE * value:
         return f'its standard deviation is {100 * sigma / value:.0f} % of it'
     return ''

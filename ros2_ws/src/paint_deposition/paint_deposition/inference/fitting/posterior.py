@@ -84,7 +84,7 @@ def usable(
     twice = [e.name for e in campaign.experiments if e.taken.fingerprint in behind]
     if twice:
         return None, (
-            f'What the model file knows of the pattern rests on the readings of '
+            f'The posterior of the model file rests on the readings of '
             f'{", ".join(twice)} themselves and is not used; give the model that was calibrated '
             'without them.',
         )

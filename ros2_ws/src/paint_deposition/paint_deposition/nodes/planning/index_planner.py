@@ -84,7 +84,7 @@ PLANNER = dict(
         ),
         smoothing_radius_m=NodeParameter(
             PlanRequest.model_fields['smoothing_radius_m'].default,
-            'What is finer than this on the part is not followed [m]',
+            'Features of the part smaller than this are not followed [m]',
             (0.005, 2.0),
         ),
         acceleration_m_per_s2=NodeParameter(

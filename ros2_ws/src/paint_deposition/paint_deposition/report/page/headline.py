@@ -206,7 +206,7 @@ def _side_by_side(data: ReportData) -> Headline:
         ('How far off', f'RMSE of {words.joined(each)}; the gauge alone gives {floor}.'),
         ('What to do', f'Take {best}, {remedy}'),
     )
-    return Headline('open', 'Side by side', f'{best} is nearest to the readings', answers)
+    return Headline('open', 'Side by side', f'{best} has the smallest error', answers)
 
 
 def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
