@@ -14,7 +14,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.fitting.posterior import drawn
+from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
@@ -85,7 +85,7 @@ def improve(
         target_region = _target_region(surface, film_um, tool_z)
     models = [model, *rivals]
     if posterior is not None:
-        models += drawn(model, posterior, DRAWS, seed)
+        models += draw_models(model, posterior, DRAWS, seed)
     retiming = retime_for_evenness(surface, target_region, original, models, request, progress)
     moves = moves_of(retiming.programme, request)
     progress('the film of the written files', 0.0)

@@ -77,9 +77,9 @@ def improve_command(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    options.say_all('note', [*result.surface.notes, *recorded.notes])
-    options.say_all('warning', [*recorded.warnings, *result.warnings])
-    options.say_results(files, as_json, _lines(result), model=chosen.words)
+    options.print_all('note', [*result.surface.notes, *recorded.notes])
+    options.print_all('warning', [*recorded.warnings, *result.warnings])
+    options.print_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.Improvement) -> Iterator[str]:

@@ -51,7 +51,7 @@ def _run(
     from paint_deposition.files.model_file import read_model_file
 
     def remark(kind: str, experiment: str, line: str) -> None:
-        options.say_all(kind, [f'{experiment}: {line}'])
+        options.print_all(kind, [f'{experiment}: {line}'])
 
     with Progress(command) as show:
         data = pd.read_campaign(campaign, show, part_pose, remark)
@@ -62,15 +62,15 @@ def _run(
         show('writing')
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
         files = options.write_results(result, output, pictures=pictures, **more)
-    options.say_all('note', data.understood)
+    options.print_all('note', data.understood)
     if not isinstance(result, pd.SideBySide):
         for name, found in result.geometry.items():
-            options.say_all('warning', (f'{name}: {line}' for line in found.warnings))
-        options.say_all('warning', result.warnings)
+            options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
+        options.print_all('warning', result.warnings)
     model_line = f'{fitted or FITTED} a 50 mm bell'
     if start is not None:
         model_line = f'{fitted} {model_words(chosen, start)}'.strip()
-    options.say_results(files, as_json, lines(result), words or model_line)
+    options.print_results(files, as_json, lines(result), words or model_line)
 
 
 @click.command('calibrate')

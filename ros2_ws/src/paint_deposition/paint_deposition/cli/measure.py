@@ -23,7 +23,7 @@ HARDLY = 0.15
 @options.part_options(0.01)
 @click.option(
     '--trajectory', type=options.FILE,
-    help='How it is painted: what `simulate` takes; default: passes as `plan` would lay them, '
+    help='The motion, as `simulate` takes it; default: passes as `plan` would lay them, '
     'with --target-um or --speed.',
 )  # fmt: skip
 @options.MODEL
@@ -84,9 +84,9 @@ def measure_command(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    options.say_all('note', result.surface.notes)
-    options.say_all('warning', warnings)
-    options.say_results(files, as_json, _lines(result), model=chosen.words)
+    options.print_all('note', result.surface.notes)
+    options.print_all('warning', warnings)
+    options.print_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.ChosenReadings) -> Iterator[str]:

@@ -93,7 +93,7 @@ class DepositionModel(BaseModel):
             projection=self.projection, effects=self.effects,
         )  # fmt: skip
 
-    def with_others(self, given: 'DepositionModel') -> 'DepositionModel':
+    def with_missing_brushes(self, given: 'DepositionModel') -> 'DepositionModel':
         """A copy with the brushes of a given model that this one does not have."""
         own = {brush.number for brush in self.brushes}
         others = [brush for brush in given.brushes if brush.number not in own]

@@ -64,12 +64,12 @@ def read_readings(
         for k in np.flatnonzero(sigma_um <= 0.0):
             table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
     table.refuse_errors()
-    said = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
+    notes = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
     groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
     readings = Readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
-        f'{path.name}: {"; ".join(filter(None, said))}',
+        f'{path.name}: {"; ".join(filter(None, notes))}',
     )  # fmt: skip
     require_repeats_close(readings)
     return readings

@@ -117,7 +117,7 @@ def _is_bag(folder: Path) -> bool:
 
 
 def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
-    """The run of a name; what cannot be told apart is not guessed."""
+    """The run of a name; an ambiguous one gets a problem or a remark."""
     problem = remark = ''
     if len(recordings) > 1:
         names = ' and '.join(path.name for path in recordings)

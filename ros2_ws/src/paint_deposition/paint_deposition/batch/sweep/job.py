@@ -28,7 +28,7 @@ from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.provenance import model_digest, sha256
-from paint_deposition.inference.fitting.posterior import drawn
+from paint_deposition.inference.fitting.posterior import draw_models
 
 NOTHING = 'nothing'
 
@@ -125,7 +125,7 @@ class Job:
                 'or refit wrote'
             )
         return self._once(
-            ('draws', path), lambda: drawn(file.model, posterior, sample.count, sample.seed)
+            ('draws', path), lambda: draw_models(file.model, posterior, sample.count, sample.seed)
         )
 
     def _inputs(self, values: Values) -> tuple[str, str, str]:

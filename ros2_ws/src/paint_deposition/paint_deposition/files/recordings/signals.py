@@ -32,16 +32,16 @@ class Signal:
     @staticmethod
     def of(text: str) -> Signal | None:
         """The signal that a text names, None if it names none; a wrong level is refused."""
-        said = SYNTAX.fullmatch(text.strip())
-        if said is None:
+        parsed = SYNTAX.fullmatch(text.strip())
+        if parsed is None:
             return None
         try:
-            level = float(said['level'] or 0.0)
+            level = float(parsed['level'] or 0.0)
         except ValueError:
             raise RecordingError(
-                f"{text}: '{said['level']}' is no number; give a level, 12 say"
+                f"{text}: '{parsed['level']}' is no number; give a level, 12 say"
             ) from None
-        return Signal(said['topic'], said['path'], said['side'] == '<', level)
+        return Signal(parsed['topic'], parsed['path'], parsed['side'] == '<', level)
 
     def value(self, message: Any) -> float | None:
         """The number in a message, None where there is none."""

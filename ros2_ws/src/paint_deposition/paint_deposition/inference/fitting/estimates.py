@@ -13,7 +13,7 @@ DRAWS = 4000
 K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
 # A parameter whose width has not fallen below this share of its weak prior's was not measured.
 LEARNED = 0.5
-# A standard deviation this large a share of a positive value leaves no digit of it.
+# A standard deviation this large a share of a positive value leaves its first digit open.
 LARGEST_SHARE = 0.5
 # With the asymmetry this few standard deviations from zero its phase means nothing.
 ASYMMETRY_SIGMAS = 2.0
@@ -44,7 +44,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Correlation:
-    """How two estimates go together."""
+    """Correlation of two estimates."""
 
     first: str
     second: str
@@ -52,7 +52,7 @@ class Correlation:
 
     @property
     def too_close(self) -> bool:
-        """Whether one can make up for the other."""
+        """Whether one can compensate for the other."""
         return abs(self.value) > TOO_CLOSE
 
 

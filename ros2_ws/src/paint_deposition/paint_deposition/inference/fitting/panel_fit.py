@@ -1,7 +1,7 @@
 """Eq. (3) fitted across the passes of a panel (section 4.1), and how far its readings reach.
 
 Paint that lands beyond the readings is extrapolated. A little more film along a panel's rim, as
-fat edges have it, then makes a pattern far too wide, with intervals that know nothing of it.
+fat edges have it, then makes the fitted pattern far too wide, which its intervals do not show.
 """
 
 from collections.abc import Callable

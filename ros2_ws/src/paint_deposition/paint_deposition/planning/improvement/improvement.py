@@ -99,7 +99,7 @@ class PassChange:
     def sentence(self) -> str:
         """The change in a line."""
         before, after = self.speed_m_per_s
-        said = [
+        parts = [
             f'{before:.3f} to {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
             f'{self.fastest_m_per_s:.3f} m/s'
         ]
@@ -109,12 +109,12 @@ class PassChange:
         ):
             if abs(metres) >= LEAST_SHIFT_M:
                 side = sides[metres < 0.0]
-                said.append(
+                parts.append(
                     f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
                 )
         if abs(self.flow[1] - self.flow[0]) > 5e-4:
-            said.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
-        return f'pass {self.number}: ' + '; '.join(said)
+            parts.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
+        return f'pass {self.number}: ' + '; '.join(parts)
 
     def to_dict(self) -> dict[str, Any]:
         """The figures by name, with the sentence."""
@@ -285,12 +285,12 @@ def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
             earlier = before.on_m - after.on_m if first == after.on_m else 0.0
             later = after.off_m - before.off_m if last == after.off_m else 0.0
             whole = np.array([first, last])
-            means = (float(speed_along(p, whole)[0]) for p in (original, improved))
+            old, new = (float(speed_along(p, whole)[0]) for p in (original, improved))
             speed = speed_along(improved, np.linspace(first, last, SAMPLES + 1))
             found.append(
                 PassChange(
                     len(found) + 1,
-                    tuple(means),
+                    (old, new),
                     float(speed.min()), float(speed.max()), earlier, later,
                     earlier / float(speed[0]), later / float(speed[-1]),
                     (before.flow, after.flow),
