@@ -24,7 +24,7 @@ CASES = 60
 @pytest.mark.slow
 def test_a_case_that_fails_says_so_and_is_tried_again(tmp_path, worker):
     """`dict` is the work: of the columns of a case, or of a number, which is none."""
-    cases = [Case('good', {'mean_um': [20.0]}), Case('bad', 3, about={'part': ['door']})]
+    cases = [Case('good', {'mean_um': [20.0]}), Case('bad', 3, known={'part': ['door']})]
     for left in (2, 1):
         finished = ResultCache(tmp_path)
         assert run(worker, dict, cases, {}, finished, lambda what, share: None) == left

@@ -51,7 +51,7 @@ def test_models_side_by_side_each_given_once(tmp_path, repository):
     assert told['best'] == min(errors, key=errors.get)
     assert told['provenance']['models']['other']['planar']['K1_cm3_per_s'] == 2.4
     page = (tmp_path / 'out/report.html').read_text(encoding='utf-8')
-    assert f'{told["best"]} is nearest to the readings' in page
+    assert f'{told["best"]} has the smallest error' in page
     assert (tmp_path / 'out/residuals_other.csv').is_file()
     twice = ('--model', start) * 2
     done = paint('compare', SAMPLES / 'measured_door/unseen.yaml', *twice, '-o', tmp_path / 'no')

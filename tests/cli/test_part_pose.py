@@ -118,7 +118,7 @@ def test_where_a_node_was_told_that_the_part_stands_is_used_but_not_guessed(tmp_
     (note,) = brought_to_the_part(once).notes
     assert note.startswith("static transforms: poses brought from 'base_link' to 'part', ")
     anew = placed_bag(tmp_path / 'anew', '/part_pose', (0, PART_POSE), (50, [2.2, *PART_POSE[1:]]))
-    with pytest.raises(PaintError, match=r"'part' was placed anew in 'base_link'.*--part-pose"):
+    with pytest.raises(PaintError, match=r"'part' was moved in 'base_link'.*--part-pose"):
         pd.read_recording(anew)
 
 

@@ -107,7 +107,7 @@ def test_a_model_file_holds_what_an_effect_follows(tmp_path):
         (DepositionModel(effects=FOLLOWING[:1]),
          'incidence_attraction follows set-points, which a model with planar alone does not have'),
         (brushed(IncidenceAttraction(attraction=1.0, follows=(BELL,))),
-         'incidence_attraction follows a set-point, and brush 1 does not say its bell_speed_rpm'),
+         'incidence_attraction follows a set-point, and brush 1 has no bell_speed_rpm'),
         (brushed(Sag(run_m=0.01, follows=(AIR,))),
          'sag acts on the finished film, which all brushes share: it cannot follow set-points'),
         (brushed(CURVES['time_s'](low=0.0, high=4.0, learned=(0.1, -0.1), follows=(AIR,))),

@@ -87,7 +87,7 @@ def test_each_part_follows_its_own_map():
     film_um = np.full(len(door_points), 20.0)
     h = both.on_film(film_um, door_points) / 20.0 - 1.0
     assert h.max() == pytest.approx(0.4, abs=0.02)
-    (_, first), (_, second) = both.on_parts()
+    (_, first), (_, second) = both.values_by_part()
     assert np.array_equal(first, GRID)
     assert second.tolist() == [[0.1, 0.2], [0.3, 0.4]]
 

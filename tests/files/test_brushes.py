@@ -46,7 +46,7 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
     ('text', 'message'),
     [
         ('brushes: {}', 'brushes is empty; give a brush by its number, or planar'),
-        ('brushes: {0: {planar: {}}}', 'brushes: 0 is no number of a brush; give 1, 2 and so on'),
+        ('brushes: {0: {planar: {}}}', 'brushes: 0 is not a brush number; give 1, 2 and so on'),
         ('brushes: {1: 3}', 'brushes, 1 is 3; expected the keys '),
         ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
         ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),

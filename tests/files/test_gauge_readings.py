@@ -90,7 +90,7 @@ def test_all_faults_of_a_file_are_named_at_once(table):
     with pytest.raises(ReadingsError) as refused:
         read_readings(path)
     text = str(refused.value)
-    assert '4 complaints: line 2: y_m' in text
+    assert '4 errors: line 2: y_m' in text
     assert all(f'; line {line}: ' in text for line in (4, 5, 7))
     assert '\n' not in text
 

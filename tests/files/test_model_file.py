@@ -183,7 +183,7 @@ def test_what_is_left_out_has_its_default(written):
         ('effects: [{id: sag, file: x.py}]', 'entry 1: has id and file; give one of id, file'),
         ('effects: [{id: 7}]', 'effects, entry 1: id is 7; expected text'),
         ('effects: [{id: air_drfit}]', "'air_drfit'; did you mean 'air_drift'"),
-        ('effects: [{id: sag}, {id: sag}]', "effects: 'sag' is there twice; keep one"),
+        ('effects: [{id: sag}, {id: sag}]', "effects: 'sag' is listed twice; keep one"),
         ('effects: [{id: sag, run_m: -1}]', 'sag: run_m is -1; expected a number 0 to 0.03'),
         ('effects: [{file: none.py}]', 'none.py: cannot be read (No such file or directory)'),
         ('name: 3', 'name is 3; expected text'),

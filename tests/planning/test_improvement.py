@@ -80,8 +80,8 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
 @pytest.mark.slow
 def test_the_mean_stays_and_the_path_too(levelled):
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
-    given, new = levelled.given.positions_m, levelled.trajectory.positions_m
-    assert cKDTree(given).query(new)[0].max() < 0.004
+    original, new = levelled.original.positions_m, levelled.trajectory.positions_m
+    assert cKDTree(original).query(new)[0].max() < 0.004
 
 
 @pytest.mark.slow
@@ -140,7 +140,7 @@ def test_the_written_motion_keeps_the_limits_and_names_those_that_cost(panel, ev
     assert min(lengths) > 0.02 * (1.0 - 1e-3)
     assert levelled.after.sigma_n < held.after.sigma_n < held.before.sigma_n
     assert 'speed' in ' '.join(limit.name for limit in held.retiming.binding_limits)
-    assert any(line.startswith('held back by the') for line in held.limit_sentences)
+    assert any(line.startswith('limited by the') for line in held.limit_sentences)
 
 
 @pytest.mark.slow

@@ -11,7 +11,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import contacts
-from paint_deposition.planning.faces import FacePasses, in_order, motion_over
+from paint_deposition.planning.faces import FacePasses, join_motions, order_faces
 from paint_deposition.planning.part_plan import plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.requests import PlanRequest
@@ -86,10 +86,10 @@ def test_faces_follow_each_other_with_least_travel():
     """Two faces end to end: the second is run the other way round."""
     first = FacePasses((level_pass(0.0), level_pass(0.3, 1.0, 0.0)), STYLE)
     second = FacePasses((level_pass(0.9), level_pass(0.6, 1.0, 0.0)), STYLE)
-    one, other = in_order([second, first])
+    one, other = order_faces([second, first])
     assert float(np.linalg.norm(other.start_m - one.end_m)) == pytest.approx(0.3)
     fixed = replace(STYLE, one_way=True)
-    kept = in_order([FacePasses(face.passes, fixed) for face in (second, first)])
+    kept = order_faces([FacePasses(face.passes, fixed) for face in (second, first)])
     begins = {face.passes[0].across_m for face in kept}
     assert begins == {0.0, 0.9}
 
@@ -102,7 +102,7 @@ def test_between_faces_the_gun_is_drawn_back_until_it_is_clear():
         heights_m.append(way.positions_m[:, 2].max())
         return len(heights_m) == 3
 
-    motion, _ = motion_over(faces, 'part', clear_at_the_third)
+    motion, _ = join_motions(faces, 'part', clear_at_the_third)
     np.testing.assert_allclose(heights_m, [0.3, 0.4, 0.6])
     assert motion.positions_m[:, 2].max() == pytest.approx(0.6)
     seconds = 1e-9 * motion.trigger_stamps_ns

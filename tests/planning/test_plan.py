@@ -10,7 +10,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.films import evenness
-from paint_deposition.planning.placing import place_passes
+from paint_deposition.planning.placement import place_passes
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.report.writers.passes import write_plan
@@ -46,14 +46,14 @@ def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
 
 def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(planned):
     assert planned.sigma_n < 0.97 * planned.plane_on_part.sigma_n
-    assert planned.sigma_n == pytest.approx(planned.placing.sigma_n, rel=0.1)
-    films, index = planned.line_films, planned.placing.index_m
+    assert planned.sigma_n == pytest.approx(planned.placement.sigma_n, rel=0.1)
+    films, index = planned.line_films, planned.placement.index_m
     across = tuple(films.surface_map.extent_m[1])
     for beside in (0.97 * index, 1.03 * index):
         other = place_passes(films, across, (beside, beside))
         assert other.index_m == pytest.approx(beside)
         np.testing.assert_allclose(np.diff(other.lines_m), beside, atol=1e-9)
-        assert other.sigma_n > 0.97 * planned.placing.sigma_n
+        assert other.sigma_n > 0.97 * planned.placement.sigma_n
     assert 0.22 <= place_passes(films, across, (0.22, 0.3)).index_m <= 0.3
 
 
@@ -62,7 +62,7 @@ def test_on_a_wide_plane_the_plan_is_as_even_as_the_recommendation():
     flat = plan(surface, NARROW, PlanRequest(speed_m_per_s=0.2, overspray_m=0.5))
     assert flat.sigma_n < flat.plane.sigma_n + 0.015
     assert flat.statistics.mean_um == pytest.approx(
-        NARROW.planar.K1_cm3_per_s / (0.2 * flat.placing.index_m), rel=0.03
+        NARROW.planar.K1_cm3_per_s / (0.2 * flat.placement.index_m), rel=0.03
     )
 
 

@@ -183,5 +183,5 @@ def test_an_index_is_for_one_brush():
     with pytest.raises(ModelError, match='an index is for one brush and the model has 1, 2'):
         recommend(model, request)
     of_one = recommend(model.with_brush(1), request)
-    plain = recommend(model.with_brush(1).model_copy(update={'brushes': ()}), request)
-    assert of_one.index_m == plain.index_m
+    unoptimised = recommend(model.with_brush(1).model_copy(update={'brushes': ()}), request)
+    assert of_one.index_m == unoptimised.index_m

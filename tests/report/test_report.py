@@ -255,7 +255,7 @@ def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnos
     floor = f'{done.noise_floor_um:.2f}'
     assert (
         'pattern of eq. (1) alone panel.yaml 7.77 8.88 0.66 + TCP tilt panel.yaml 6.66 '
-        f'model as given, fitted anew door.yaml {errors[0]} {floor} '
+        f'model as given, refitted door.yaml {errors[0]} {floor} '
         f'+ air drift door.yaml {errors[1]} {floor}'
     ) in page_of(tmp_path / 'report.html').text
 

@@ -196,12 +196,12 @@ def test_some_brushes_out_of_all_keep_their_patterns(shifts, numbers):
         return vector.of_patterns(entries[np.newaxis])[0]
 
     vector = centre + 0.3 * np.array(shifts)
-    entries, slope = kept.out_of(THREE, vector)
+    entries, slope = kept.subset(THREE, vector)
     rows = [THREE.brushes.index(number) for number in numbers]
     np.testing.assert_allclose(patterns(kept, entries), patterns(THREE, vector)[rows], rtol=1e-12)
     steps = 1e-6 * np.eye(19)
     found = [
-        (kept.out_of(THREE, vector + s)[0] - kept.out_of(THREE, vector - s)[0]) for s in steps
+        (kept.subset(THREE, vector + s)[0] - kept.subset(THREE, vector - s)[0]) for s in steps
     ]
     np.testing.assert_allclose(slope, np.array(found).T / 2e-6, atol=1e-8)
 

@@ -1,4 +1,4 @@
-"""Slips among single readings are found, what neighbours share is kept; texture is estimated."""
+"""Outliers among single readings are found, shared deviations kept; texture is estimated."""
 
 from dataclasses import replace
 
@@ -16,8 +16,8 @@ from paint_deposition.inference.diagnosis.run import trouble_with
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.outliers import (
     FittedPoints,
+    LeaveOneOut,
     Outlier,
-    Scatter,
     find_outliers,
 )
 from paint_deposition.inference.readings.campaign import Campaign
@@ -98,7 +98,7 @@ def test_a_prediction_without_the_reading_is_that_of_the_others_alone():
     # Without covariates, whose scale would be that of the readings.
     misfit, row = replace(built_up(scattered(4)), covariates=()), 17
     others = np.delete(np.arange(COUNT), row)
-    whole, without = Scatter.of(misfit), Scatter.of(misfit.select(others))
+    whole, without = LeaveOneOut.of(misfit), LeaveOneOut.of(misfit.select(others))
     joint = np.logaddexp.reduce(whole.log_weight) - np.logaddexp.reduce(without.log_weight)
     normal = -0.5 * np.log(2.0 * np.pi)
     # The smallest directions of a field, which are left out, are not quite those of all.
@@ -119,7 +119,8 @@ def test_what_was_probably_meant(written, expected, guess):
 @pytest.mark.slow
 @pytest.mark.parametrize('texture', [0.002, 0.02])
 def test_the_texture_is_estimated_beside_a_missing_effect(texture):
-    shares = [Scatter.of(built_up(scattered(seed, texture))).texture_share for seed in range(12)]
+    misfits = [built_up(scattered(seed, texture)) for seed in range(12)]
+    shares = [LeaveOneOut.of(misfit).texture_share for misfit in misfits]
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 

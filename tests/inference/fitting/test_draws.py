@@ -7,7 +7,7 @@ from scipy.stats import truncnorm
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.fitting.posterior import drawn
+from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.coordinates import PATTERN
 
@@ -25,7 +25,8 @@ def known(means: dict[str, float], deviations: dict[str, float]) -> Posterior:
 
 def test_draws_near_a_bound_follow_the_truncated_normal():
     """The mean of what is left of the normal, not that of one whose tail lies at the bound."""
-    models = drawn(MODEL, known({'K2': 0.05, GAIN: 0.1}, {'K2': 0.1, GAIN: 0.3}), COUNT, seed=1)
+    posterior = known({'K2': 0.05, GAIN: 0.1}, {'K2': 0.1, GAIN: 0.3})
+    models = draw_models(MODEL, posterior, COUNT, seed=1)
     k2 = np.array([model.planar.K2 for model in models])
     gain = np.array([model.effect('corner_slowdown').gain for model in models])
     low, high = (CornerSlowdown.parameters()['gain'][end] for end in ('low', 'high'))
@@ -38,11 +39,11 @@ def test_draws_near_a_bound_follow_the_truncated_normal():
 
 def test_the_asymmetry_of_a_draw_is_at_most_one():
     wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
-    asymmetry = np.array([model.planar.K3 for model in drawn(MODEL, wide, COUNT, seed=2)])
+    asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
     assert len(np.unique(asymmetry)) == COUNT
     assert asymmetry.max() <= 1.0
 
 
 def test_a_posterior_that_is_nowhere_physical_is_refused():
     with pytest.raises(ModelError, match='posterior: of 1000 draws 0 are within the bounds'):
-        drawn(MODEL, known({'K2': -0.5}, {'K2': 0.01}), 1, seed=3)
+        draw_models(MODEL, known({'K2': -0.5}, {'K2': 0.01}), 1, seed=3)

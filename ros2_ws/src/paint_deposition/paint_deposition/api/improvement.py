@@ -14,15 +14,15 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.fitting.posterior import drawn
+from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import simulated
 from paint_deposition.planning.improvement.improvement import (
     DEFAULT_TOLERANCE,
+    FilmSummary,
     Improvement,
-    LaidFilm,
 )
 from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
@@ -75,7 +75,7 @@ def improve(
     model = model or DepositionModel()
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
-    surface, given = seen.surface, Programme.of(trajectory)
+    surface, original = seen.surface, Programme.of(trajectory)
     progress('the film as it is', 0.0)
     film_um, paint = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
@@ -85,8 +85,8 @@ def improve(
         target_region = _target_region(surface, film_um, tool_z)
     models = [model, *rivals]
     if posterior is not None:
-        models += drawn(model, posterior, DRAWS, seed)
-    retiming = retime_for_evenness(surface, target_region, given, models, request, progress)
+        models += draw_models(model, posterior, DRAWS, seed)
+    retiming = retime_for_evenness(surface, target_region, original, models, request, progress)
     moves = moves_of(retiming.programme, request)
     progress('the film of the written files', 0.0)
     passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
@@ -95,8 +95,8 @@ def improve(
     program_um, _ = simulated(surface, model, program)
     tolerance = request.tolerance or DEFAULT_TOLERANCE
     band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
-    before = LaidFilm.of(film_um, surface, target_region, band, paint.emitted_cm3, trajectory)
-    after = LaidFilm.of(new_um, surface, target_region, band, new_paint.emitted_cm3, improved)
+    before = FilmSummary.of(film_um, surface, target_region, band, paint.emitted_cm3, trajectory)
+    after = FilmSummary.of(new_um, surface, target_region, band, new_paint.emitted_cm3, improved)
     return Improvement(
         surface, target_region, model, request, trajectory, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),

@@ -50,7 +50,7 @@ def calibrate(
         seed: of the starts of the fit.
 
     Raises:
-        ReadingsError: the readings cannot be what they are said to be, or determine nothing.
+        ReadingsError: the readings are not plausible, or determine nothing.
     """
     model = model or _model_of(campaign)
     require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))

@@ -9,7 +9,7 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.optimised_plan import optimised
+from paint_deposition.planning.optimised_plan import optimise
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan
@@ -58,8 +58,8 @@ def plan(
         PlanError: the request has no answer; says why and what comes closest.
     """
     request = PlanRequest(**wanted)
-    plain = planned(surface, model or DepositionModel(), request, frame_id, progress)
-    return optimised(plain, progress) if request.optimise else plain
+    unoptimised = planned(surface, model or DepositionModel(), request, frame_id, progress)
+    return optimise(unoptimised, progress) if request.optimise else unoptimised
 
 
 @takes(PlanRequest)

@@ -33,15 +33,15 @@ class Case:
 
     Attributes:
         digest: of all that it is computed from; the same digest is never computed twice.
-        given: what is its own, small.
-        inputs: names of what it shares with others, such as a part or a motion.
-        about: columns of its row that are known without computing it.
+        parameters: of this case alone, small.
+        inputs: names of what it shares with other cases, such as a part or a motion.
+        known: columns of its row that need no computation.
     """
 
     digest: str
-    given: Any
+    parameters: Any
     inputs: tuple[str, ...] = ()
-    about: Mapping[str, Any] = field(default_factory=dict)
+    known: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -49,7 +49,7 @@ class ResultCache:
     """A folder of results, a Parquet file for each case: a run that was cut off is resumed.
 
     Attributes:
-        folder: of the files, which appear whole.
+        folder: of the files, each written as a whole.
         failures: columns of cases that could not be computed; the next run tries them again.
     """
 
@@ -57,7 +57,7 @@ class ResultCache:
     failures: dict[str, Columns] = field(default_factory=dict)
 
     def has(self, digest: str) -> bool:
-        """Whether a case is there."""
+        """Whether the result of a case is stored."""
         return self._path(digest).is_file()
 
     def add(self, digest: str, columns: Columns) -> None:
@@ -67,7 +67,7 @@ class ResultCache:
         write_parquet(self._path(digest), pa.table(dict(columns)))
 
     def table(self, digests: Iterable[str]) -> pa.Table:
-        """These cases, one after the other; columns that a case has not are empty in its rows."""
+        """These cases, one after the other; columns that a case lacks are empty in its rows."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -99,14 +99,14 @@ def code_digest() -> str:
     return digest.hexdigest()[:32]
 
 
-def packed(value: Any) -> bytes:
-    """Bytes that ``pickle.loads`` opens in another process; a user's own effects are run there."""
+def serialised(value: Any) -> bytes:
+    """Bytes that ``pickle.loads`` opens elsewhere; the files of users' effects run there."""
     content = io.BytesIO()
-    _Packer(content, protocol=5).dump(value)
+    _EffectPickler(content, protocol=5).dump(value)
     return content.getvalue()
 
 
-class _Packer(pickle.Pickler):
+class _EffectPickler(pickle.Pickler):
     def reducer_override(self, value: Any) -> Any:
         if isinstance(value, type) and issubclass(value, Effect) and value.file is not None:
             return effect_of, (value.file, value.file_content)

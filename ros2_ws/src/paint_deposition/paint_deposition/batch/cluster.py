@@ -15,7 +15,7 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
 import paint_deposition
-from paint_deposition.batch.cases import Case, Columns, ResultCache, packed
+from paint_deposition.batch.cases import Case, Columns, ResultCache, serialised
 from paint_deposition.errors import ManyError
 
 if TYPE_CHECKING:
@@ -26,8 +26,8 @@ ONE_THREAD = dict.fromkeys(
     ('NUMBA_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'OMP_NUM_THREADS', 'MKL_NUM_THREADS'), '1'
 )
 CONNECT_S = 30
-# Inputs that a worker keeps open.
-OPENED = 8
+# Inputs that a worker keeps in memory.
+INPUTS_KEPT = 8
 
 
 def compute(
@@ -41,7 +41,7 @@ def compute(
 ) -> tuple[int, str]:
     """Start workers if a case is left, and ``run``: the number computed, the workers in words."""
     if all(results.has(case.digest) for case in cases):
-        return 0, 'none: every case had been finished'
+        return 0, 'none: every case was finished already'
     progress('starting the workers')
     with workers(scheduler, count) as client:
         info = client.scheduler_info(n_workers=-1)
@@ -94,8 +94,8 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             own, theirs = _version(), set(client.run(_version).values())
             if theirs != {own}:  # films are the same only by the same code
                 raise ManyError(
-                    f'the workers at {scheduler} have paint_deposition '
-                    f'{", ".join(sorted(theirs)) or "nowhere: there is none"}, this is {own}; '
+                    f'versions of the workers at {scheduler}: '
+                    f'{", ".join(sorted(theirs)) or "no worker"}, this is {own}; '
                     f'start `dask worker {scheduler} --nthreads 1` with the same version'
                 )
             yield client
@@ -115,9 +115,9 @@ def run(
 ) -> int:
     """Compute the cases that are not finished yet, and return how many those were.
 
-    An input is sent once, as the result of a task of its own: the scheduler can make it anew when
+    An input is sent once, as the result of a task of its own: the scheduler can recompute it when
     the only worker that holds it dies. Cases of a worker that dies are run again by another one. A
-    case that ends its worker again and again, or fails in a way that is not foreseen, has the
+    case that ends its worker again and again, or fails in an unforeseen way, has the
     reason in its column ``error`` and is tried again by the next run.
 
     Args:
@@ -136,12 +136,12 @@ def run(
     left = {case.digest: case for case in cases if not results.has(case.digest)}
     # As bytes: Dask neither walks through the arrays nor copies them for each worker.
     sent = {
-        name: client.submit(bytes, packed(inputs[name]), key=f'input-{name}', pure=False)
+        name: client.submit(bytes, serialised(inputs[name]), key=f'input-{name}', pure=False)
         for name in {name for case in left.values() for name in case.inputs}
     }
     futures: dict[Future, Case] = {
         client.submit(
-            _unpacked, work, packed(case.given), *(sent[name] for name in case.inputs),
+            _run_case, work, serialised(case.parameters), *(sent[name] for name in case.inputs),
             key=f'case-{case.digest}', pure=False, retries=1,
         ): case
         for case in left.values()
@@ -154,22 +154,22 @@ def run(
         if failure is None:
             results.add(case.digest, columns)
         else:
-            results.failures[case.digest] = {**case.about, 'error': [failure]}
+            results.failures[case.digest] = {**case.known, 'error': [failure]}
         future.release()
         done += 1
         progress(f'{done} of {len(cases)} cases', done / len(cases))
     return len(left)
 
 
-@lru_cache(maxsize=OPENED)
-def _opened(content: bytes) -> Any:
-    """An input as it was. What it keeps for itself, a search tree say, serves the next case."""
+@lru_cache(maxsize=INPUTS_KEPT)
+def _deserialised(content: bytes) -> Any:
+    """An input; what it caches, such as a search tree, serves the next case too."""
     return pickle.loads(content)
 
 
-def _unpacked(work: Callable[..., Columns], given: bytes, *inputs: bytes) -> Columns:
+def _run_case(work: Callable[..., Columns], parameters: bytes, *inputs: bytes) -> Columns:
     """Run one case in a worker."""
-    return work(pickle.loads(given), *map(_opened, inputs))
+    return work(pickle.loads(parameters), *map(_deserialised, inputs))
 
 
 def _result(future: Future) -> tuple[Columns, str | None]:

@@ -22,8 +22,7 @@ MOST_WARNINGS = 5
 workers_options = options.grouped((
     click.option(
         '--scheduler', metavar='ADDRESS',
-        help='Of a Dask scheduler with workers, tcp://10.0.0.5:8786; default: processes of this '
-        'machine.',
+        help='Address of a Dask scheduler, tcp://10.0.0.5:8786; default: local processes.',
     ),
     click.option(
         '--workers', 'count', type=click.IntRange(min=1),
@@ -53,7 +52,7 @@ def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, where
     with Progress('sweep') as show:
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
-        options.say_all('note', job.notes)
+        options.print_all('note', job.notes)
         finished, done, workers = _computed(computed, job.cases, job.inputs, output, show, **where)
         show('writing and drawing')
         found = Sweep.of(job, finished, done, workers)
@@ -62,8 +61,8 @@ def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, where
             raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
         files = options.write_results(found, output, pictures=pictures)
     odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
-    _say_warnings(odd, output / 'cases.parquet')
-    options.say_results(files, as_json, found.lines)
+    _print_warnings(odd, output / 'cases.parquet')
+    options.print_results(files, as_json, found.lines)
 
 
 @click.command('line')
@@ -86,21 +85,23 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where
 
     with Progress('line') as show:
         show('reading')
-        cases, file, model, strays = line_cases(folder)
+        cases, file, model, unmatched = line_cases(folder)
         finished, done, workers = _computed(computed, cases, {}, output, show, **where)
         show('pooling')
         table = finished.table(case.digest for case in cases)
-        found = Line(folder, model, shared_files(folder, file), table, done, workers, strays)
+        found = Line(folder, model, shared_files(folder, file), table, done, workers, unmatched)
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
         files = options.write_results(found, output, pictures=pictures)
-    _say_warnings([*found.errors, *found.remarks], output / 'line.json')
-    if strays:
-        more = f' and {len(strays) - MOST_WARNINGS} more' if len(strays) > MOST_WARNINGS else ''
-        named = ', '.join(strays[:MOST_WARNINGS])
-        options.say_all('warning', [f'no recording has the name of {named}{more}; left out'])
-    options.say_results(files, as_json, found.lines)
+    _print_warnings([*found.errors, *found.remarks], output / 'line.json')
+    if unmatched:
+        more = (
+            f' and {len(unmatched) - MOST_WARNINGS} more' if len(unmatched) > MOST_WARNINGS else ''
+        )
+        named = ', '.join(unmatched[:MOST_WARNINGS])
+        options.print_all('warning', [f'no recording has the name of {named}{more}; left out'])
+    options.print_results(files, as_json, found.lines)
 
 
 def _computed(
@@ -120,11 +121,11 @@ def _computed(
         raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
     finished = ResultCache(output / 'finished')
     done, workers = compute(scheduler, count, work, cases, inputs, finished, show)
-    options.say_all('note', [f'workers: {workers}'])
+    options.print_all('note', [f'workers: {workers}'])
     return finished, done, workers
 
 
-def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
+def _print_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
     """Print some of many warnings (name, reason), each reason once, and the file of all."""
     named: dict[str, list[str]] = {}
     for name, reason in warnings:
@@ -133,6 +134,6 @@ def _say_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
         f'{first}{f" and {len(others)} more" if others else ""}: {reason}'
         for reason, (first, *others) in named.items()
     ]
-    options.say_all('warning', lines[:MOST_WARNINGS])
+    options.print_all('warning', lines[:MOST_WARNINGS])
     if len(lines) > MOST_WARNINGS:
-        options.say_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
+        options.print_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])

@@ -25,13 +25,13 @@ from paint_deposition.planning.requests import ImproveRequest
 @options.MODEL
 @click.option(
     '--rival', 'rivals', type=options.FILE, multiple=True,
-    help='Another model that explains the readings as well; the film is made even for all.',
+    help='Another model that explains the readings equally well; the film is optimised for all.',
 )  # fmt: skip
 @options.output_option(
     'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
 )
 @options_of(ImproveRequest)
-@options.seed_option('the models drawn from what the model file knows')
+@options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
 @options.PICTURES
 @options.JSON
@@ -77,9 +77,9 @@ def improve_command(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    options.say_all('note', [*result.surface.notes, *recorded.notes])
-    options.say_all('warning', [*recorded.warnings, *result.warnings])
-    options.say_results(files, as_json, _lines(result), model=chosen.words)
+    options.print_all('note', [*result.surface.notes, *recorded.notes])
+    options.print_all('warning', [*recorded.warnings, *result.warnings])
+    options.print_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.Improvement) -> Iterator[str]:

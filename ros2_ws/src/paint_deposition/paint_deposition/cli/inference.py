@@ -51,7 +51,7 @@ def _run(
     from paint_deposition.files.model_file import read_model_file
 
     def remark(kind: str, experiment: str, line: str) -> None:
-        options.say_all(kind, [f'{experiment}: {line}'])
+        options.print_all(kind, [f'{experiment}: {line}'])
 
     with Progress(command) as show:
         data = pd.read_campaign(campaign, show, part_pose, remark)
@@ -62,15 +62,15 @@ def _run(
         show('writing')
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
         files = options.write_results(result, output, pictures=pictures, **more)
-    options.say_all('note', data.understood)
+    options.print_all('note', data.understood)
     if not isinstance(result, pd.SideBySide):
         for name, found in result.geometry.items():
-            options.say_all('warning', (f'{name}: {line}' for line in found.warnings))
-        options.say_all('warning', result.warnings)
-    told = f'{fitted or FITTED} a 50 mm bell'
+            options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
+        options.print_all('warning', result.warnings)
+    model_line = f'{fitted or FITTED} a 50 mm bell'
     if start is not None:
-        told = f'{fitted} {model_words(chosen, start)}'.strip()
-    options.say_results(files, as_json, lines(result), words or told)
+        model_line = f'{fitted} {model_words(chosen, start)}'.strip()
+    options.print_results(files, as_json, lines(result), words or model_line)
 
 
 @click.command('calibrate')
@@ -119,15 +119,15 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
 @options.CAMPAIGN
 @click.option(
     '--model', 'model_files', type=options.FILE, multiple=True,
-    help="Model to judge as it is; default: the campaign's, else one fitted to it. Repeated, the "
-    'models are set side by side.',
+    help="Model to compare, taken as it is; default: the campaign's, else one fitted to it. "
+    'Repeated, the models are compared with each other.',
 )  # fmt: skip
 @OUTPUT
 @options.PART_POSE
 @options.PICTURES
 @options.JSON
 def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
-    """Set the model beside the gauge readings of CAMPAIGN and say where it is off.
+    """Compare the model with the gauge readings of CAMPAIGN and show where it is off.
 
     Writes comparison.json, residuals.csv, comparison.png and report.html. With several models
     there is a table of residuals for each.
@@ -160,7 +160,7 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
         errors = [m.residuals.rmse_um for m in comparison.misfits if m.kind == 'experiment']
         cells = [comparison.points.rmse_um, *errors]
         yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in cells)
-    yield f'nearest to the readings: {beside.best}'
+    yield f'smallest error: {beside.best}'
 
 
 def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
@@ -226,7 +226,7 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
 @options.PICTURES
 @options.JSON
 def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any) -> None:
-    """Add an effect to the model, fit it to CAMPAIGN anew and show the error before and after.
+    """Add an effect to the model, refit it to CAMPAIGN and show the error before and after.
 
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
     on from there, give that model.yaml as --model.
@@ -293,7 +293,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
-        yield f'p-value of nothing missing: {diagnosis.p_value:.4f}'
+        yield f'p-value if nothing is missing: {diagnosis.p_value:.4f}'
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from paint_deposition.cli.options import FILE, JSON, say_all
+from paint_deposition.cli.options import FILE, JSON, print_all
 
 if TYPE_CHECKING:
     from paint_deposition.motion.part_location import PartPlace
@@ -38,7 +38,7 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
     from paint_deposition.files.provenance import origin
 
     place = locate_by_points(touched, points, pose_unit)
-    say_all('warning', place.warnings)
+    print_all('warning', place.warnings)
     if as_json:
         files = {'touched': touched, 'points': points}
         click.echo(json_text(place.to_dict() | {'provenance': origin(files=files)}))

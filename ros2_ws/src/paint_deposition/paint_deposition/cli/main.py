@@ -22,16 +22,19 @@ COMMANDS = {
     'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
-    'improve': ('improve', 'Speeds, flows and triggers of a programme for a more even film.'),
+    'improve': (
+        'improve',
+        'Make the film of a programme more even: speeds, flows, triggers.',
+    ),
     'measure': ('measure', 'Choose where to put the gauge on a part.'),
-    'compare': ('inference', 'Set the model beside gauge readings.'),
+    'compare': ('inference', 'Compare the model with gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
-    'refit': ('inference', 'Add an effect of your choice and fit anew.'),
-    'sweep': ('batch', 'Many variations of one job, on all cores or a cluster.'),
-    'line': ('batch', 'Many parts over days: what they share and what changes.'),
-    'locate': ('locate', 'Find where the part stands, by touched points.'),
+    'refit': ('inference', 'Add an effect of your choice and refit.'),
+    'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
+    'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
+    'locate': ('locate', 'Find the pose of the part from touched points.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'recover': ('recordings', 'Make a whole bag of an unfinished run.'),
+    'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
 }
 
 

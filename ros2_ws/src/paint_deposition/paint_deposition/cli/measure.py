@@ -23,7 +23,7 @@ HARDLY = 0.15
 @options.part_options(0.01)
 @click.option(
     '--trajectory', type=options.FILE,
-    help='How it is painted: what `simulate` takes; default: passes as `plan` would lay them, '
+    help='The motion, as `simulate` takes it; default: passes as `plan` would lay them, '
     'with --target-um or --speed.',
 )  # fmt: skip
 @options.MODEL
@@ -55,7 +55,7 @@ def measure_command(
     """
     if trajectory is None and passes == FilmBuild():
         raise click.UsageError(
-            'it is not said how the part is painted; give --trajectory, or --target-um for passes '
+            'no motion is given; give --trajectory, or --target-um for passes '
             'as `plan` would lay them'
         )
     with Progress('measure') as show:
@@ -84,9 +84,9 @@ def measure_command(
             result, output, made_from=made_from, part_pose=motion.get('part_pose'),
             pictures=pictures,
         )  # fmt: skip
-    options.say_all('note', result.surface.notes)
-    options.say_all('warning', warnings)
-    options.say_results(files, as_json, _lines(result), model=chosen.words)
+    options.print_all('note', result.surface.notes)
+    options.print_all('warning', warnings)
+    options.print_results(files, as_json, _lines(result), model=chosen.words)
 
 
 def _lines(result: pd.ChosenReadings) -> Iterator[str]:
@@ -98,7 +98,7 @@ def _lines(result: pd.ChosenReadings) -> Iterator[str]:
             yield f'{name:>22} {100 * chance:3.0f} %   on a grid {100 * grid:3.0f} %'
     hidden = [name for name, chance in power if chance < HARDLY]
     if hidden:
-        yield f'hardly to be found on this part at their typical size: {", ".join(hidden)}'
+        yield f'unlikely to be detected on this part at their typical size: {", ".join(hidden)}'
     yield (
         f'at least {result.apart_m * 1e3:.0f} mm from each other and {result.foot_m * 1e3:.0f} mm '
         f'off edges; {result.repeats} of them are to be read twice'

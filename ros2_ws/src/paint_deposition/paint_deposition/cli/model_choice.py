@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import paint_deposition as pd
-from paint_deposition.cli.options import say_all
+from paint_deposition.cli.options import print_all
 from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def chosen_model(given: Path | None, brush: int = 0) -> ChosenModel:
 def model_for(given: Path | None, motion: Path) -> ChosenModel:
     """The model named with --model, else the one that the motion was planned with, else a bell.
 
-    What is odd about it is said on stderr.
+    Warnings about it go to stderr.
     """
     from paint_deposition.files.planned_model import planned_model
     from paint_deposition.files.provenance import model_digest
@@ -58,10 +58,10 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
         model = chosen.model
         alike = [model, *(model.with_brush(brush.number) for brush in model.brushes)]
         if planned.digest not in map(model_digest, alike):
-            say_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
+            print_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
         return chosen
     if planned.file is None:
-        say_all('warning', [
+        print_all('warning', [
             f'{motion} was planned with a model ({planned.digest[:12]}) that is not in '
             f'{planned.path}; give it with --model, or the film is another one than planned'
         ])  # fmt: skip

@@ -99,7 +99,7 @@ def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> li
 
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
-    help='A longer time between poses is a gap: gun off.',
+    help='A longer interval between poses is a gap, in which the gun is off.',
 )  # fmt: skip
 
 
@@ -188,7 +188,7 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
         ),
         click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
-            help='Triangles are split until no edge is longer.',
+            help='Longest edge of the refined mesh: larger triangles are split.',
         ),
         click.option(
             '--down', nargs=3, type=NUMBER, metavar='X Y Z', callback=_vector,
@@ -198,7 +198,7 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
     return grouped(options, 'part')
 
 
-def say_all(label: str, lines: Iterable[str]) -> None:
+def print_all(label: str, lines: Iterable[str]) -> None:
     """Print each line behind its label on stderr: notes, warnings."""
     for line in lines:
         click.echo(f'{label}: {line}', err=True)
@@ -215,7 +215,7 @@ def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
         return [output / file.name for file in pd.write(result, folder, **more)]
 
 
-def say_results(files: list[Path], as_json: bool, lines: Iterable[str], model: str = '') -> None:
+def print_results(files: list[Path], as_json: bool, lines: Iterable[str], model: str = '') -> None:
     """Print the file of figures as written, or else the model, these lines and the files."""
     head = [f'model: {model}'] if model else []
     if as_json:

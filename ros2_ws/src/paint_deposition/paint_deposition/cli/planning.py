@@ -40,7 +40,7 @@ def recommend_command(
         answer, output, pictures=pictures, model=chosen.model,
         made_from={'model_file': str(model_file or '')},
     )  # fmt: skip
-    options.say_results(files, as_json, _recommendation_lines(answer), model=chosen.words)
+    options.print_results(files, as_json, _recommendation_lines(answer), model=chosen.words)
 
 
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
@@ -75,7 +75,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 )  # fmt: skip
 @click.option(
     '--face-angle-deg', default=40.0, show_default=True, type=options.FiniteRange(5.0, 75.0),
-    help='A face turns away from its mean by no more.',
+    help='Largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
 @options.output_option('the bag, passes.csv, passes.mod, plan.json and the film')
@@ -126,9 +126,9 @@ def plan_command(
             result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
             pictures=pictures,
         )  # fmt: skip
-    options.say_all('note', surface.notes)
-    options.say_all('warning', map(str, touched))
-    options.say_results(files, as_json, _plan_lines(result), model=chosen.words)
+    options.print_all('note', surface.notes)
+    options.print_all('warning', map(str, touched))
+    options.print_results(files, as_json, _plan_lines(result), model=chosen.words)
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
@@ -148,10 +148,10 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
                 f'the {1e3 * gun.before_m:.0f} mm before it keep clear of the part'
             )
         return
-    if result.plain:
-        plain, paint = result.plain, result.plain.statistics
+    if result.unoptimised:
+        first, paint = result.unoptimised, result.unoptimised.statistics
         yield (
-            f'without --optimise: {plain.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
+            f'without --optimise: {first.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
             f'of {film.emitted_volume_cm3:.1f} cm3, capture fraction '
             f'{100 * paint.capture_fraction:.0f} %'
         )

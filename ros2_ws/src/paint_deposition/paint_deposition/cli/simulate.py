@@ -44,9 +44,9 @@ from paint_deposition.cli.progress import Progress
 )  # fmt: skip
 @options.motion_options
 @options.MAX_POSE_GAP
-@click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Film wanted.')
+@click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
 @click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
-              help='Accepted difference from the target, either way.')  # fmt: skip
+              help='Accepted difference from the target, either way [µm].')  # fmt: skip
 @options.PICTURES
 @options.JSON
 def simulate_command(
@@ -94,12 +94,12 @@ def simulate_command(
         }
         show('writing and drawing')
         files = options.write_results(film, output, made_from=made_from, pictures=pictures)
-    options.say_all('note', film.notes)
-    options.say_all('note', [readings.understood] if readings else [])
-    options.say_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
-    options.say_all('warning', film.warnings)
+    options.print_all('note', film.notes)
+    options.print_all('note', [readings.understood] if readings else [])
+    options.print_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
+    options.print_all('warning', film.warnings)
     words = '; '.join(dict.fromkeys(model.words for model in chosen))
-    options.say_results(files, as_json, _lines(film), model=words)
+    options.print_results(files, as_json, _lines(film), model=words)
 
 
 def _lines(film: pd.Film) -> Iterator[str]:

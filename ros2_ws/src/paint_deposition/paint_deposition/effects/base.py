@@ -1,4 +1,4 @@
-"""What an effect is: one physical cause, its parameters, and where in the model it acts."""
+"""The base of effects: one physical cause, its parameters, and where in the model it acts."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class SetPointPower(BaseModel):
         """By how much the amplitudes grow at others, or ModelError that begins with ``whose``."""
         value = getattr(set_points, self.setting)
         if value is None:
-            raise ModelError(f'{whose} does not say its {self.setting}; give it to the brush')
+            raise ModelError(f'{whose} has no {self.setting}; add it to the brush')
         return (value / self.at) ** self.exponent
 
 
@@ -96,8 +96,8 @@ def parameter(
     )  # fmt: skip
 
 
-def over(**covariates: Any) -> Mapping[str, Any]:
-    """What a class says of covariates, by their names; see ``Effect.covariates``."""
+def read_only(**covariates: Any) -> Mapping[str, Any]:
+    """A read-only mapping, as for ``Effect.covariates``."""
     return MappingProxyType(covariates)
 
 
@@ -131,7 +131,7 @@ class Effect(BaseModel):
     source: ClassVar[str] = ''
     # Covariates along which the law may be off, each with the way in which the film goes with it:
     # it rises (1), falls (-1), or either (0).
-    covariates: ClassVar[Mapping[str, int]] = over()
+    covariates: ClassVar[Mapping[str, int]] = read_only()
     # What a law of any form over them would be: a 'factor' on what arrives or an 'addition' to the
     # film; '' where a curve over a covariate is not that effect.
     free_law: ClassVar[str] = ''
@@ -151,7 +151,7 @@ class Effect(BaseModel):
 
     @model_serializer(mode='wrap')
     def _without_nothing(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """An effect that follows nothing does not say so."""
+        """Leave ``follows`` out where it is empty."""
         values = written(self)
         if not self.follows:
             values.pop('follows', None)

@@ -45,7 +45,7 @@ class DepositionModel(BaseModel):
         brushes = [Brush.model_validate(brush) for brush in values['brushes']]
         by_number = {brush.number: brush for brush in brushes}
         if len(by_number) < len(brushes):
-            raise ValueError('a number of brushes is there twice; keep one')
+            raise ValueError('two brushes have one number; keep one')
         ordered = tuple(by_number[number] for number in sorted(by_number))
         return {**values, 'planar': ordered[0].planar, 'brushes': ordered}
 
@@ -93,7 +93,7 @@ class DepositionModel(BaseModel):
             projection=self.projection, effects=self.effects,
         )  # fmt: skip
 
-    def with_others(self, given: 'DepositionModel') -> 'DepositionModel':
+    def with_missing_brushes(self, given: 'DepositionModel') -> 'DepositionModel':
         """A copy with the brushes of a given model that this one does not have."""
         own = {brush.number for brush in self.brushes}
         others = [brush for brush in given.brushes if brush.number not in own]

@@ -194,14 +194,14 @@ def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int |
     motions = []
     for number, written in enumerate(entry.guns or [{}], start=1):
         gun = checked(_Gun, f'gun {number}', written, ReadingsError)
-        said = {key: value for key in own if (value := getattr(gun, key)) is not None}
+        declared = {key: value for key in own if (value := getattr(gun, key)) is not None}
         file = gun.trajectory or entry.trajectory
         if file is None:
             of = f'gun {number}' if entry.guns else 'it'
             raise ReadingsError(
                 f"{of} has no 'trajectory'; give the name of a recording, RAPID module or table"
             )
-        source = MotionSource(**(own | said))
+        source = MotionSource(**(own | declared))
         if source.urdf:
             source = source.model_copy(update={'urdf': str(folder / source.urdf)})
         brush = entry.brush if gun.brush is None else gun.brush

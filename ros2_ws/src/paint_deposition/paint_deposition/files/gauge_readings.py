@@ -63,13 +63,13 @@ def read_readings(
         sigma_um = read.numbers('sigma', may_be_empty=True)
         for k in np.flatnonzero(sigma_um <= 0.0):
             table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
-    table.refuse_complaints()
-    said = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
+    table.refuse_errors()
+    notes = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
     groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
     readings = Readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
-        f'{path.name}: {"; ".join(filter(None, said))}',
+        f'{path.name}: {"; ".join(filter(None, notes))}',
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -114,7 +114,7 @@ class MeasuringPoints:
             elif not np.array_equal(positions[row], positions[other]):
                 same = f"point '{label}' is elsewhere in line {read.table.lines[other]}"
                 read.table.complain(row, f'{same}; keep one')
-        read.table.refuse_complaints()
+        read.table.refuse_errors()
         words = f'{place_words} of {len(labels)} points in {path.name} ({read.table.form})'
         return MeasuringPoints(path, labels, positions, normals, words)
 

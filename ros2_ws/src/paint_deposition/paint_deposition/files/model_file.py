@@ -110,34 +110,34 @@ def write_model(
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
-    said = checked(_Sections, 'model', content, ModelError)
-    projection = checked(ProjectionSection, 'projection', said.projection or {}, ModelError)
+    sections = checked(_Sections, 'model', content, ModelError)
+    projection = checked(ProjectionSection, 'projection', sections.projection or {}, ModelError)
     effects: list[Effect] = []
-    for number, entry in enumerate(said.effects or (), start=1):
+    for number, entry in enumerate(sections.effects or (), start=1):
         effect = _effect(f'effects, entry {number}', entry, load)
         if effect.id in [other.id for other in effects]:
-            raise ModelError(f'effects: {effect.id!r} is there twice; keep one')
+            raise ModelError(f'effects: {effect.id!r} is listed twice; keep one')
         effects.append(effect)
     if projection.occlusion:
         if any(effect.id == Occlusion.id for effect in effects):
             raise ModelError('occlusion is given in projection and in effects; keep the effect')
         effects.append(Occlusion(strength=1.0))
-    if said.brushes is None:
-        planar = checked(PlanarPattern, 'planar', said.planar or {}, ModelError)
+    if sections.brushes is None:
+        planar = checked(PlanarPattern, 'planar', sections.planar or {}, ModelError)
         patterns = DepositionModel(planar=planar)
-    elif said.planar is not None:
+    elif sections.planar is not None:
         raise ModelError('planar and brushes are both given; keep one of them')
     else:
-        patterns = DepositionModel.of_brushes(_brushes(said.brushes))
+        patterns = DepositionModel.of_brushes(_brushes(sections.brushes))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
     model.effects_by_pattern()  # refuses what effects cannot follow
     posterior = None
-    if said.posterior:
-        posterior = checked(Posterior, 'posterior', said.posterior, ModelError)
+    if sections.posterior:
+        posterior = checked(Posterior, 'posterior', sections.posterior, ModelError)
         posterior.check_suits(model)
-    history = said.history or []
-    return ModelFile(model, said.name or '', said.uncertainty or {}, history, posterior)
+    history = sections.history or []
+    return ModelFile(model, sections.name or '', sections.uncertainty or {}, history, posterior)
 
 
 def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
@@ -148,7 +148,7 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
     between: list[tuple[int, dict[str, Any]]] = []
     for number, entry in section.items():
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
-            raise ModelError(f'brushes: {number!r} is no number of a brush; give 1, 2 and so on')
+            raise ModelError(f'brushes: {number!r} is not a brush number; give 1, 2 and so on')
         given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
         at = given.model_dump(exclude={'planar'})
         if given.planar is None:

@@ -24,7 +24,7 @@ COMMENTS = {
     'brushes': 'eq. (1) and set-points by number',
     'projection': 'eq. (2): from the model plane to the surface',
     'uncertainty': 'standard deviations',
-    'posterior': 'what the fit knows: a prior for the next job',
+    'posterior': 'posterior of the fit: the prior of the next job',
     'history': 'what was added, oldest first',
 }
 

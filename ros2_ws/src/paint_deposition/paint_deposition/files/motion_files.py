@@ -139,9 +139,9 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
                 'own frame, and a part_pose is given; leave one of them out'
             )
         of = f"'{named}'" if named else 'their own frame'
-        said = f'part_pose: poses brought from {of} to the part, which stands at '
-        said += words(Rigid.of(source.part_pose))
-        return _with_note(at_part(recorded, source.part_pose, part), said)
+        note = f'part_pose: poses brought from {of} to the part, which stands at '
+        note += words(Rigid.of(source.part_pose))
+        return _with_note(at_part(recorded, source.part_pose, part), note)
     if is_frame(named, part):
         return recorded
     known = ''
@@ -150,8 +150,8 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
 
         static = StaticFrames.from_bag(bag)
         if place := static.pose_of(part, named):
-            said = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
-            return _with_note(at_part(recorded, place.values, part), said + words(place))
+            note = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
+            return _with_note(at_part(recorded, place.values, part), note + words(place))
         if over_time := poses_over_time(bag, part, named, recorded.stamps_ns):
             return _in_moving_part_frame(recorded, part, *over_time)
         known = static.words(named)

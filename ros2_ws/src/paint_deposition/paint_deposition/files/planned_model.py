@@ -1,4 +1,4 @@
-"""The model that passes were planned with: which it was, said in every file of a plan.
+"""The model that passes were planned with: named in every file of a plan.
 
 A plan lies in a folder with its ``model.yaml``; its bag holds a copy. Bag, RAPID module and
 ``plan.json`` hold the digest of the model, so that another ``model.yaml`` is not taken for it.

@@ -2,7 +2,7 @@
 
 A part is found by all that it was made from: the bytes and the name of its file, the options,
 and the code and libraries that prepared it. Processes may share the folder: files appear
-whole, what is broken or gone is prepared anew, and the parts unused for longest make room.
+whole, what is broken or gone is prepared again, and the parts unused for longest make room.
 """
 
 import hashlib
@@ -53,7 +53,7 @@ def find(place: Path) -> Surface | None:
             faces, neighbours = (kept[name].astype(np.int64) for name in INDICES)
             notes = tuple(kept['notes'].tolist())
         os.utime(place)
-    except Exception:  # whatever broken bytes provoke in NumPy; the part is prepared anew
+    except Exception:  # whatever broken bytes provoke in NumPy; the part is prepared again
         return None
     arrays |= {'faces': faces, 'neighbours': neighbours}
     return Surface(notes=notes, curved_edges=CurvedEdges(*curved), **arrays)

@@ -68,7 +68,7 @@ class Brush(SetPoints):
 
 
 def listed(numbers: Iterable[int]) -> str:
-    """Numbers of brushes in words; those that stand for set-points nobody knows."""
+    """Numbers of brushes in words, without those that stand for set-points."""
     return ', '.join(str(number) for number in sorted(numbers) if number < BETWEEN)
 
 
@@ -86,7 +86,7 @@ class Exponents:
 WIDTH = Exponents((0.0, -1.0, 1.0, -1.0), 0.5)
 EFFICIENCY = Exponents((0.0, 0.0, 0.0, 0.0), 0.3)
 FORM = Exponents((0.0, 0.0, 0.0, 0.0), 0.3)
-# How well a calibrated brush is met, and how little is known of a level, as deviations.
+# Standard deviations: of the law at a calibrated brush, and of the prior of a level.
 MET, LEVEL = 1e-4, 10.0
 
 
@@ -166,7 +166,7 @@ class BrushLaw:
         return all(getattr(brush, name) is not None for brush in self.brushes)
 
     def _sprayed(self, at: SetPoints) -> float:
-        """What the transfer is a share of: solids or paint that is sprayed [cm3/s], else 1."""
+        """The solids or paint sprayed [cm3/s], to which the transfer efficiency refers; else 1."""
         first, share = self.brushes[0], 1.0
         for name, unit in (('flow_cm3_per_min', 60.0), ('solids', 1.0)):
             if self._known(name):

@@ -1,4 +1,4 @@
-"""The faces of a part: how each is sprayed beside the others, in what order, and the way between.
+"""The faces of a part: blending at their seams, their order, and the motion from face to face.
 
 The faces overlap at their seams, because the spray of each reaches beyond it. Two things even
 that out on the film of all faces together: how far from its seams each face is sprayed, found by
@@ -35,11 +35,11 @@ from paint_deposition.planning.surface_map import SurfaceMap
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
-# By how much longer or shorter the gun may stay on a pass than evenness on its face alone asks,
-# and what a change by that much is worth in film, as a share.
-DWELL, RELUCTANCE = (0.5, 2.0), 0.02
-# Between faces the gun is drawn back so far [m], by the first that keeps it clear of the part.
-RETREATS_M = (0.1, 0.2, 0.4, 0.8)
+# Bounds on the time on a pass, over the time that evenness on its face alone requires, and the
+# weight that holds it near that.
+DWELL, DWELL_WEIGHT = (0.5, 2.0), 0.02
+# Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
+RETRACTIONS_M = (0.1, 0.2, 0.4, 0.8)
 
 
 @dataclass(frozen=True)
@@ -65,7 +65,7 @@ class FacePasses:
 
 
 @dataclass(frozen=True)
-class _Laid:
+class _FaceFilms:
     """Passes on every face for one margin, and the film of each pass on the whole part."""
 
     margin_m: float
@@ -91,26 +91,26 @@ def blend(
     overspray_m, tried = 0.0, []
     for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
         progress('faces', number / len(MARGINS))
-        tried.append(_laid(surface, model, request, faces, share * overspray_m))
+        tried.append(_lay_faces(surface, model, request, faces, share * overspray_m))
         overspray_m = tried[0].faces[0].style.overspray_m
     target = request.target_um if request.speed_m_per_s is None else None
-    dwells = [_dwell(laid, area_m2, target) for laid in tried]
+    dwells = [_dwell(trial, area_m2, target) for trial in tried]
     sigmas = [
-        evenness(dwell @ laid.films_um, area_m2)[1]
-        for dwell, laid in zip(dwells, tried, strict=True)
+        evenness(dwell @ trial.films_um, area_m2)[1]
+        for dwell, trial in zip(dwells, tried, strict=True)
     ]
     best = int(np.argmin(sigmas))
     _, before = evenness(tried[0].films_um.sum(axis=0), area_m2)
     return tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before
 
 
-def _laid(
+def _lay_faces(
     surface: Surface,
     model: DepositionModel,
     request: PlanRequest,
     faces: tuple[Face, ...],
     margin_m: float,
-) -> _Laid:
+) -> _FaceFilms:
     passes, maps, films = [], [], []
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     for face in faces:
@@ -122,25 +122,27 @@ def _laid(
             integrator.reset()
             integrator.add(path)
             films.append(integrator.raw_um.copy())
-    return _Laid(margin_m, tuple(passes), tuple(maps), np.array(films))
+    return _FaceFilms(margin_m, tuple(passes), tuple(maps), np.array(films))
 
 
-def _dwell(laid: _Laid, area: np.ndarray, target_um: float | None) -> np.ndarray:
+def _dwell(trial: _FaceFilms, area: np.ndarray, target_um: float | None) -> np.ndarray:
     """(n,) time on each pass, over what it is on its face alone, for an even film of all."""
     weight = area / area.sum()
-    films = laid.films_um
+    films = trial.films_um
     wanted = target_um or float(weight @ films.sum(axis=0))
     rows = np.sqrt(weight)[:, np.newaxis] * films.T / wanted
-    ridge = RELUCTANCE * np.eye(len(films)) / math.sqrt(len(films))
+    ridge = DWELL_WEIGHT * np.eye(len(films)) / math.sqrt(len(films))
     return lsq_linear(
         np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), DWELL
     ).x
 
 
-def _with_dwell(laid: _Laid, dwell: np.ndarray, request: PlanRequest) -> tuple[FacePasses, ...]:
-    """The passes at their new speeds, with a run-up that suits them."""
+def _with_dwell(
+    trial: _FaceFilms, dwell: np.ndarray, request: PlanRequest
+) -> tuple[FacePasses, ...]:
+    """The passes at their new speeds, with a lead-in to match."""
     found, first = [], 0
-    for face, surface_map in zip(laid.faces, laid.maps, strict=True):
+    for face, surface_map in zip(trial.faces, trial.maps, strict=True):
         passes = []
         for number, planned in enumerate(face.passes):
             style = replace(
@@ -156,7 +158,7 @@ def _with_dwell(laid: _Laid, dwell: np.ndarray, request: PlanRequest) -> tuple[F
 # --- order, and the way from face to face
 
 
-def in_order(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+def order_faces(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
     """The faces in that order, each time the nearest next, which has least travel between them.
 
     A face may run the other way round, unless its passes all run one way.
@@ -184,12 +186,12 @@ def _travel_m(before: FacePasses, after: FacePasses) -> float:
     return float(np.linalg.norm(after.start_m - before.end_m))
 
 
-def motion_over(
+def join_motions(
     faces: Sequence[FacePasses], frame_id: str, is_clear: Callable[[Trajectory], bool]
 ) -> tuple[Trajectory, tuple[Move, ...]]:
     """The timed motion that sprays one face after the other, and the moves of a robot program.
 
-    Between the faces the gun is drawn back along its axis until the way ``is_clear``.
+    Between the faces the gun retracts along its axis until the way ``is_clear``.
     """
     parts: list[Trajectory] = []
     moves: list[Move] = []
@@ -209,9 +211,9 @@ def _between(
 ) -> list[Move]:
     """Moves from the end of a face to the start of the next, without both."""
     speed = style.transfer_speed_m_per_s
-    for retreat_m in RETREATS_M:
+    for retreat_m in RETRACTIONS_M:
         between = [
-            Move(_drawn_back(move, retreat_m), move.quaternion_xyzw, speed, spraying=False)
+            Move(_retracted(move, retreat_m), move.quaternion_xyzw, speed, spraying=False)
             for move in (before, after)
         ]
         if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
@@ -219,7 +221,7 @@ def _between(
     return between
 
 
-def _drawn_back(move: Move, by_m: float) -> np.ndarray:
+def _retracted(move: Move, by_m: float) -> np.ndarray:
     return move.position_m - by_m * Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
 
 

@@ -219,7 +219,7 @@ class FilmAtPoints:
         path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
         self._integrator.reset()
         self._integrator.add(path)
-        return self._integrator.raw_um * self._settling(path)
+        return self._integrator.raw_um * self._finished_over_arrived(path)
 
     def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
         """(n, V) films for a density of paint of 1 s/m at each node [um].
@@ -242,10 +242,10 @@ class FilmAtPoints:
             self._integrator.reset()
             self._integrator.add_sprayed(part.with_(dwell_s=part.dwell_s * shares.data[column]))
             films[node] = self._integrator.raw_um
-        return films * self._settling(path)
+        return films * self._finished_over_arrived(path)
 
-    def _settling(self, path: SprayPath) -> np.ndarray | float:
-        """(V,) film in the end over film that arrived; effects on the film need all of it."""
+    def _finished_over_arrived(self, path: SprayPath) -> np.ndarray | float:
+        """(V,) finished film over the film that arrived, from effects on the finished film."""
         if not self._settles:
             return 1.0
         everywhere = self._surface.points()

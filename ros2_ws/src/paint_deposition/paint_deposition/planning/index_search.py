@@ -165,7 +165,7 @@ def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
     return Minimum(float(found.x), float(found.fun))
 
 
-def choose(curve: IndexCurve, tolerance: float | None) -> Minimum:
+def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
     """The index to recommend, see ``recommend``.
 
     Raises:

@@ -11,7 +11,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import Contact, contacts
-from paint_deposition.planning.faces import blend, in_order, motion_over
+from paint_deposition.planning.faces import blend, join_motions, order_faces
 from paint_deposition.planning.films import PlannedFilm, predicted
 from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
@@ -29,7 +29,7 @@ class PartPlan(PlannedFilm):
         faces: sprayed, the largest first.
         margin_m: by how much each face is sprayed less far than its seams.
         sigma_n_unblended: sigma_n without margins, each face for itself.
-        contacts: where gun or spray come too near to the part. envelope: of the gun.
+        contacts: where gun or spray come too close to the part. envelope: of the gun.
     """
 
     faces: tuple[Face, ...]
@@ -95,21 +95,21 @@ def plan_faces(
         PlanError: a face has no passes, or the film is less even than the tolerance.
     """
     envelope = envelope or GunEnvelope()
-    faces = _of_the_gun(sprayable_faces(surface, widest_rad), request)
+    faces = _facing_gun(sprayable_faces(surface, widest_rad), request)
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     area = np.where(painted, surface.vertex_areas_m2, 0.0)
     each = request.model_copy(update={'outward': None, 'tolerance': None})
     margin_m, laid, unblended = blend(surface, model, each, faces, area, progress)
-    running = in_order(laid)
+    running = order_faces(laid)
     progress('motion', 0.0)
-    trajectory, moves = motion_over(
+    trajectory, moves = join_motions(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
     )
     if request.optimise:
         wanted = request.improvement(running[0].style.overspray_m, request.target_um)
         retimed = retime_for_evenness(
-            surface, painted, Programme.of(trajectory), [model], wanted, progress, explained=False
+            surface, painted, Programme.of(trajectory), [model], wanted, progress, explain=False
         ).programme
         trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, wanted))
     found = predicted(surface, model, request, painted, trajectory)
@@ -127,8 +127,8 @@ def plan_faces(
     )  # fmt: skip
 
 
-def _of_the_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ...]:
-    """Without those on the back, if it is said where the gun stands."""
+def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ...]:
+    """Without those on the back, if the direction to the gun is given."""
     if request.outward is None:
         return faces
     side = np.asarray(request.outward) / np.linalg.norm(request.outward)

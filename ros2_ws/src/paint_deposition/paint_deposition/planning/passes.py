@@ -152,9 +152,9 @@ def trajectory_of(
             legs.append(_transfer(clock, passes[number - 1], planned, style, rate_hz))
             clock += legs[-1].duration_s
         ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
-        triggers += [clock + ramp.time_at_s(planned.on_m), clock + ramp.time_at_s(planned.off_m)]
+        triggers += [clock + ramp.time_at_m(planned.on_m), clock + ramp.time_at_m(planned.off_m)]
         times = _sample_times(ramp.duration_s, rate_hz)
-        poses = _poses_at(planned, ramp.way_at_m(times))
+        poses = _poses_at(planned, ramp.travel_at_s(times))
         legs.append(_Leg(clock + times, *poses, ramp.duration_s))
         clock += ramp.duration_s
     stamps_s = np.concatenate([leg.stamps_s for leg in legs])
@@ -206,7 +206,7 @@ class _Ramp:
         self.rise_s = self.speed / self.acceleration
         self.duration_s = length_m / self.speed + self.rise_s if length_m > 0.0 else 0.0
 
-    def way_at_m(self, time_s: np.ndarray) -> np.ndarray:
+    def travel_at_s(self, time_s: np.ndarray) -> np.ndarray:
         """Travel at times from the start."""
         t = np.clip(time_s, 0.0, self.duration_s)
         left = self.duration_s - t
@@ -216,7 +216,7 @@ class _Ramp:
             [t < self.rise_s, left < self.rise_s], [rising, self.length - falling], even
         )
 
-    def time_at_s(self, way_m: float) -> float:
+    def time_at_m(self, way_m: float) -> float:
         """When a travel is reached."""
         rise_m = 0.5 * self.speed * self.rise_s
         if way_m < rise_m:
@@ -241,7 +241,7 @@ def _transfer(
     times = _sample_times(duration, rate_hz)
     share = times / duration
     if length > 0.0:
-        share = ramp.way_at_m(share * ramp.duration_s) / length
+        share = ramp.travel_at_s(share * ramp.duration_s) / length
     positions = start + share[:, np.newaxis] * (end - start)
     quaternions = Slerp([0.0, 1.0], turn)(share).as_quat()
     return _Leg(start_s + times, positions, quaternions, duration)

@@ -11,7 +11,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
 from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import PassStyle, plan_passes, planned_moves, trajectory_of
-from paint_deposition.planning.placing import Placing, place_passes, placed
+from paint_deposition.planning.placement import Placement, place_passes, placement_at
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
@@ -30,35 +30,35 @@ class Plan(PlannedFilm):
 
     Attributes:
         style: how passes are run.
-        placing: number, index and place of the passes, with sigma_n of the search.
+        placement: number, index and place of the passes, with sigma_n of the search.
         plane: recommendation for a plane of the part's size.
         plane_on_part: its passes laid about the middle of this part.
         line_films: films of single passes, for other placings.
-        plain: of an optimised plan, the one that it began with; else None.
+        unoptimised: of an optimised plan, the plan that it started from; else None.
     """
 
     style: PassStyle
-    placing: Placing
+    placement: Placement
     plane: Recommendation
-    plane_on_part: Placing
+    plane_on_part: Placement
     line_films: LineFilms
-    plain: 'Plan | None' = None
+    unoptimised: 'Plan | None' = None
 
     @property
     def sentence(self) -> str:
         """The plan in a sentence."""
         speeds = f'{self.style.speed_m_per_s:.3g} m/s'
-        if self.plain:
+        if self.unoptimised:
             sprayed = self.sprayed_speeds_m_per_s
             speeds = f'{min(sprayed):.3g} to {max(sprayed):.3g} m/s'
         return (
             f'{len(self.passes)} {self.request.direction} passes at '
-            f'{self.placing.index_m * 1e3:.0f} mm, {speeds}: {super().sentence}'
+            f'{self.placement.index_m * 1e3:.0f} mm, {speeds}: {super().sentence}'
         )
 
     @property
     def comparison(self) -> str:
-        """What the part's shape makes of passes for a plane, in a sentence."""
+        """sigma_n of the passes for a plane: on the plane, and on this part, in a sentence."""
         return (
             f'on a plane: sigma_n {100 * self.plane.sigma_n:.1f} % at '
             f'{self.plane.index_m * 1e3:.0f} mm; those passes about the middle of this part: '
@@ -68,7 +68,7 @@ class Plan(PlannedFilm):
     def to_dict(self) -> dict[str, Any]:
         """Figures of the plan."""
         return super().to_dict() | {
-            'index_m': self.placing.index_m,
+            'index_m': self.placement.index_m,
             'lines_m': [planned.across_m for planned in self.passes],
             'travel': 'one_way' if self.request.one_way else 'alternating',
             'gun_turns': False,
@@ -77,14 +77,14 @@ class Plan(PlannedFilm):
             'overspray_m': self.style.overspray_m,
             'acceleration_m_per_s2': self.style.acceleration_m_per_s2,
             'smoothing_radius_m': self.request.smoothing_radius_m,
-            'plain': self.plain
+            'plain': self.unoptimised
             and {
-                'sigma_n': self.plain.sigma_n,
-                'mean_um': self.plain.mean_um,
-                'paint_cm3': self.plain.statistics.emitted_volume_cm3,
-                'cycle_time_s': self.plain.cycle_time_s,
-                'passes': self.plain.placing.passes,
-                'capture_fraction': self.plain.statistics.capture_fraction,
+                'sigma_n': self.unoptimised.sigma_n,
+                'mean_um': self.unoptimised.mean_um,
+                'paint_cm3': self.unoptimised.statistics.emitted_volume_cm3,
+                'cycle_time_s': self.unoptimised.cycle_time_s,
+                'passes': self.unoptimised.placement.passes,
+                'capture_fraction': self.unoptimised.statistics.capture_fraction,
             },
             'plane': {
                 'index_m': self.plane.index_m,
@@ -102,7 +102,7 @@ def plan(
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> Plan:
-    """Plan passes and simulate their film; ``progress`` gets what is done and its share, 0 to 1.
+    """Plan passes and simulate their film; ``progress`` gets the step and its share, 0 to 1.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
@@ -119,11 +119,11 @@ def plan(
         surface, surface_map, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
         lambda share: progress('single passes', share),
     )  # fmt: skip
-    placing = place_passes(films, ends, index_range, request.tolerance)
+    placement = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
-    on_part = placed(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
+    on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     # Level passes go from the top down, vertical ones from the left to the right.
-    lines = placing.lines_m if request.direction == 'horizontal' else placing.lines_m[::-1]
+    lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     target = None if request.speed_m_per_s else request.target_um
     for round_ in range(TARGET_ROUNDS):
         passes = plan_passes(surface_map, lines, [style] * len(lines))
@@ -138,7 +138,7 @@ def plan(
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     return Plan(
         **found, passes=passes, moves=tuple(planned_moves(passes, style)), style=style,
-        placing=placing, plane=plane, plane_on_part=on_part, line_films=films,
+        placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
     )  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from paint_deposition.planning.index_search import (
     IndexCurve,
     Minimum,
     PassSetup,
-    choose,
+    choose_index,
     cycle_time_s,
     passes_to_cover,
 )
@@ -135,7 +135,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
     width = half_width_m(parallel.first)
     curve = IndexCurve.of(parallel, *request.index_range_m(width))
-    best = choose(curve, request.tolerance)
+    best = choose_index(curve, request.tolerance)
     _refuse_stripes(parallel, best, width)
     if request.speed_m_per_s is None:
         curve, best, speed = _at_target(model, setup, request, curve, best, speed)
@@ -214,7 +214,7 @@ def _at_target(
             return replace(curve, parallel=ParallelPasses(first, second)), best, wanted
         speed = wanted
         curve = IndexCurve.of(setup.parallel_passes(model, speed), low, high)
-        best = choose(curve, request.tolerance)
+        best = choose_index(curve, request.tolerance)
     return curve, best, speed
 
 

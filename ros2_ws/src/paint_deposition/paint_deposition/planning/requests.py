@@ -54,7 +54,7 @@ class PassRequest(FilmBuild):
     )
 
     @model_validator(mode='after')
-    def _says_how_much(self) -> 'PassRequest':
+    def _has_speed_or_target(self) -> 'PassRequest':
         if self.speed_m_per_s is None and self.target_um is None:
             raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
         return self
@@ -104,8 +104,8 @@ class Limits(Request):
         1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
     )
     acceleration_m_per_s2: float = given(
-        2.0, 'Of the robot along its path, and across it in bends [m/s2].', '--acceleration',
-        above=0.0,
+        2.0, 'Acceleration of the robot along its path, and across it in bends [m/s2].',
+        '--acceleration', above=0.0,
     )  # fmt: skip
 
     @model_validator(mode='after')
@@ -124,10 +124,10 @@ class PlanRequest(Limits, PassRequest):
 
     direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')
     index_m: float | None = given(
-        None, 'Fixes the index [m]; default: most even.', '--index', above=0.0
+        None, 'Index between passes [m]; default: the most even one.', '--index', above=0.0
     )
     smoothing_radius_m: float = given(
-        0.1, 'What is finer than this on the part is not followed.', above=0.0
+        0.1, 'Features of the part smaller than this are not followed.', above=0.0
     )
     overspray_m: float | None = given(
         None,
@@ -135,7 +135,9 @@ class PlanRequest(Limits, PassRequest):
         least=0.0,
     )
     outward: Vector | None = given(
-        None, 'From the part to the gun; default: the mean normal of the mesh.', metavar='X Y Z'
+        None,
+        'Direction from the part to the gun; default: the mean normal of the mesh.',
+        metavar='X Y Z',
     )
     optimise: bool = given(
         False,
@@ -144,7 +146,7 @@ class PlanRequest(Limits, PassRequest):
     )
     paint_weight: float = given(
         5e-3,
-        'With --optimise: what paint is worth, in units of sigma_n squared, for as much as the '
+        'With --optimise: cost, in units of sigma_n squared, of as much paint as the '
         'film on the part holds.', least=0.0,
     )  # fmt: skip
     time_weight: float = given(
@@ -185,19 +187,21 @@ class ImproveRequest(Limits):
         above=0.0,
     )  # fmt: skip
     paint_weight: float = given(
-        3e-3, 'What all the paint of the programme is worth, in units of sigma_n squared.',
+        3e-3, 'Cost of all the paint of the programme, in units of sigma_n squared.',
         least=0.0,
     )  # fmt: skip
-    time_weight: float = given(0.0, 'The same of the time sprayed.', least=0.0)
+    time_weight: float = given(0.0, 'The same for the time sprayed.', least=0.0)
     smoothness: float = given(
-        1e-2, 'Weight of changes of speed; more gives calmer passes.', least=0.0
+        1e-2, 'Weight of changes of speed; a greater weight gives steadier speeds.', least=0.0
     )
-    jerk_m_per_s3: float = given(50.0, 'Of the robot [m/s3].', '--jerk', above=0.0)
+    jerk_m_per_s3: float = given(
+        50.0, 'Jerk of the robot along its path [m/s3].', '--jerk', above=0.0
+    )
     move_min_m: float = given(
         0.02, 'Shortest move of the robot program while spraying [m].', '--move-min', above=0.0
     )
     settings_per_s: float = given(
-        20.0, 'Moves with a speed of their own that the controller follows in a second.',
+        20.0, 'Moves with a speed of their own that the controller can follow per second.',
         above=0.0,
     )  # fmt: skip
     flow: tuple[Positive, Positive] = given(
@@ -232,7 +236,7 @@ class MeasureRequest(Request):
     """Where to put the gauge on a part."""
 
     refusal = ReadingsError
-    points: int = given(60, 'How many points.', least=1)
+    points: int = given(60, 'Number of points.', least=1)
     repeats: int = given(
         8, 'Points to be read twice, which show the noise of the gauge; 0 if you know it.',
         least=0,
@@ -247,12 +251,15 @@ class GunEnvelope(Request):
     """What must stay clear of the part, on the tool's axis."""
 
     radius_m: float = given(
-        0.08, 'Of the gun, and of the cylinder before it that must stay free.', '--gun-radius-m',
-        above=0.0,
+        0.08, 'Radius of the gun, and of the cylinder before it that must stay clear.',
+        '--gun-radius-m', above=0.0,
     )  # fmt: skip
-    length_m: float = given(0.4, 'Of the gun behind its TCP.', '--gun-length-m', above=0.0)
+    length_m: float = given(0.4, 'Length of the gun behind its TCP.', '--gun-length-m', above=0.0)
     before_m: float = given(
-        0.1, 'Nothing of the part may come nearer before the TCP.', '--keep-off-m', least=0.0
+        0.1,
+        'Length of the cylinder before the TCP that must stay clear.',
+        '--keep-off-m',
+        least=0.0,
     )
 
     @property

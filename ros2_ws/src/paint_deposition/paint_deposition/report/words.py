@@ -96,7 +96,7 @@ def is_learned(effect_id: str) -> bool:
 def step_words(step: Mapping[str, Any]) -> str:
     """What one step of a model's history added."""
     added = str(step.get('added', PATTERN))
-    known = {PATTERN: 'pattern of eq. (1) alone', REFIT: 'model as given, fitted anew'}
+    known = {PATTERN: 'pattern of eq. (1) alone', REFIT: 'model as given, refitted'}
     return known.get(added) or f'+ {effect_name(added)}'
 
 

@@ -1,4 +1,4 @@
-"""What each part says by itself, part after part, and when that changed: steps and drifts."""
+"""Series over the parts of a line (level, misfit, amplitudes), and their steps and drifts."""
 
 from __future__ import annotations
 
@@ -24,19 +24,20 @@ MOST_BASELINE = 100
 # All charts together raise one false alarm in so many parts; level, misfit and effects share it.
 RUN_LENGTH = 1000.0
 CHARTS, SHARES = 2, 3
-# An amplitude that one part knows no better than to so many typical sizes is not charted.
-VAGUE = 5.0
-# Series that are correlated by more than this are one.
+# An amplitude whose standard deviation from one part is more typical sizes is not charted.
+MOST_UNCERTAIN = 5.0
+# Amplitudes whose series are correlated by more than this share a chart.
 CORRELATED = 0.9
-# The chi-square of a part counts as no more standard deviations than this.
-FURTHEST = 8.0
+# The misfit of a part is limited to so many standard deviations.
+MOST_SIGMAS = 8.0
 # A segment has at least so many parts.
-SHORTEST = 3
-# One part is no further from its neighbours: a single bad part is no change [standard deviations].
-MOST_OF_ONE = 4.0
-NEIGHBOURS = 5
-# A change may have been wherever the squared error is larger by no more (95 %, two parameters).
-LIKELY = 5.99
+SHORTEST_SEGMENT = 3
+# A value is limited to so many standard deviations from the median of its neighbours: a single bad
+# part is no change.
+SPIKE_SIGMAS = 4.0
+SPIKE_WINDOW = 5
+# The 95 % interval of a change: where the squared error rises by no more (two parameters).
+INTERVAL_RISE = 5.99
 SECONDS_A_DAY = 86400.0
 
 
@@ -46,9 +47,9 @@ class Series:
 
     Attributes:
         name: 'level', 'misfit', or an effect's 'id.parameter'.
-        unit: of values. members: series that are alike, itself first.
-        values, sd: (n,) and what one part's readings leave open, standard deviations.
-        baseline: so many first parts give the centre.
+        unit: of values. members: correlated amplitudes that share the chart, itself first.
+        values, sd: (n,) estimate from each part alone, and its standard deviation.
+        baseline: number of first parts that give the centre.
         run_length: of each of its charts.
     """
 
@@ -68,7 +69,7 @@ class Series:
 
     @cached_property
     def deviation(self) -> np.ndarray:
-        """(n,) standard deviation from part to part: by the gauge, and by the parts themselves."""
+        """(n,) standard deviation of a value: of its estimate, and between parts."""
         own = max(robust_deviation(self.values) ** 2 - float(np.median(self.sd**2)), 0.0)
         return np.sqrt(own + self.sd**2)
 
@@ -79,24 +80,24 @@ class Series:
 
     @cached_property
     def charts(self) -> Charts:
-        """Shewhart and EWMA."""
+        """Shewhart and EWMA charts."""
         return charts(self.standard, self.run_length)
 
 
 def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
-    """The level, the misfit, then every amplitude that one part shows; oldest part first."""
+    """The level, the misfit, then every amplitude that one part determines; oldest part first."""
     noise = pooled.posterior.scales.noise
     rows = [
-        _of_part(part, part.residual_um - pooled.shared_um(part, place_of), noise)
+        _part_estimates(part, part.residual_um - pooled.shared_um(part, place_of), noise)
         for part, place_of in zip(parts, places(parts)[1], strict=True)
     ]
     level, level_sd, misfit, amounts, amounts_sd = map(np.array, zip(*rows, strict=True))
     names = amplitudes()
     # An accepted effect is charted as a whole.
-    amounts[:, list(pooled.chosen)] += pooled.amounts
+    amounts[:, list(pooled.chosen)] += pooled.amplitude_means
     known = [
         k for k in range(len(names))
-        if np.isfinite(amounts[:, k]).all() and np.median(amounts_sd[:, k]) < VAGUE
+        if np.isfinite(amounts[:, k]).all() and np.median(amounts_sd[:, k]) < MOST_UNCERTAIN
     ]  # fmt: skip
     groups = _grouped(known, amounts / np.where(amounts_sd > 0.0, amounts_sd, 1.0), pooled.chosen)
     spending = RUN_LENGTH * CHARTS * SHARES
@@ -118,8 +119,8 @@ def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
     return found
 
 
-def _of_part(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
-    """Level with its deviation; misfit; amplitudes with theirs, whatever the level is."""
+def _part_estimates(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
+    """Level and its deviation; misfit; amplitudes and theirs, the level fitted with each."""
     sigma = noise * part.sigma_um
     film, left = part.predicted_um / sigma, left_um / sigma
     marks = part.by_effect / sigma[:, np.newaxis]
@@ -127,7 +128,7 @@ def _of_part(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
     level = film @ left / square
     rest = left - level * film
     freedom = max(len(part) - 1, 1)
-    # The tail that is smaller is taken, so that neither end is rounded to 0.
+    # The smaller tail is taken, so that neither end is rounded to 0.
     above, below = chi2.logsf(rest @ rest, freedom), chi2.logcdf(rest @ rest, freedom)
     misfit = _quantile(above, below)
     own = marks - np.outer(film, film @ marks / square)
@@ -138,11 +139,11 @@ def _of_part(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
 
 def _quantile(log_above: float, log_below: float) -> float:
     value = norm.isf(np.exp(log_above)) if log_above < log_below else norm.ppf(np.exp(log_below))
-    return float(np.clip(value, -FURTHEST, FURTHEST))
+    return float(np.clip(value, -MOST_SIGMAS, MOST_SIGMAS))
 
 
 def _grouped(known: Sequence[int], standard: np.ndarray, first: Sequence[int]) -> list[list[int]]:
-    """Amplitudes whose series are alike, in groups; accepted ones lead theirs."""
+    """Amplitudes grouped by correlated series; an accepted one leads its group."""
     groups: list[list[int]] = []
     for k in sorted(known, key=lambda one: one not in first):
         for group in groups:
@@ -160,12 +161,12 @@ class Change:
 
     Attributes:
         series, unit, members: of what. kind: 'step' or 'drift'.
-        part: row of the first part after it. time_s: of that part; earliest_s, latest_s: within
-            which it lies with 95 %.
+        part: row of the first part after it. time_s: of that part; earliest_s, latest_s: its
+            95 % interval.
         before, after: means (of a drift: at its beginning and at the end). sd: of their
             difference. per_day: of a drift, else None.
         strength: the difference in standard deviations of it.
-        also: weaker series that changed with it; their amplitudes share its mark on the film.
+        also: weaker series that changed with it; their effects look alike on the film.
     """
 
     series: str
@@ -217,20 +218,20 @@ def date(time_s: float) -> str:
 
 
 def changes_of(series: Sequence[Series], times_s: np.ndarray) -> list[Change]:
-    """All changes, oldest first; those that come with a stronger one are named by it.
+    """All changes, oldest first; concurrent weaker ones are listed with the strongest.
 
-    A change has to lower the squared error by twice the logarithm of the parts, which pays for
-    looking at all places (BIC), and of the series, which pays for looking at all of them.
+    A change must lower the squared error by twice the logarithm of the number of parts (BIC, for
+    the choice of its place) plus twice that of the number of series (for the choice of one).
     """
     penalty = 2.0 * np.log(len(times_s)) + 2.0 * np.log(len(series))
-    found = [change for one in series for change in _of_series(one, times_s, penalty)]
+    found = [change for one in series for change in _changes_in(one, times_s, penalty)]
     return sorted(_merge_concurrent(found), key=lambda change: change.time_s)
 
 
 def _merge_concurrent(found: Sequence[Change]) -> list[Change]:
-    """Changes at the same time as one, the strongest leading: effects share marks on the film.
+    """Concurrent changes as one, named for the strongest: effects look alike on the film.
 
-    The misfit leads only where nothing else changed, for it has no name.
+    The misfit leads only where nothing else changed, since it names no cause.
     """
     leaders: list[Change] = []
     for change in sorted(found, key=lambda one: (one.series == 'misfit', -one.strength)):
@@ -245,13 +246,13 @@ def _merge_concurrent(found: Sequence[Change]) -> list[Change]:
     return leaders
 
 
-def _of_series(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
+def _changes_in(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
     from ruptures import KernelCPD
 
     values = _clip_spikes(series.standard)
-    if len(values) < 2 * SHORTEST:
+    if len(values) < 2 * SHORTEST_SEGMENT:
         return []
-    ends = KernelCPD(kernel='linear', min_size=SHORTEST).fit(values).predict(pen=penalty)
+    ends = KernelCPD(kernel='linear', min_size=SHORTEST_SEGMENT).fit(values).predict(pen=penalty)
     starts = [0, *ends[:-1]]
     steps_cost = sum(_scatter(values[a:b]) for a, b in zip(starts, ends, strict=True))
     steps_cost += penalty * (len(ends) - 1)
@@ -269,14 +270,14 @@ def _scatter(values: np.ndarray) -> float:
 
 
 def _clip_spikes(values: np.ndarray) -> np.ndarray:
-    """The values with single ones kept near their neighbours."""
-    middle = median_filter(values, NEIGHBOURS, mode='nearest')
-    return np.clip(values, middle - MOST_OF_ONE, middle + MOST_OF_ONE)
+    """The values, each limited to a range about the median of its neighbours."""
+    middle = median_filter(values, SPIKE_WINDOW, mode='nearest')
+    return np.clip(values, middle - SPIKE_SIGMAS, middle + SPIKE_SIGMAS)
 
 
 def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     """(n - SHORTEST,) least squared error of a line that leaves the level at each part."""
-    began = times_s[: len(times_s) - SHORTEST]
+    began = times_s[: len(times_s) - SHORTEST_SEGMENT]
     since = np.maximum(times_s[:, np.newaxis] - began, 0.0)
     since -= since.mean(axis=0)
     left = values - values.mean()
@@ -291,7 +292,7 @@ def _as_drift(series: Series, times_s: np.ndarray, errors: np.ndarray) -> Change
     (level, slope), *_ = np.linalg.lstsq(scaled, series.values * weight, rcond=None)
     sd = float(np.sqrt(np.linalg.inv(scaled.T @ scaled)[1, 1]))
     days = float(since[-1])
-    likely = np.flatnonzero(errors <= errors.min() + LIKELY)
+    likely = np.flatnonzero(errors <= errors.min() + INTERVAL_RISE)
     return Change(
         series.name, series.unit, series.members, 'drift', row, float(times_s[row]),
         float(times_s[likely[0]]), float(times_s[likely[-1]]), float(level),
@@ -310,7 +311,7 @@ def _as_step(
     sd = float(np.sqrt(1.0 / weight[first:row].sum() + 1.0 / weight[row:end].sum()))
     splits = np.arange(first + 1, end)
     errors = np.array([_scatter(values[first:k]) + _scatter(values[k:end]) for k in splits])
-    likely = splits[errors <= errors.min() + LIKELY]
+    likely = splits[errors <= errors.min() + INTERVAL_RISE]
     return Change(
         series.name, series.unit, series.members, 'step', row, float(times_s[row]),
         float(times_s[likely[0]]), float(times_s[likely[-1]]), before, after, sd, None,

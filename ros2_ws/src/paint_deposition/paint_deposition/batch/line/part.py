@@ -38,20 +38,20 @@ FIGURES = ('mean_um', 'std_dev_um', 'coverage', 'painted_volume_cm3', 'emitted_v
 Columns = dict[str, list[Any]]
 
 
-def computed(given: Mapping[str, Any]) -> Columns:
-    """Rows of a run: one for each point measured, or one if nothing was measured.
+def computed(case: Mapping[str, Any]) -> Columns:
+    """Rows of a run: one for each measured point, or a single one.
 
     Args:
-        given: ``run``, ``file`` (the line's), ``folder`` and ``model``.
+        case: ``run``, ``file`` (the line's), ``folder`` and ``model``.
 
     A run that cannot be used says why in the column ``error``, a part whose readings cannot be
     used says so in ``remark``.
     """
-    run: Run = given['run']
+    run: Run = case['run']
     try:
         if run.problem:
             raise ManyError(run.problem)
-        rows = _rows(run, given['file'], Path(given['folder']), given['model'])
+        rows = _rows(run, case['file'], Path(case['folder']), case['model'])
     except PaintError as error:
         rows = [{'part': run.name, 'error': str(error)}]
     return {name: [row[name] for row in rows] for name in rows[0]}
@@ -78,9 +78,9 @@ def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> lis
             unused = str(error).removeprefix(f'{folder}/')
     remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
     remarks += [*seen.geometry.warnings, *([f'simulated only: {unused}'] if unused else [])]
-    about = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks)}
-    about |= _film(seen.surface, seen.path, model)
-    return [about | row for row in rows or [{}]]
+    known = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks)}
+    known |= _film(seen.surface, seen.path, model)
+    return [known | row for row in rows or [{}]]
 
 
 def _date(run: Run) -> float:
@@ -91,8 +91,8 @@ def _date(run: Run) -> float:
             there = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
             return there.timestamp()
     raise ManyError(
-        f'{run.path}: it is not known when it was painted; put the date into its name, '
-        '2026-11-12_0730 say, or record with the time of day'
+        f'{run.path}: the time of painting is unknown; put the date into its name, '
+        'such as 2026-11-12_0730, or record with the time of day'
     )
 
 

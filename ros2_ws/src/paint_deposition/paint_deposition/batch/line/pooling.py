@@ -1,4 +1,4 @@
-"""What many parts say together: a pattern, a misfit and effects that they share, a level of each.
+"""Pooling of many parts: a shared pattern, misfit and effects, and a level for each part.
 
 The readings of part i are linear about the model,
 
@@ -11,8 +11,9 @@ a closed form (Gelman et al., Bayesian Data Analysis, 2013, chapters 5 and 15). 
 for all that no effect explains: without it any error of the model, seen often enough, would be
 taken for an effect.
 
-Effects are found one after the other, by their evidence. Each set of effects is judged with the
-scales that are the likeliest beside it: those fitted without an effect would take it for noise.
+Effects are found one after the other, by their evidence. Each set of effects is evaluated with
+the scales that are the most probable with it: those fitted without an effect
+would take it for noise.
 """
 
 from __future__ import annotations
@@ -31,19 +32,19 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.report.words import unit_words
 
-# Readings so near to each other are of one place of the part.
-PLACE_M = 0.05
+# Readings within a cell of this size are at one place of the part.
+PLACE_SIZE_M = 0.05
 LEVELS = np.geomspace(1e-3, 0.2, 24).tolist()
 NOISES = np.geomspace(0.5, 3.0, 19).tolist()
 # Size of the misfit as a share of the film, and how far it reaches over the part [m].
 MISFITS = tuple(product((0.005, 0.01, 0.02, 0.05, 0.1), (0.02, 0.1, 0.25)))
-# Half of the belief before the readings is that there is no misfit.
+# Prior probability that there is no misfit.
 NO_MISFIT = 0.5
-# An effect is accepted if it is so probable that something of the catalogue acts.
-SURE = 0.99
+# An effect is accepted if some effect of the catalogue acts with this probability.
+ACCEPTANCE = 0.99
 MOST_ACCEPTED = 3
-# Effects whose evidence is within this of the best are not told apart (odds of 20 to 1).
-TOGETHER = 3.0
+# Effects whose log evidence is this close to the best are not distinguished (odds of 20 to 1).
+INDISTINGUISHABLE = 3.0
 ONE_BRUSH = PatternVector()
 
 
@@ -106,19 +107,20 @@ def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
 
 def places(parts: Sequence[Measured]) -> tuple[np.ndarray, list[np.ndarray]]:
     """Places at which the line is measured: (F, 3) [m], and (P,) that of each point, by part."""
-    cells = np.round(np.concatenate([part.positions_m for part in parts]) / PLACE_M).astype(int)
+    positions_m = np.concatenate([part.positions_m for part in parts])
+    cells = np.round(positions_m / PLACE_SIZE_M).astype(int)
     unique, place_of = np.unique(cells, axis=0, return_inverse=True)
     ends = np.cumsum([len(part) for part in parts])[:-1]
-    return unique * PLACE_M, np.split(place_of.ravel(), ends)
+    return unique * PLACE_SIZE_M, np.split(place_of.ravel(), ends)
 
 
 @dataclass(frozen=True)
 class SufficientStatistics:
-    """The readings of all parts, summed up; K = k + F + A columns: pattern, places, effects.
+    """Of the readings of all parts, for K = k + F + A columns: pattern, places, effects.
 
     Attributes:
-        gram: (K, K) columns over the noise, squared. score: (K,) columns with the residuals.
-        square: of the residuals over the noise.
+        gram: (K, K) Gram matrix of the columns over the noise. score: (K,) their products with the
+            residuals. square: sum of squared residuals over the noise.
         level_gram: (n, K) of each part, its film with the columns; level_score: (n,) with the
             residuals; level_square: (n,) the film's square.
         count: of the readings. place_m: (F, 3) places [m].
@@ -138,7 +140,7 @@ class SufficientStatistics:
 
     @staticmethod
     def of(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> SufficientStatistics:
-        """Sum up; at least one part."""
+        """Of at least one part."""
         place_m, place_of = places(parts)
         rows = []
         for part, here in zip(parts, place_of, strict=True):
@@ -160,16 +162,17 @@ class SufficientStatistics:
 
     @property
     def shared(self) -> int:
-        """How many columns the pattern and the places have; those of the effects follow."""
+        """Number of columns of pattern and places; those of the effects follow."""
         return len(self.between_jobs) + len(self.place_m)
 
 
 @dataclass(frozen=True)
 class Scales:
-    """What has no closed form.
+    """The hyperparameters, which have no closed form.
 
     Attributes:
-        level: standard deviation of the parts' levels, as a share. noise: on the stated noise.
+        level: standard deviation of the parts' levels, as a share.
+        noise: factor on the stated noise.
         misfit: size and width of the misfit, None for none.
     """
 
@@ -180,13 +183,13 @@ class Scales:
 
 @dataclass(frozen=True)
 class LinePosterior:
-    """The readings with the levels of the parts integrated out, for some scales."""
+    """The posterior for given scales, the levels of the parts integrated out."""
 
     statistics: SufficientStatistics
     scales: Scales
 
     @cached_property
-    def _levels_out(self) -> tuple[np.ndarray, np.ndarray, float]:
+    def _without_levels(self) -> tuple[np.ndarray, np.ndarray, float]:
         """Gram matrix, score and square of the residuals without what the levels explain."""
         sums, precision = self.statistics, 1.0 / self.scales.noise**2
         variance = self.scales.level**2
@@ -208,12 +211,12 @@ class LinePosterior:
         log_det = -sum(float(np.linalg.slogdet(block)[1]) for block in blocks)
         return block_diag(*map(np.linalg.inv, blocks)), log_det
 
-    def solved(self, chosen: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray, float]:
+    def solve(self, chosen: Sequence[int] = ()) -> tuple[np.ndarray, np.ndarray, float]:
         """Mean (k,) and covariance (k, k) of pattern, places and these amplitudes; log evidence.
 
         Amplitudes are standard normal before the readings, in their typical sizes.
         """
-        gram, score, square = self._levels_out
+        gram, score, square = self._without_levels
         precision, log_prior = self._prior
         shared, scales = self.statistics.shared, self.scales
         rows = [*range(shared), *(shared + one for one in chosen)]
@@ -231,15 +234,15 @@ class LinePosterior:
 
 
 @dataclass(frozen=True)
-class Weighed:
-    """A posterior for each misfit that is considered, with the logarithm of its prior share."""
+class MisfitMixture:
+    """A posterior for each size and width of the misfit, with its log prior probability."""
 
     posteriors: tuple[LinePosterior, ...]
-    log_share: np.ndarray
+    log_prior: np.ndarray
 
     @staticmethod
-    def beside(statistics: SufficientStatistics, chosen: Sequence[int]) -> Weighed:
-        """With the level and the noise that are the likeliest beside these amplitudes."""
+    def fitted(statistics: SufficientStatistics, chosen: Sequence[int]) -> MisfitMixture:
+        """With the most probable level and noise given these amplitudes."""
         misfits: list[tuple[float, float] | None] = [None, *MISFITS]
         grids: dict[str, Any] = {'misfit': misfits, 'noise': NOISES, 'level': LEVELS}
         scales = Scales(0.02, 1.0, None)
@@ -247,24 +250,24 @@ class Weighed:
             for name, values in grids.items():
                 scales = max(
                     (replace(scales, **{name: value}) for value in values),
-                    key=lambda one: LinePosterior(statistics, one).solved(chosen)[2],
+                    key=lambda one: LinePosterior(statistics, one).solve(chosen)[2],
                 )
         share = np.log((1.0 - NO_MISFIT) / len(MISFITS))
-        return Weighed(
+        return MisfitMixture(
             tuple(LinePosterior(statistics, replace(scales, misfit=one)) for one in misfits),
             np.array([np.log(NO_MISFIT), *[share] * len(MISFITS)]),
         )
 
     def evidence(self, chosen: Sequence[int]) -> float:
-        """Logarithm of the probability of the readings with these amplitudes."""
+        """Log evidence of these amplitudes, the misfit summed out."""
         return float(logsumexp(self._log_joint(chosen)))
 
-    def likeliest(self, chosen: Sequence[int]) -> LinePosterior:
-        """The posterior with the likeliest misfit."""
+    def most_probable(self, chosen: Sequence[int]) -> LinePosterior:
+        """The posterior with the most probable misfit."""
         return self.posteriors[int(np.argmax(self._log_joint(chosen)))]
 
     def _log_joint(self, chosen: Sequence[int]) -> np.ndarray:
-        return np.array([one.solved(chosen)[2] for one in self.posteriors]) + self.log_share
+        return np.array([one.solve(chosen)[2] for one in self.posteriors]) + self.log_prior
 
 
 @dataclass(frozen=True)
@@ -275,8 +278,8 @@ class Cause:
         effect, parameter, unit: which.
         value, sd: its amplitude and the standard deviation of it.
         probability: that one of ``members`` acts, given what was accepted before.
-        members: effects that these readings do not tell from it, itself first.
-        all_parts: how many standard deviations it is off zero, in all parts together.
+        members: effects that these readings cannot distinguish from it, itself first.
+        all_parts: its distance from zero in standard deviations, all parts together.
     """
 
     effect: str
@@ -309,7 +312,7 @@ class Pooled:
 
     Attributes:
         causes: accepted effects, in the order found. chosen: numbers of their amplitudes.
-        posterior: with the likeliest scales beside them.
+        posterior: with the most probable scales given them.
     """
 
     causes: tuple[Cause, ...]
@@ -318,10 +321,10 @@ class Pooled:
 
     @cached_property
     def _mean(self) -> np.ndarray:
-        return self.posterior.solved(self.chosen)[0]
+        return self.posterior.solve(self.chosen)[0]
 
     @property
-    def amounts(self) -> np.ndarray:
+    def amplitude_means(self) -> np.ndarray:
         """Mean of the chosen amplitudes, in their typical sizes."""
         return self._mean[self.posterior.statistics.shared :]
 
@@ -330,7 +333,7 @@ class Pooled:
         pattern, misfit = np.split(
             self._mean[: self.posterior.statistics.shared], [part.by_pattern.shape[1]]
         )
-        effects = part.by_effect[:, list(self.chosen)] @ self.amounts
+        effects = part.by_effect[:, list(self.chosen)] @ self.amplitude_means
         return part.by_pattern @ pattern + part.predicted_um * misfit[place_of] + effects
 
 
@@ -339,32 +342,32 @@ def pooled(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> Poo
     statistics = SufficientStatistics.of(parts, pattern)
     names = amplitudes()
     chosen: tuple[int, ...] = ()
-    weighed = Weighed.beside(statistics, chosen)
+    mixture = MisfitMixture.fitted(statistics, chosen)
     causes: list[Cause] = []
     while len(causes) < MOST_ACCEPTED:
         left = [k for k, (e, _) in enumerate(names) if e not in {names[c][0] for c in chosen}]
-        best = max(left, key=lambda k: weighed.evidence((*chosen, k)))
-        beside = Weighed.beside(statistics, (*chosen, best))
-        each = np.array([beside.evidence((*chosen, k)) for k in left])
-        # Half of the belief is that nothing (more) acts; the rest is shared by the effects.
-        log_odds = logsumexp(each) - np.log(len(left)) - weighed.evidence(chosen)
+        best = max(left, key=lambda k: mixture.evidence((*chosen, k)))
+        fitted = MisfitMixture.fitted(statistics, (*chosen, best))
+        each = np.array([fitted.evidence((*chosen, k)) for k in left])
+        # Prior: nothing (more) acts with probability 1/2, else one of the effects, all alike.
+        log_odds = logsumexp(each) - np.log(len(left)) - mixture.evidence(chosen)
         probability = float(1.0 / (1.0 + np.exp(-log_odds)))
-        if probability < SURE:
+        if probability < ACCEPTANCE:
             break
         order = np.argsort(-each)
-        near = [left[k] for k in order if each[k] > each[order[0]] - TOGETHER]
+        near = [left[k] for k in order if each[k] > each[order[0]] - INDISTINGUISHABLE]
         chosen = (*chosen, near[0])
-        weighed = beside if near[0] == best else Weighed.beside(statistics, chosen)
+        mixture = fitted if near[0] == best else MisfitMixture.fitted(statistics, chosen)
         members = tuple(dict.fromkeys(names[k][0] for k in near))
-        posterior = weighed.likeliest(chosen)
+        posterior = mixture.most_probable(chosen)
         causes.append(_cause(posterior, chosen, probability, members))
-    return Pooled(tuple(causes), weighed.likeliest(chosen), chosen)
+    return Pooled(tuple(causes), mixture.most_probable(chosen), chosen)
 
 
 def _cause(
     posterior: LinePosterior, chosen: tuple[int, ...], probability: float, members: tuple[str, ...]
 ) -> Cause:
-    mean, covariance, _ = posterior.solved(chosen)
+    mean, covariance, _ = posterior.solve(chosen)
     value, sd = float(mean[-1]), float(np.sqrt(covariance[-1, -1]))
     effect, parameter = amplitudes()[chosen[-1]]
     info = EFFECTS[effect].parameters()[parameter]

@@ -1,4 +1,4 @@
-"""What a line of parts says: a row for each part and point, what is shared, what changed."""
+"""The result of a line: a row for each part and point, what the parts share, what changed."""
 
 from __future__ import annotations
 
@@ -47,10 +47,10 @@ class Line:
     """The parts of a line.
 
     Attributes:
-        folder: of the runs. model: all were set beside. files: shared by all, by what they are.
+        folder: of the runs. model: of all. files: shared by all, by what they are.
         table: a row for each part and point, in the order of the runs.
         computed: how many runs were computed now. workers: what computed them, in words.
-        strays: names of files of the folder that belong to no run.
+        unmatched: names of files of the folder that belong to no run.
     """
 
     folder: Path
@@ -59,11 +59,11 @@ class Line:
     table: pa.Table
     computed: int
     workers: str
-    strays: Sequence[str] = ()
+    unmatched: Sequence[str] = ()
 
     @cached_property
     def parts(self) -> list[Measured]:
-        """Those that were measured, oldest first."""
+        """The measured parts, oldest first."""
         return measured_parts(self.table.to_pydict())
 
     @cached_property
@@ -109,7 +109,7 @@ class Line:
 
     @cached_property
     def remarks(self) -> list[tuple[str, str]]:
-        """Name of each part that has something odd about it, and what, oldest first."""
+        """Name of each part with a remark, and the remark, oldest first."""
         return [(run['part'], run['remark']) for run in self.runs if run.get('remark')]
 
     @property
@@ -124,7 +124,7 @@ class Line:
 
     @property
     def lines(self) -> Iterator[str]:
-        """What to say of it."""
+        """The result in lines."""
         yield self.sentence
         if self.pooled is None:
             yield 'nothing is pooled: fewer than two parts were measured'
@@ -132,11 +132,11 @@ class Line:
         scales = self.pooled.posterior.scales
         yield (
             f'the level differs from part to part by {100 * scales.level:.1f} %, the gauge '
-            f'scatters {scales.noise:.2f} times as stated'
+            f'scatters by {scales.noise:.2f} times the stated noise'
         )
         yield from (f'shared by all parts: {cause.sentence}' for cause in self.pooled.causes)
         if not self.pooled.causes:
-            yield 'no effect that all parts share is proven'
+            yield 'no effect shared by all parts was found'
         yield from (f'changed: {change.sentence}' for change in self.changes)
         if not self.series:
             yield f'no charts: fewer than {FEWEST} parts were measured'
@@ -166,7 +166,7 @@ class Line:
             'changes': [change.to_dict() for change in self.changes],
             'errors': [{'run': name, 'error': error} for name, error in self.errors],
             'remarks': [{'part': name, 'remark': remark} for name, remark in self.remarks],
-            'without_run': list(self.strays),
+            'without_run': list(self.unmatched),
             'provenance': origin(self.model, self.files),
         }  # fmt: skip
 
@@ -206,14 +206,14 @@ def _parts(line: Line) -> pa.Table:
     """A row for each part: when, its film as computed, and what its readings say."""
     import pyarrow as pa
 
-    said: dict[str, dict[str, Any]] = {}
+    measured: dict[str, dict[str, Any]] = {}
     for row, part in enumerate(line.parts):
-        readings = said[part.name] = {'readings': len(part)}
+        readings = measured[part.name] = {'readings': len(part)}
         for series in line.series:
             name = {'level': 'level_percent'}.get(series.name, series.name)
             readings |= {name: float(series.values[row]), f'{name}_sd': float(series.sd[row])}
-    empty = dict.fromkeys(next(iter(said.values()), {})) | {'readings': 0}
-    return pa.Table.from_pylist([run | said.get(run['part'], empty) for run in line.runs])
+    empty = dict.fromkeys(next(iter(measured.values()), {})) | {'readings': 0}
+    return pa.Table.from_pylist([run | measured.get(run['part'], empty) for run in line.runs])
 
 
 def _with_time(table: pa.Table) -> pa.Table:

@@ -117,7 +117,7 @@ def _is_bag(folder: Path) -> bool:
 
 
 def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
-    """The run of a name; what cannot be told apart is not guessed."""
+    """The run of a name; an ambiguous one gets a problem or a remark."""
     problem = remark = ''
     if len(recordings) > 1:
         names = ' and '.join(path.name for path in recordings)
@@ -125,8 +125,8 @@ def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
     if len(readings) > 1:
         names = ' and '.join(path.name for path in readings)
         remark = f'two files of readings have its name, {names}; keep one'
-    given = readings[0] if len(readings) == 1 else None
-    return Run(name, recordings[0], given, problem, remark)
+    only = readings[0] if len(readings) == 1 else None
+    return Run(name, recordings[0], only, problem, remark)
 
 
 def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, list[str]]:
@@ -145,14 +145,14 @@ def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, lis
     own = [effect.file_content.decode() for effect in model.effects]
     shared = [code_digest(), file.model_dump(), model_digest(model), own]
     shared += map(sha256, files.values())
-    given = {'file': file, 'folder': str(folder), 'model': model}
-    runs, strays = runs_in(folder, files.values())
+    parameters = {'file': file, 'folder': str(folder), 'model': model}
+    runs, unmatched = runs_in(folder, files.values())
     cases = []
     for run in runs:
         own_files = [_digest(path) for path in (run.path, run.readings) if path]
         digest = digest_of(*shared, run.name, run.problem, run.remark, *own_files)
-        cases.append(Case(digest, given | {'run': run}, about={'part': [run.name]}))
-    return cases, file, model, strays
+        cases.append(Case(digest, parameters | {'run': run}, known={'part': [run.name]}))
+    return cases, file, model, unmatched
 
 
 def shared_files(folder: Path, file: LineFile) -> dict[str, Path]:

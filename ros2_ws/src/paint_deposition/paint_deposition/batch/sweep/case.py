@@ -25,7 +25,7 @@ Columns = dict[str, list[Any]]
 
 
 def computed(
-    given: Mapping[str, Any],
+    parameters: Mapping[str, Any],
     surface: Surface,
     trajectory: Trajectory | None,
     readings: Readings | None,
@@ -33,32 +33,32 @@ def computed(
     """The figures of a case, one row; a case without a film says why in the column ``error``.
 
     Args:
-        given: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
+        parameters: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
         surface: the part. trajectory: the motion; None: passes are planned.
         readings: places at which the gauge is predicted, or None.
     """
     try:
-        figures = _painted(given, surface, trajectory, readings)
+        figures = _painted(parameters, surface, trajectory, readings)
     except PaintError as error:
         figures = {'error': str(error)}
     return {name: [value] for name, value in figures.items()}
 
 
 def _painted(
-    given: Mapping[str, Any],
+    parameters: Mapping[str, Any],
     surface: Surface,
     trajectory: Trajectory | None,
     readings: Readings | None,
 ) -> dict[str, Any]:
-    model: DepositionModel = given['model']
+    model: DepositionModel = parameters['model']
     figures: dict[str, Any] = {}
     if trajectory is None:
-        planned = plan(surface, model, **given['passes'])
+        planned = plan(surface, model, **parameters['passes'])
         trajectory = planned.trajectory
         figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
     film = simulate(
-        surface, varied_motion(trajectory, **given['motion']), model, readings=readings,
-        target_um=given['target_um'], tolerance_um=given['tolerance_um'],
+        surface, varied_motion(trajectory, **parameters['motion']), model, readings=readings,
+        target_um=parameters['target_um'], tolerance_um=parameters['tolerance_um'],
     )  # fmt: skip
     statistics = film.statistics
     figures |= {

@@ -1,4 +1,4 @@
-"""A sweep as work: its cases with all that they share, read once."""
+"""The cases of a sweep and the inputs that they share, each read once."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from paint_deposition.batch.cases import Case, code_digest, digest_of
 from paint_deposition.batch.sweep.sweep_file import SweepFile
 from paint_deposition.batch.sweep.variations import (
     DRAW,
-    OF_MOTION,
-    OF_PASSES,
+    MOTION_KEYS,
+    PASS_KEYS,
     Values,
     effects_of,
     named_models,
@@ -28,7 +28,7 @@ from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.provenance import model_digest, sha256
-from paint_deposition.inference.fitting.posterior import drawn
+from paint_deposition.inference.fitting.posterior import draw_models
 
 NOTHING = 'nothing'
 
@@ -125,7 +125,7 @@ class Job:
                 'or refit wrote'
             )
         return self._once(
-            ('draws', path), lambda: drawn(file.model, posterior, sample.count, sample.seed)
+            ('draws', path), lambda: draw_models(file.model, posterior, sample.count, sample.seed)
         )
 
     def _inputs(self, values: Values) -> tuple[str, str, str]:
@@ -155,22 +155,22 @@ class Job:
 
     def _options(self, values: Values, planned: bool) -> dict[str, Any]:
         file = self.file
-        for name in OF_MOTION if planned else OF_PASSES:
+        for name in MOTION_KEYS if planned else PASS_KEYS:
             if name in values and planned:
                 raise ManyError(f'{name} varies a recorded motion; give a trajectory')
             if name in values:
                 raise ManyError(
                     f'{name} varies planned passes; leave trajectory out, or vary '
-                    f'{", ".join(OF_MOTION)}'
+                    f'{", ".join(MOTION_KEYS)}'
                 )
-        passes = file.passes.model_dump() | {n: values[n] for n in OF_PASSES if n in values}
+        passes = file.passes.model_dump() | {n: values[n] for n in PASS_KEYS if n in values}
         if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
             raise ManyError(
                 'passes are planned, but neither their speed nor a target is given; give passes: '
                 '{speed_m_per_s: ...}, passes: {target_um: ...}, or a trajectory'
             )
         return {
-            'motion': {name: values[name] for name in OF_MOTION if name in values},
+            'motion': {name: values[name] for name in MOTION_KEYS if name in values},
             'passes': passes if planned else {},
             'target_um': file.target_um,
             'tolerance_um': file.tolerance_um,

@@ -1,4 +1,4 @@
-"""What a sweep found: a row for each case, and its files."""
+"""The result of a sweep: a row for each case, and its files."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ from paint_deposition.report.writers.write import written
 if TYPE_CHECKING:
     import pyarrow as pa
 
-# Values that are few enough for a line through their medians.
+# With no more values than this a line is drawn through their medians.
 FEW_VALUES = 12
 MOST_COLUMNS = 6
 # Narrowest range of a chart, as a share of its values.
 LEAST_SPAN = 0.01
-# What a case says that leaves a thing, or everything, as the sweep's file has it.
+# Shown for a case that leaves a value, or all of them, as in the sweep's file.
 UNCHANGED = 'unchanged'
-# What is judged, less being better, and drawn, each with its label.
-JUDGED, LABEL = 'sigma_n', 'unevenness σ_N'
-DRAWN = {JUDGED: LABEL, 'mean_um': 'mean film [µm]'}
+# The figure by which cases are ranked, less being better; all charted figures with their labels.
+SCORE, LABEL = 'sigma_n', 'unevenness σ_N'
+CHARTED = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ class Sweep:
     @property
     def drawn(self) -> dict[str, str]:
         """The figures that some case has, with their labels."""
-        return {n: label for n, label in DRAWN.items() if n in self.table.column_names}
+        return {n: label for n, label in CHARTED.items() if n in self.table.column_names}
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class Sweep:
 
     @property
     def warnings(self) -> list[tuple[int, str]]:
-        """Number of each case with an odd film, and what is odd about it."""
+        """Number of each case with warnings, and the warnings."""
         return self._texts(WARNINGS) if WARNINGS in self.table.column_names else []
 
     def _texts(self, name: str) -> list[tuple[int, str]]:
@@ -105,9 +105,9 @@ class Sweep:
     @property
     def best(self) -> int | None:
         """Row of the most even film."""
-        if JUDGED not in self.table.column_names or np.isnan(self.column(JUDGED)).all():
+        if SCORE not in self.table.column_names or np.isnan(self.column(SCORE)).all():
             return None
-        return int(np.nanargmin(self.column(JUDGED)))
+        return int(np.nanargmin(self.column(SCORE)))
 
     @property
     def sentence(self) -> str:
@@ -118,7 +118,7 @@ class Sweep:
 
     @property
     def lines(self) -> Iterator[str]:
-        """What to say of it."""
+        """The result in lines."""
         yield self.sentence
         for name, label in self.drawn.items():
             low, middle, high = self._spread(name)
@@ -141,7 +141,7 @@ class Sweep:
                 name: dict(zip(('low_5', 'median', 'high_95'), self._spread(name), strict=True))
                 for name in self.drawn
             },
-            'judged_by': JUDGED if best is not None else None,
+            'judged_by': SCORE if best is not None else None,
             'best': None if best is None else {'case': best + 1, 'values': self.job.values[best]},
             'errors': [{'case': number, 'error': error} for number, error in self.errors],
             'notes': list(self.job.notes),
@@ -159,7 +159,7 @@ def _write(sweep: Sweep, folder: Path, pictures: str = 'png') -> list[Path]:
         files.append(write_parquet(folder / 'points.parquet', _points(sweep)))
     files.append(folder / 'sweep.json')
     write_json(files[-1], sweep.to_dict())
-    over = {name: _drawn_over(sweep, name) for name in sweep.varied if name != 'part_pose'}
+    over = {name: _axis_values(sweep, name) for name in sweep.varied if name != 'part_pose'}
     if sweep.drawn and over:
         results = {label: sweep.column(name) for name, label in sweep.drawn.items()}
         picture = folder / f'sweep.{pictures}'
@@ -190,7 +190,7 @@ def _column(values: Sequence[Any]) -> pa.Array:
     return pa.array(values, pa.float64() if any(isinstance(v, float) for v in values) else None)
 
 
-def _drawn_over(sweep: Sweep, name: str) -> np.ndarray:
+def _axis_values(sweep: Sweep, name: str) -> np.ndarray:
     """(n,) numbers that varied, or texts: what files are called, which effects act."""
     default = getattr(sweep.job.file, name, None)
     given = [values.get(name, default) for values in sweep.job.values]

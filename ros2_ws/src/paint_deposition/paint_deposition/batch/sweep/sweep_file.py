@@ -1,4 +1,4 @@
-"""Sweep files: what stays and what varies."""
+"""Sweep files: what is fixed and what varies."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 
 MOST_CASES = 1_000_000
-A_LIST = 'a list of at least one value, or {first: A, last: B, steps: N}'
-A_SPREAD = '{normal: [mean, standard deviation]} or {uniform: [lowest, highest]}'
-Made = TypeVar('Made', bound=BaseModel)
+LIST_WORDS = 'a list of at least one value, or {first: A, last: B, steps: N}'
+DISTRIBUTION_WORDS = '{normal: [mean, standard deviation]} or {uniform: [lowest, highest]}'
+Model = TypeVar('Model', bound=BaseModel)
 
 
 class Steps(BaseModel, extra='forbid'):
@@ -26,20 +26,20 @@ class Steps(BaseModel, extra='forbid'):
     steps: int = Field(ge=2, le=MOST_CASES)
 
     def values(self) -> list[float]:
-        """All of them, rounded to what their writer meant."""
+        """All of them, rounded to 12 digits."""
         span = self.last - self.first
         return [float(f'{self.first + span * k / (self.steps - 1):.12g}')
                 for k in range(self.steps)]  # fmt: skip
 
 
-class Spread(BaseModel, extra='forbid'):
-    """A distribution: one of the two."""
+class Distribution(BaseModel, extra='forbid'):
+    """A distribution: normal or uniform."""
 
     normal: tuple[Number, Number] | None = None
     uniform: tuple[Number, Number] | None = None
 
     @model_validator(mode='after')
-    def _one_that_spreads(self) -> Spread:
+    def _is_one_distribution(self) -> Distribution:
         if (self.normal is None) == (self.uniform is None):
             raise ValueError('give one of normal, uniform')
         if self.normal and not self.normal[1] > 0.0:
@@ -55,17 +55,20 @@ def _grid(given: dict[str, Any]) -> dict[str, list[Any]]:
 
 def _values(name: str, given: Any) -> list[Any]:
     if isinstance(given, dict):
-        return _made(Steps, name, given, A_LIST).values()
+        return _validated(Steps, name, given, LIST_WORDS).values()
     if not isinstance(given, list) or not given:
-        raise ValueError(f'{name} is {given!r}; expected {A_LIST}')
+        raise ValueError(f'{name} is {given!r}; expected {LIST_WORDS}')
     return given
 
 
-def _spreads(given: dict[str, Any]) -> dict[str, Spread]:
-    return {name: _made(Spread, name, values, A_SPREAD) for name, values in given.items()}
+def _distributions(given: dict[str, Any]) -> dict[str, Distribution]:
+    return {
+        name: _validated(Distribution, name, values, DISTRIBUTION_WORDS)
+        for name, values in given.items()
+    }
 
 
-def _made(model: type[Made], name: str, given: Any, expected: str) -> Made:
+def _validated(model: type[Model], name: str, given: Any, expected: str) -> Model:
     try:
         return model.model_validate(given)
     except ValidationError:
@@ -80,7 +83,7 @@ class Sample(BaseModel, extra='forbid'):
     posterior: bool = Field(
         False, description="whether the model's parameters are drawn from its posterior"
     )
-    vary: Annotated[dict[str, Any], AfterValidator(_spreads)] = Field(
+    vary: Annotated[dict[str, Any], AfterValidator(_distributions)] = Field(
         {}, description='a distribution for each name'
     )
 

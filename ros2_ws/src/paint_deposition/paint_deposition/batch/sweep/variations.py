@@ -20,8 +20,8 @@ from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
-OF_PASSES = ('index_m', 'standoff_m', 'speed_m_per_s')
-OF_MOTION = ('speed_factor', 'standoff_change_m', 'flow_factor')
+PASS_KEYS = ('index_m', 'standoff_m', 'speed_m_per_s')
+MOTION_KEYS = ('speed_factor', 'standoff_change_m', 'flow_factor')
 SECTIONS: dict[str, type[BaseModel]] = {'planar': PlanarPattern, 'projection': Projection}
 # Of the pattern of one brush of several: 'brush_2.K1_cm3_per_s'.
 BRUSH = 'brush_'
@@ -43,7 +43,7 @@ def known_names(models: Sequence[DepositionModel] = ()) -> list[str]:
     numbers = dict.fromkeys(brush.number for model in models for brush in model.brushes)
     of_brushes = [f'{BRUSH}{k}.{n}' for k in numbers for n in PlanarPattern.model_fields]
     of_effects = [f'{e.id}.{n}' for e in effects_of(models).values() for n in e.parameters()]
-    others = (*INPUTS, 'part_pose', 'effects', *OF_PASSES, *OF_MOTION)
+    others = (*INPUTS, 'part_pose', 'effects', *PASS_KEYS, *MOTION_KEYS)
     return [*others, *of_model, *of_brushes, *of_effects]
 
 
@@ -127,7 +127,7 @@ def _require_kind(name: str, value: Any) -> None:
     elif name == 'effects':
         holds = isinstance(value, list) and all(isinstance(one, str) for one in value)
         expected = 'a list of effects of the model, [] for none'
-    elif name in (*OF_PASSES, 'speed_factor', 'flow_factor'):
+    elif name in (*PASS_KEYS, 'speed_factor', 'flow_factor'):
         holds = _is_number(value) and value > 0.0
         expected = f'a number{" above 0" if _is_number(value) else ""}'
     else:

@@ -15,7 +15,7 @@ from paint_deposition.kernel.laws import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 
-# Scale on which the distance to an edge is resolved [m], and where it ends to matter [m].
+# Scale and range in which the distance to an edge is resolved [m].
 EDGE_SCALE_M, FARTHEST_EDGE_M = 0.01, 0.15
 # Times since the trigger and distances from a turn matter up to here.
 LONGEST_SINCE_TRIGGER_S, FARTHEST_TURN_M = 1.0, 1.0
@@ -83,15 +83,15 @@ class LearnedCurve(LearnedLaw):
         return np.maximum(1.0 + self.curve(value), LEAST_FACTOR)
 
 
-class _OverThePath(LearnedCurve):
-    """Acts on the flow, by what the path is like at each sub-step."""
+class _PathCurve(LearnedCurve):
+    """Acts on the flow, by a covariate of each sub-step."""
 
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         return path.with_flow_scaled(self.factor(along_path(path)[self.covariate]))
 
 
-class _OverTheSurface(LearnedCurve):
-    """Acts on the film, by what the surface is like at each point; bare metal stays bare."""
+class _SurfaceCurve(LearnedCurve):
+    """Acts on the film, by a covariate of each point; bare metal stays bare."""
 
     kinds = ('factor', 'addition')
 
@@ -99,14 +99,14 @@ class _OverTheSurface(LearnedCurve):
         return applied(film_um, self.curve(at_points(points)[self.covariate]()), self.kind)
 
 
-class _OverTheFilm(LearnedCurve):
+class _FilmCurve(LearnedCurve):
     """Acts on the film, or what the gauge makes of it, by the film itself."""
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
         return applied(film_um, self.curve(film_um), self.kind)
 
 
-class _AlongTheRay(LearnedCurve):
+class _RayCurve(LearnedCurve):
     """Acts on the flux of each ray, inside the kernel."""
 
     def values(self) -> tuple[float, ...]:
@@ -173,10 +173,10 @@ def _ray_factor(variable: Callable[[Ray], float]) -> Callable[..., float]:
     return flux_factor
 
 
-def _acting(
+def _curve_class(
     acts: type[LearnedCurve], covariate: str, unit: str, over: str, **others: Any
 ) -> type[LearnedCurve]:
-    """The law over a covariate that acts as a class of the above does."""
+    """The class of the law over a covariate, derived from one of the above."""
     what = {
         'id': f'learned:{covariate}', 'covariate': covariate, 'unit': unit, 'over': over,
         '__module__': __name__, '__doc__': f'What is painted follows {over}, as learned.',
@@ -199,37 +199,37 @@ def _incidence_axis(value: Any) -> Any:
 CURVES: dict[str, type[LearnedCurve]] = {
     law.covariate: law
     for law in (
-        _acting(
-            _AlongTheRay, 'incidence_deg', 'deg', 'the angle of incidence',
+        _curve_class(
+            _RayCurve, 'incidence_deg', 'deg', 'the angle of incidence',
             axis=staticmethod(_incidence_axis),
             flux_factor=staticmethod(_ray_factor(lambda ray: -ray.cos_incidence)),
         ),
-        _acting(
-            _AlongTheRay, 'standoff_ratio', '1', 'the distance as a multiple of Omega',
+        _curve_class(
+            _RayCurve, 'standoff_ratio', '1', 'the distance as a multiple of Omega',
             flux_factor=staticmethod(_ray_factor(lambda ray: ray.standoff_ratio)),
         ),
-        _acting(_OverThePath, 'time_s', 's', 'the time since the motion began'),
-        _acting(_OverThePath, 'spray_pass', '1', 'the number of the pass'),
-        _acting(
-            _OverThePath, 'stroke_end_m', 'm', 'the distance to the nearer end of the stroke',
+        _curve_class(_PathCurve, 'time_s', 's', 'the time since the motion began'),
+        _curve_class(_PathCurve, 'spray_pass', '1', 'the number of the pass'),
+        _curve_class(
+            _PathCurve, 'stroke_end_m', 'm', 'the distance to the nearer end of the stroke',
             needs_whole_strokes=True,
         ),
-        _acting(_OverThePath, 'since_trigger_s', 's', 'the time since the trigger opened'),
-        _acting(_OverThePath, 'speed_m_per_s', 'm/s', 'the speed of the gun'),
-        _acting(_OverTheSurface, 'curvature_per_m', '1/m', 'the curvature of the surface'),
-        _acting(
-            _OverTheSurface, 'edge_distance_m', 'm', 'the distance to the nearest free edge',
+        _curve_class(_PathCurve, 'since_trigger_s', 's', 'the time since the trigger opened'),
+        _curve_class(_PathCurve, 'speed_m_per_s', 'm/s', 'the speed of the gun'),
+        _curve_class(_SurfaceCurve, 'curvature_per_m', '1/m', 'the curvature of the surface'),
+        _curve_class(
+            _SurfaceCurve, 'edge_distance_m', 'm', 'the distance to the nearest free edge',
             axis=staticmethod(_edge_axis),
         ),
-        _acting(
-            _OverTheSurface, 'sky_view_factor', '1',
+        _curve_class(
+            _SurfaceCurve, 'sky_view_factor', '1',
             'the share of the half-space that a point sees',
         ),
-        _acting(
-            _OverTheSurface, 'across_m', 'm', "the distance from the part's centre to the right"
+        _curve_class(
+            _SurfaceCurve, 'across_m', 'm', "the distance from the part's centre to the right"
         ),
-        _acting(_OverTheSurface, 'height_fraction', '1', 'the height on the part'),
-        _acting(_OverTheFilm, 'film_um', 'um', 'the film itself'),
+        _curve_class(_SurfaceCurve, 'height_fraction', '1', 'the height on the part'),
+        _curve_class(_FilmCurve, 'film_um', 'um', 'the film itself'),
     )
 }  # fmt: skip
 # Where pickle looks for them.

@@ -1,4 +1,4 @@
-"""What all laws learned from readings have in common.
+"""The base of laws learned from readings.
 
 Its form comes from readings: values at knots over the range that the readings cover, linear in
 between. One step beyond that range it is neutral again: nothing is known there. The idea is that

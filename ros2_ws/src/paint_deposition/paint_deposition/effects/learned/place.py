@@ -91,7 +91,7 @@ class LearnedMap(LearnedLaw):
     def typical(cls) -> 'LearnedMap':
         return cls(learned=(0.0, 0.1, 0.1, 0.0))
 
-    def on_parts(self) -> Iterator[tuple[PartGrid, np.ndarray]]:
+    def values_by_part(self) -> Iterator[tuple[PartGrid, np.ndarray]]:
         """Each grid with its values (rows, columns)."""
         first = 0
         for grid in self.maps:
@@ -100,7 +100,7 @@ class LearnedMap(LearnedLaw):
             first += grid.knots
 
     def on_film(self, film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-        for grid, values in self.on_parts():
+        for grid, values in self.values_by_part():
             if grid.is_of(points):
                 # Value by value, so that it is the same to the bit for few points and for many.
                 h = np.einsum('vk,k->v', grid.weights(places_m(points)), values.ravel())

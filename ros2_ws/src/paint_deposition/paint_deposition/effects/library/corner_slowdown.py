@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, PathContext, over, parameter
+from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
 from paint_deposition.motion.path import SprayPath
 
 # A gun that is slower than this stands, and its log trembles [m/s].
@@ -19,7 +19,7 @@ class CornerSlowdown(Effect):
 
     id = 'corner_slowdown'
     family = 'boundary'
-    covariates = over(stroke_end_m=-1)
+    covariates = read_only(stroke_end_m=-1)
     free_law = 'factor'
     signature = 'more paint where the passes turn, none along edges that they run beside'
     rivals = ('edge_build', 'trigger_lag', 'standoff_efficiency')

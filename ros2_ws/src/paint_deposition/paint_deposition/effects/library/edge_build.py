@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -16,7 +16,7 @@ class EdgeBuild(Effect):
     id = 'edge_build'
     family = 'boundary'
     needs = 'voltage'
-    covariates = over(edge_distance_m=-1)
+    covariates = read_only(edge_distance_m=-1)
     free_law = 'factor'
     signature = 'a rim of more paint along all free edges alike'
     rivals = ('corner_slowdown',)

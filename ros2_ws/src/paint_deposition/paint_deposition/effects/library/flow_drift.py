@@ -1,6 +1,6 @@
 """Flow that drifts from pass to pass."""
 
-from paint_deposition.effects.base import Effect, PathContext, over, parameter
+from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
 from paint_deposition.motion.path import SprayPath
 
 # The calibrated flow is that of the middle of a job; live nobody knows how many passes will come.
@@ -16,7 +16,7 @@ class FlowDrift(Effect):
 
     id = 'flow_drift'
     family = 'order'
-    covariates = over(time_s=0, spray_pass=0)
+    covariates = read_only(time_s=0, spray_pass=0)
     free_law = 'factor'
     signature = 'level changes in the order of the passes; reversed if their order is'
     rivals = ('fog_gradient',)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -15,7 +15,7 @@ class FogGradient(Effect):
 
     id = 'fog_gradient'
     family = 'order'
-    covariates = over(height_fraction=-1)
+    covariates = read_only(height_fraction=-1)
     free_law = 'addition'
     signature = 'more at the bottom, by a fixed amount: not in proportion to the film'
     rivals = ('flow_drift',)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -16,7 +16,7 @@ class GaugeGain(Effect):
     id = 'gauge_gain'
     family = 'level'
     exact = True
-    covariates = over(film_um=0)
+    covariates = read_only(film_um=0)
     signature = 'in proportion to the film everywhere; the same as another K1'
     rivals = ('gauge_zero',)
     source = 'specification of gauges: a fixed amount plus a percentage, 1 to 3 %'

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -15,7 +15,7 @@ class GaugeZero(Effect):
     id = 'gauge_zero'
     family = 'level'
     exact = True
-    covariates = over(film_um=0)
+    covariates = read_only(film_um=0)
     signature = 'the same amount on every reading; shows on bare metal'
     rivals = ('overspray_fog', 'gauge_gain')
     source = 'specification of gauges: 1 % or 2.5 um, whichever is greater (Elcometer)'

@@ -1,6 +1,6 @@
 """A plume that trails behind the moving gun."""
 
-from paint_deposition.effects.base import Effect, PathContext, over, parameter
+from paint_deposition.effects.base import Effect, PathContext, parameter, read_only
 from paint_deposition.motion.path import SprayPath
 
 
@@ -13,7 +13,7 @@ class GunWake(Effect):
 
     id = 'gun_wake'
     family = 'time'
-    covariates = over(speed_m_per_s=0)
+    covariates = read_only(speed_m_per_s=0)
     signature = 'passes moved against their direction, in proportion to the speed'
     rivals = ('pose_lag', 'trigger_lag')
     source = 'time of flight of 5 to 50 ms; size from general practice'

@@ -1,6 +1,6 @@
 """Attraction to surface that turns away from the gun, or rebound from it."""
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.kernel.laws import Ray
 
 
@@ -16,7 +16,7 @@ class IncidenceAttraction(Effect):
 
     id = 'incidence_attraction'
     family = 'incidence'
-    covariates = over(incidence_deg=0)
+    covariates = read_only(incidence_deg=0)
     free_law = 'factor'
     signature = 'grows with incidence; most on surface that turns away from the gun'
     rivals = ('standoff_efficiency',)

@@ -1,6 +1,6 @@
 """A pattern that does not widen in proportion to the distance."""
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.kernel.fast_math import power
 from paint_deposition.kernel.laws import Ray
 
@@ -19,7 +19,7 @@ class PatternSpread(Effect):
 
     id = 'pattern_spread'
     family = 'standoff'
-    covariates = over(standoff_ratio=0)
+    covariates = read_only(standoff_ratio=0)
     signature = 'the width of the pattern changes with the distance, not what it deposits'
     rivals = ('tcp_standoff', 'overspray_fog')
     source = (

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.part.points import SurfacePoints
 
 REFERENCE_FILM_UM = 20.0
@@ -19,7 +19,7 @@ class Sag(Effect):
 
     id = 'sag'
     family = 'lateral shift'
-    covariates = over(film_um=0, height_fraction=0)
+    covariates = read_only(film_um=0, height_fraction=0)
     signature = "thick zones thinner at their top and thicker below; grows with the film's cube"
     rivals = ('air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment')
     source = (

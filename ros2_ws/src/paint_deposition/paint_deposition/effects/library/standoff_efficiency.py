@@ -1,6 +1,6 @@
 """Transfer efficiency that falls with the distance from the bell."""
 
-from paint_deposition.effects.base import Effect, over, parameter
+from paint_deposition.effects.base import Effect, parameter, read_only
 from paint_deposition.kernel.fast_math import power
 from paint_deposition.kernel.laws import Ray
 
@@ -14,7 +14,7 @@ class StandoffEfficiency(Effect):
 
     id = 'standoff_efficiency'
     family = 'standoff'
-    covariates = over(standoff_ratio=-1)
+    covariates = read_only(standoff_ratio=-1)
     free_law = 'factor'
     signature = 'negative where the gun is far, positive where it is near; level, not width'
     rivals = ('incidence_attraction', 'corner_slowdown', 'tcp_standoff')

@@ -55,7 +55,7 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     for (parent, child), poses in parts.items():
         if len({pose for *_, pose in poses}) > 1:
             raise RecordingError(
-                f"{bag.path}: '{child}' was placed anew in '{parent}' while the run was recorded; "
+                f"{bag.path}: '{child}' was moved in '{parent}' while the run was recorded; "
                 'give --part-pose'
             )
     # The last static transform replaces earlier ones, as in tf2.

@@ -80,7 +80,7 @@ class PoseTable(Table):
     def values(self, columns: Sequence[int]) -> np.ndarray:
         """The numbers (N, C) of columns; cells that are none are refused with their lines."""
         read = [self.numbers(column, finite=False, switch=True) for column in columns]
-        self.refuse_complaints()
+        self.refuse_errors()
         return np.stack(read, axis=1)
 
     def stamps_ns(self, column: int) -> tuple[np.ndarray, str]:

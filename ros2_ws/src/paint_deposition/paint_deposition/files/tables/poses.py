@@ -68,7 +68,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
-    said = f'{len(table)} poses: x y z in {unit}; {orientation}; {trigger}{by_brush}'
+    note = f'{len(table)} poses: x y z in {unit}; {orientation}; {trigger}{by_brush}'
     time, speed = table.find(*TIME), table.find(*SPEED)
     if time is not None:
         stamps, time_unit = table.stamps_ns(time)
@@ -77,7 +77,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
         return Trajectory(
             stamps, positions, quaternions, trigger_stamps_ns=stamps[on],
             trigger_flow=levels[on], trigger_brush=numbered(brushes[on]),
-            notes=(f'{said}; {table.written([time])} in {time_unit}',),
+            notes=(f'{note}; {table.written([time])} in {time_unit}',),
         )  # fmt: skip
     if speed is None:
         raise RecordingError(
@@ -96,7 +96,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
             positions, quaternions, *columns, strict=True
         )
     ]
-    return replace(timed(moves, flows is not None), notes=(PROGRAMMED, said))
+    return replace(timed(moves, flows is not None), notes=(PROGRAMMED, note))
 
 
 def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:

@@ -77,7 +77,7 @@ class ReadingTable:
             raise table.error(doubt)
         kept, order, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
         if not kept:
-            table.refuse_complaints()
+            table.refuse_errors()
             raise table.error('no readings below the header')
         table = table.select(kept)
         return ReadingTable(

@@ -52,8 +52,8 @@ def read_rotations(
         for names in (QUATERNION, ABB_QUATERNION):
             if columns := table.find_all(names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
-                said = f'quaternion {table.written(columns)} ({order})'
-                return table.values(columns), said
+                note = f'quaternion {table.written(columns)} ({order})'
+                return table.values(columns), note
     columns, by_axis, convention = _angle_columns(table, rotation)
     written = table.written(columns)
     unit = _unit(table, columns, convention, angle_unit)

@@ -42,7 +42,7 @@ class Table:
     lines: list[int]
     refusal: type[PaintError]
     decimal: str = '.'
-    _complaints: dict[int, str] = field(default_factory=dict)
+    _errors: dict[int, str] = field(default_factory=dict)
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -92,24 +92,24 @@ class Table:
 
     def complain(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
-        self._complaints.setdefault(self.lines[row], text)
+        self._errors.setdefault(self.lines[row], text)
 
     def error(self, text: str) -> PaintError:
         """What is wrong with the file as a whole, as an error to raise."""
         return self.refusal(f'{self.path}: {text}')
 
-    def refuse_complaints(self) -> None:
+    def refuse_errors(self) -> None:
         """Refuse the file with all that is wrong in its lines, up to a number."""
-        if not self._complaints:
+        if not self._errors:
             return
-        lines = [f'line {line}: {text}' for line, text in sorted(self._complaints.items())]
-        count = f'{len(lines)} complaints: ' if len(lines) > 1 else ''
+        lines = [f'line {line}: {text}' for line, text in sorted(self._errors.items())]
+        count = f'{len(lines)} errors: ' if len(lines) > 1 else ''
         if (more := len(lines) - MOST_COMPLAINTS_SHOWN) > 0:
             lines[MOST_COMPLAINTS_SHOWN:] = [f'and {more} more']
         raise self.error(count + '; '.join(lines))
 
     def select(self: Kind, rows: Sequence[int]) -> Kind:
-        """The chosen rows (indices); complaints are shared."""
+        """The chosen rows (indices); errors are shared."""
         return replace(
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )

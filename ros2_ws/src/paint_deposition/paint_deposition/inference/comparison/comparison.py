@@ -1,4 +1,4 @@
-"""The model beside the readings: where and how much it is off, and in which regions."""
+"""Comparison of model and readings: residuals, their dependence on covariates, regions."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
@@ -157,7 +157,7 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Comparison:
-    """The model beside the readings.
+    """The model compared with the readings.
 
     Attributes:
         study: the campaign, with the noise of its gauge and notes for the user.
@@ -207,7 +207,7 @@ class Comparison:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """Several models beside the same readings.
+    """Several models compared with the same readings.
 
     Attributes:
         by_name: a comparison for each model, in the order asked for, by the model's name.

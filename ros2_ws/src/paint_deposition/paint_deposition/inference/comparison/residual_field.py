@@ -12,10 +12,10 @@ RADIUS_OVER_SPACING = 1.8
 SAME_SIDE_COSINE = 0.5
 
 
-def spreading(
+def interpolation_matrix(
     surface: Surface, positions_m: np.ndarray, normals: np.ndarray, radius_m: float | None = None
 ) -> csr_matrix:
-    """Matrix (V, P) that spreads values at points over the surface around them.
+    """Matrix (V, P) that interpolates values at points over the surface around them.
 
     Each vertex takes a mean of the points within the radius on its side of the part, weighted by
     a smooth kernel: single readings are noisy, and what matters is where neighbours agree. The
@@ -43,7 +43,7 @@ def reached(matrix: csr_matrix) -> np.ndarray:
     return np.diff(matrix.indptr) > 0
 
 
-def spread_over_surface(
+def interpolate_over_surface(
     surface: Surface, positions_m: np.ndarray, normals: np.ndarray, residual_um: np.ndarray
 ) -> np.ndarray:
     """Residual at each vertex (V,) [um], NaN where no reading is near.
@@ -52,7 +52,7 @@ def spread_over_surface(
         positions_m, normals: (P, 3) readings on its surface.
         residual_um: (P,) measured minus predicted.
     """
-    matrix = spreading(surface, positions_m, normals)
+    matrix = interpolation_matrix(surface, positions_m, normals)
     return np.where(reached(matrix), matrix @ residual_um, np.nan)
 
 

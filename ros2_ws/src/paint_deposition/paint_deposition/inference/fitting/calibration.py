@@ -41,7 +41,7 @@ from paint_deposition.inference.readings.plausibility import (
     check_enough,
     check_panel,
     check_readings,
-    check_units_beside,
+    check_units_against_fit,
     geometry_by_experiment,
 )
 from paint_deposition.inference.readings.residuals import Residuals
@@ -84,8 +84,8 @@ class Calibration:
         parameters: of the pattern and of varied effects, with uncertainties.
         correlations: of pairs, strongest first.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
-        warnings: what the reader must know, a sentence each.
-        remainder: what no pattern explains; None before that is looked at.
+        warnings: a sentence each.
+        remainder: what no pattern explains; None until it is estimated.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
             reach the pattern's edges; they widen the uncertainties.
     """
@@ -178,7 +178,7 @@ def calibrate(
             bell, whose pattern is then guessed from the first panel.
 
     Raises:
-        ReadingsError: the readings cannot be what they are said to be, or determine nothing.
+        ReadingsError: the readings are not plausible, or determine nothing.
     """
     model = with_brushes_of(campaign, start or DepositionModel())
     study = Study.of(campaign, model.effects)
@@ -221,7 +221,7 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
     measured, sigma = study.measured_um[rows], study.sigma_um[rows]
     check_panel(experiment.readings, panel, measured, sigma)
     collapse = fit_collapse(panel, measured, sigma)
-    check_units_beside(experiment.readings, measured, collapse.residuals.predicted_um)
+    check_units_against_fit(experiment.readings, measured, collapse.residuals.predicted_um)
     return PanelFit(panel, collapse)
 
 

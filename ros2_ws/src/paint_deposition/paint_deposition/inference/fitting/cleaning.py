@@ -12,7 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.condensing import MANY, condensed, thinned
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.fitting.outliers import (
-    FEWEST,
+    FEWEST_POINTS,
     FittedPoints,
     Outlier,
     find_outliers,
@@ -22,7 +22,7 @@ from paint_deposition.inference.fitting.study import TEXTURE_SHARE, Study, Textu
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
-# Starts of the fit beside which readings are judged.
+# Starts of the fit from which outliers are found.
 STARTS = 3
 
 
@@ -51,7 +51,7 @@ def clean_and_fit(
         campaign, start, starts = condensed(campaign, rough.model), rough.model, 1
     study = Study.of(campaign, effects)
     fit = _fitted(study, start, starts, seed, known)
-    if len(study) < FEWEST or not fit.predicted_um.any():
+    if len(study) < FEWEST_POINTS or not fit.predicted_um.any():
         return study, fit
     misfit = _misfit(study, fit)
     if found := _outliers(study, fit, misfit):
@@ -88,12 +88,12 @@ def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier
 def _texture(study: Study, misfit: FittedPoints) -> Texture:
     """Estimated where the gauge's noise is known.
 
-    Only a texture finer than usual is believed: a coarser one looks like anything that is missing
+    Only a texture finer than usual is accepted: a coarser one looks like anything that is missing
     from the model and narrower than the distance between readings.
     """
     if study.noise.source == 'assumed':
         return study.texture
-    share = misfit.scatter.texture_share
+    share = misfit.leave_one_out.texture_share
     return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
 
 

@@ -13,7 +13,7 @@ DRAWS = 4000
 K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
 # A parameter whose width has not fallen below this share of its weak prior's was not measured.
 LEARNED = 0.5
-# A standard deviation this large a share of a positive value leaves no digit of it.
+# A standard deviation this large a share of a positive value leaves its first digit open.
 LARGEST_SHARE = 0.5
 # With the asymmetry this few standard deviations from zero its phase means nothing.
 ASYMMETRY_SIGMAS = 2.0
@@ -44,7 +44,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Correlation:
-    """How two estimates go together."""
+    """Correlation of two estimates."""
 
     first: str
     second: str
@@ -52,7 +52,7 @@ class Correlation:
 
     @property
     def too_close(self) -> bool:
-        """Whether one can make up for the other."""
+        """Whether one can compensate for the other."""
         return abs(self.value) > TOO_CLOSE
 
 
@@ -166,7 +166,7 @@ def _pattern_reason(
         }.get(int(learned[2]) + int(learned[3]), '')
     row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
     if not learned[row]:
-        return 'its value rests on what bells usually have'
+        return 'its value comes from the prior of usual bells'
     if name in ('sigma1_m', 'sigma2_m') and sigma > LARGEST_SHARE * value:
         return f'its standard deviation is {100 * sigma / value:.0f} % of it'
     return ''

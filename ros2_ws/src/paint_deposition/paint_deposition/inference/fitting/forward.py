@@ -72,10 +72,10 @@ class Forward:
     def _stages(self, model: DepositionModel) -> list['_Stages']:
         """The model of each part: without the effects of what was switched off."""
         off = [part.experiment.switched_off for part in self._parts]
-        stages = {each: self._taken_apart(model.without(each)) for each in set(off)}
+        stages = {each: self._split_by_stage(model.without(each)) for each in set(off)}
         return [stages[each] for each in off]
 
-    def _taken_apart(self, model: DepositionModel) -> '_Stages':
+    def _split_by_stage(self, model: DepositionModel) -> '_Stages':
         acting = tuple(effect for effect in model.effects if not effect.is_neutral)
         before = tuple(effect for effect in acting if _defines(effect, BEFORE_ARRIVAL))
         if any(_defines(effect, LAWS) for effect in before):

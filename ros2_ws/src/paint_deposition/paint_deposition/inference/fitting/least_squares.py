@@ -19,15 +19,15 @@ from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERM
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
 SPREAD_OF_STARTS = 0.8
-# Shapes that are tried for each start that is kept.
-TRIED_A_START = 8
-# Steps of the first search from each start, and how many of the best are taken to the end.
+# Candidate shapes of the pattern for each start.
+CANDIDATES_PER_START = 8
+# Steps of the first search from each start; the number of best ones that are refined.
 SCREENING_STEPS = 6
-FINISHED = 4
+REFINED_STARTS = 4
 MOST_STEPS = 60
 # Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
 EVENNESS = 0.05
-# A weaker ring, as a share of all paint, has no asymmetry to speak of.
+# Below this share of all paint the ring has no measurable asymmetry.
 LEAST_RING = 0.01
 
 # For functions: BLAS has one thread while they run. Threads that share matrices as small as those
@@ -127,10 +127,10 @@ def fit_readings(
     first = problem.scaled_to_mean(parameters.encode(parameters.start))
     candidates = [first]
     if starts > 1:
-        candidates += _promising(problem, first, starts - 1, seed)
+        candidates += _best_starts(problem, first, starts - 1, seed)
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
         rough.sort(key=lambda result: result.cost)
-        candidates = [result.x for result in rough[:FINISHED]]
+        candidates = [result.x for result in rough[:REFINED_STARTS]]
     found = [problem.search(start, MOST_STEPS) for start in candidates]
     best = min(found, key=lambda result: result.cost)
     model = parameters.decode(best.x)
@@ -157,7 +157,9 @@ def covariance_factor(directions: np.ndarray, more: np.ndarray | None = None) ->
     return cholesky(covariance, lower=True, overwrite_a=True, check_finite=False)
 
 
-def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) -> list[np.ndarray]:
+def _best_starts(
+    problem: '_Problem', first: np.ndarray, count: int, seed: int
+) -> list[np.ndarray]:
     """The best of many shapes of the pattern, spread evenly over what bells usually have.
 
     For given r, sigma1 and sigma2 the film is linear in the gains of ring, centre and asymmetry,
@@ -168,7 +170,7 @@ def _promising(problem: '_Problem', first: np.ndarray, count: int, seed: int) ->
         if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
     ]  # fmt: skip
     width = problem.prior.width
-    spread = ndtri(qmc.Halton(len(shape), seed=seed).random(TRIED_A_START * count))
+    spread = ndtri(qmc.Halton(len(shape), seed=seed).random(CANDIDATES_PER_START * count))
     tried = []
     for away in spread:
         vector = first.copy()
@@ -242,7 +244,7 @@ class _Problem:
         return np.vstack([self.whitened(slopes), self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
-        """The same with K1s such that the mean film is right: the rest is then close enough."""
+        """The same with the K1s scaled so that the mean film is right."""
         predicted = self.predict(vector)
         weights = self.sigma**-2.0
         most = float(np.sum(weights * predicted**2))
@@ -258,7 +260,7 @@ class _Problem:
         Of several brushes K3 and phi are those that are best for the first.
         """
         pattern = self.parameters.pattern
-        # For each brush: ring alone, centre alone, and the ring lopsided along x and along y.
+        # For each brush: ring alone, centre alone, asymmetry of the ring along x and y.
         one = np.eye(TERMS)[[EVEN, CENTRED, BY_COS, BY_SIN]]
         one[2:] += one[0]
         parts = np.kron(np.eye(pattern.count), one)

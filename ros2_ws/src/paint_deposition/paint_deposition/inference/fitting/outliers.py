@@ -1,7 +1,7 @@
 """Outliers among single readings, and how readings scatter about anything smooth.
 
 A typing error, a display misread, a reading on bare metal contradicts all that its neighbours and
-the model say. A point that was read several times agrees with itself or is judged by its repeats.
+the model say. A point that was read several times agrees with itself or is checked by its repeats.
 
 Nothing is assumed of what the model lacks but that neighbours share it: neighbours on the part, or
 readings alike in one covariate. The misfit of the pattern, of every size of such a field, and of
@@ -60,9 +60,9 @@ class FittedPoints:
     covariates: tuple[Covariate, ...]
 
     @cached_property
-    def scatter(self) -> 'Scatter':
-        """What all models say of the readings."""
-        return Scatter.of(self)
+    def leave_one_out(self) -> 'LeaveOneOut':
+        """Leave-one-out predictions of the readings by all models."""
+        return LeaveOneOut.of(self)
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
@@ -73,8 +73,8 @@ class FittedPoints:
 
 
 @dataclass(frozen=True)
-class Scatter:
-    """What each of M models says of the readings.
+class LeaveOneOut:
+    """Leave-one-out predictions of the readings by each of M models.
 
     Attributes:
         log_weight: (M,) logarithm of prior share times likelihood.
@@ -91,7 +91,7 @@ class Scatter:
     residual_um: np.ndarray
 
     @staticmethod
-    def of(misfit: FittedPoints) -> 'Scatter':
+    def of(misfit: FittedPoints) -> 'LeaveOneOut':
         """Compute all models."""
         log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
         found = []
@@ -99,10 +99,10 @@ class Scatter:
             directions = np.hstack([misfit.free_um, field])
             for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
                 variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
-                likelihood, mean, sigma = _left_out(misfit.residual_um, variance, directions)
+                likelihood, mean, sigma = _leave_one_out(misfit.residual_um, variance, directions)
                 found.append((likelihood + log_share + log_texture, texture, mean, sigma))
         log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
-        return Scatter(log_weight, textures, mean, sigma, misfit.residual_um)
+        return LeaveOneOut(log_weight, textures, mean, sigma, misfit.residual_um)
 
     @property
     def texture_share(self) -> float:
@@ -132,7 +132,7 @@ def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0)
     return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
 
 
-def _left_out(
+def _leave_one_out(
     residual: np.ndarray, variance: np.ndarray, directions: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
@@ -165,18 +165,18 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
 
 
 # Prior probability of an outlier, and the posterior one from which a reading counts as one.
-RARE, SURE = 0.01, 0.9
-# They are rare: where a greater share of the points would be some, the model is at fault.
-MOST = 0.05
-# Fewer points say too little of each other.
-FEWEST = 20
-# What was probably meant is proposed if it is expected to within this many standard deviations.
-NEAR = 3.0
+PRIOR_PROBABILITY, LEAST_PROBABILITY = 0.01, 0.9
+# A greater share of outliers than this means that the model is at fault.
+LARGEST_SHARE = 0.05
+# Fewer points predict each other too poorly.
+FEWEST_POINTS = 20
+# A corrected value is proposed if it is within this many standard deviations of the expected one.
+GUESS_SIGMAS = 3.0
 
 
 @dataclass(frozen=True)
 class Outlier:
-    """A reading that was left out, and what the others say.
+    """A reading that was left out, and what model and other readings predict there.
 
     Attributes:
         point: its label, which names the part.
@@ -193,7 +193,7 @@ class Outlier:
     def guess_um(self) -> float | None:
         """What was probably read: a decimal point or two digits are in the wrong place."""
         guess = min(_miswritten(self.thickness_um), key=lambda v: abs(v - self.expected_um))
-        return guess if abs(guess - self.expected_um) < NEAR * self.sigma_um else None
+        return guess if abs(guess - self.expected_um) < GUESS_SIGMAS * self.sigma_um else None
 
     def __str__(self) -> str:
         meant = '' if self.guess_um is None else f' ({self.guess_um:.4g}?)'
@@ -210,7 +210,7 @@ class Outlier:
 
 
 def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[float, float]]:
-    """Slips by their row, with the residual that the others predict and its error [um].
+    """Outliers by their row, with the residual that the others predict and its error [um].
 
     The most certain one is taken out first, since outliers hide each other and widen what is
     expected of sound readings.
@@ -221,21 +221,22 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[f
     count = len(single)
     kept = np.arange(count)
     found: dict[int, tuple[float, float]] = {}
-    if count < FEWEST:
+    if count < FEWEST_POINTS:
         return {}
     film, left = np.mean(misfit.predicted_um), misfit
     while True:
-        scatter = left.scatter
+        leave_one_out = left.leave_one_out
         # Nothing is known of an outlier but that it is a number of the size of the film.
         wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
-        log_odds = np.log(RARE / (1.0 - RARE)) + wild - scatter.log_density
+        prior = np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY))
+        log_odds = prior + wild - leave_one_out.log_density
         log_odds[~single[kept]] = -np.inf
         worst = int(np.argmax(log_odds))
-        if expit(log_odds[worst]) < SURE:
+        if expit(log_odds[worst]) < LEAST_PROBABILITY:
             return found
-        if len(found) + 1 > max(MOST * count, 1.0):
+        if len(found) + 1 > max(LARGEST_SHARE * count, 1.0):
             return {}
-        found[int(kept[worst])] = scatter.predicted(worst)
+        found[int(kept[worst])] = leave_one_out.predicted(worst)
         kept = np.delete(kept, worst)
         left = misfit.select(kept)
 

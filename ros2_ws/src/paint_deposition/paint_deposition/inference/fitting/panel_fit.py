@@ -1,7 +1,7 @@
 """Eq. (3) fitted across the passes of a panel (section 4.1), and how far its readings reach.
 
 Paint that lands beyond the readings is extrapolated. A little more film along a panel's rim, as
-fat edges have it, then makes a pattern far too wide, with intervals that know nothing of it.
+fat edges have it, then makes the fitted pattern far too wide, which its intervals do not show.
 """
 
 from collections.abc import Callable
@@ -113,7 +113,7 @@ class Reach:
         return (
             f'{self.name}: the readings end {self.ends_m[0]:.2f} and {self.ends_m[1]:.2f} m to '
             f'the sides of a pass, where {100 * self.beyond[0]:.0f} and '
-            f'{100 * self.beyond[1]:.0f} % of its paint is still to land: the edges of the '
+            f'{100 * self.beyond[1]:.0f} % of its paint lands further out: the edges of the '
             'pattern are extrapolated; measure, on a larger panel if need be, '
             f'about {self.needed_m:.1f} m to both sides of a pass'
         )

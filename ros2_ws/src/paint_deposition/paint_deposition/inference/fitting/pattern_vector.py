@@ -19,16 +19,16 @@ PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigm
 COS, SIN = 2, 3
 # Weak: between brushes the asymmetry keeps its order of magnitude.
 RATIO = Coordinate('log_K3_ratio', 0.0, 0.5, -2.0, 2.0, 0.06)
-# Share of the variance between jobs that all brushes have in common: batch, viscosity and the wear
-# of the cup are theirs alike, the settings are each one's own. An assumption.
-IN_COMMON = 0.9
+# Share of the variance between jobs that all brushes share: batch, viscosity and wear of the cup
+# are common, the settings are each brush's own. An assumption.
+SHARED_VARIANCE = 0.9
 # A ratio has no value where the first brush has less asymmetry.
 LEAST_K3 = 1e-3
 
 
 @dataclass(frozen=True)
 class PatternVector:
-    """Where which pattern stands in the vector.
+    """Positions of the patterns in the vector.
 
     Attributes:
         brushes: their numbers; a single pattern needs none.
@@ -75,7 +75,7 @@ class PatternVector:
         """Entry of the ratio of a pattern that is not the first."""
         return int(self.entries(row)[1]) + 1
 
-    def in_common(self, deviations: np.ndarray) -> np.ndarray:
+    def shared_covariance(self, deviations: np.ndarray) -> np.ndarray:
         """(k, k) covariance with these standard deviations (k,) if all brushes change together.
 
         A ratio to the first brush changes by itself.
@@ -89,7 +89,7 @@ class PatternVector:
         """(k, k) covariance of the entries between jobs, most of it in all brushes alike."""
         deviations = np.array([c.between_jobs for c in self.coordinates])
         own = np.diag(deviations**2)
-        return IN_COMMON * self.in_common(deviations) + (1.0 - IN_COMMON) * own
+        return SHARED_VARIANCE * self.shared_covariance(deviations) + (1.0 - SHARED_VARIANCE) * own
 
     def of_patterns(self, vectors: np.ndarray) -> np.ndarray:
         """(n, B, 7) coordinates of each pattern for vectors (n, k); K3 may exceed 1."""
@@ -112,7 +112,7 @@ class PatternVector:
             block[[COS, SIN]] = _slopes_of_asymmetry(own[[COS, SIN]]) @ asymmetry
         return found
 
-    def out_of(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def subset(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The entries (k,) of some of the brushes, and their derivative (k, n) by those of all."""
         rows = [whole.brushes.index(number) for number in self.brushes]
         slope = np.zeros((len(self), len(whole)))

@@ -1,4 +1,4 @@
-"""What a fit has learned: the prior of the next job, and models drawn from it."""
+"""The posterior of a fit: the prior of the next job, and models drawn from it."""
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -34,7 +34,7 @@ def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None)
 def of_brushes(
     known: Posterior | None, given: DepositionModel, start: DepositionModel
 ) -> Posterior | None:
-    """What is known of the brushes that painted a campaign.
+    """The posterior of the brushes that painted a campaign.
 
     Where nothing was calibrated, a model with several brushes still says how they differ: their
     level and size are open, and each may differ from the others as much as jobs do.
@@ -51,7 +51,7 @@ def of_brushes(
         return None
     deviations = np.array([c.between_jobs for c in kept.coordinates])
     width = np.array([c.width for c in kept.coordinates])
-    covariance = kept.in_common(width) + np.diag(deviations**2)
+    covariance = kept.shared_covariance(width) + np.diag(deviations**2)
     names = [c.name for c in kept.coordinates]
     return Posterior.of(names, np.array(kept.encode(start.patterns)), covariance)
 
@@ -62,7 +62,7 @@ def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Post
         return known
     names = [c.name for c in whole.coordinates]
     of_effects = [name for name in known.names if name not in names]
-    entries, slope = kept.out_of(whole, np.array([known.mean[name] for name in names]))
+    entries, slope = kept.subset(whole, np.array([known.mean[name] for name in names]))
     mean = np.concatenate([entries, [known.mean[name] for name in of_effects]])
     linear = block_diag(slope, np.eye(len(of_effects)))
     order = [known.names.index(name) for name in (*names, *of_effects)]
@@ -84,7 +84,7 @@ def usable(
     twice = [e.name for e in campaign.experiments if e.taken.fingerprint in behind]
     if twice:
         return None, (
-            f'What the model file knows of the pattern rests on the readings of '
+            f'The posterior of the model file rests on the readings of '
             f'{", ".join(twice)} themselves and is not used; give the model that was calibrated '
             'without them.',
         )
@@ -102,19 +102,19 @@ def fingerprints(campaign: Campaign) -> tuple[str, ...]:
     return tuple(experiment.taken.fingerprint for experiment in campaign.experiments)
 
 
-# Values of a learned curve so many knots apart are hardly off together.
+# Values of a learned curve so many knots apart have nearly independent errors.
 KNOTS_TOGETHER = 2.0
-# A posterior of which less than one draw in so many is physical belongs to another model.
+# If fewer draws than one in so many are physical, the posterior belongs to another model.
 MOST_ROUNDS = 1000
 
 
-def drawn(
+def draw_models(
     model: DepositionModel, posterior: Posterior, count: int, seed: int
 ) -> list[DepositionModel]:
     """So many models from the posterior of a model, the normal distribution within its bounds.
 
-    Draws with a value outside its bounds are drawn anew: none is unphysical, and none piles up at
-    a bound. Learned curves vary within their band, by themselves.
+    Draws with a value outside its bounds are repeated, so that none pile up at a bound. Learned
+    curves vary independently, within their band.
 
     Args:
         model: that the posterior belongs to; it has every effect that the posterior names.
@@ -148,12 +148,12 @@ def drawn(
         )
     models = [parameters.decode(vector) for vector in vectors[:count]]
     return [
-        one.model_copy(update={'effects': tuple(_bent(effect, rng) for effect in one.effects)})
+        one.model_copy(update={'effects': tuple(_draw_curve(law, rng) for law in one.effects)})
         for one in models
     ]
 
 
-def _bent(effect: Effect, rng: np.random.Generator) -> Effect:
+def _draw_curve(effect: Effect, rng: np.random.Generator) -> Effect:
     """A learned curve drawn from its band; any other effect as it is."""
     if not (isinstance(effect, LearnedCurve) and effect.sd):
         return effect

@@ -1,8 +1,8 @@
-"""Random effects: by how much parts and gauge sessions differ for reasons that carry no meaning.
+"""Random effects: differences between parts and gauge sessions that have no cause of interest.
 
-They are drawn anew for every part and session. Only differences count: what all have in common
+They are independent for every part and session. Only differences count: what all have in common
 is for K1 and the effects to explain. A part that was painted with something switched off has a
-level of its own, which says nothing of the others.
+level of its own, independent of the others.
 """
 
 from dataclasses import dataclass

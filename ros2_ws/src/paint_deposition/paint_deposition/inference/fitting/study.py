@@ -32,9 +32,9 @@ LEAST_FACETS, WORTH_REPORTING, FACETS_OFF = 0.1, 1.0, 0.5
 
 @dataclass(frozen=True)
 class Texture:
-    """The film's own variation from spot to spot, which no model follows.
+    """The film's own variation from spot to spot, which no model predicts.
 
-    Repeats at one spot do not average it out, and no gauge is to blame for it.
+    Repeats at one spot do not average it out, and it is no error of the gauge.
 
     Attributes:
         share: standard deviation as a share of the film.

@@ -24,7 +24,7 @@ ASSUMED_FREEDOM = 5.0
 # is estimated from few repeats, the limit is the quantile of Student's t that sound readings
 # exceed with this probability.
 GROSS_SIGMAS = 5.0
-GROSS_CHANCE = 1e-4
+GROSS_PROBABILITY = 1e-4
 # The scale is at least this share of the usual noise: a display in whole um shows many repeats
 # without any scatter.
 LEAST_SCALE = 0.5
@@ -122,7 +122,7 @@ class _Repeats:
         return np.sqrt(squares / freedom), freedom
 
     def _beyond(self, scale: float, freedom: float) -> np.ndarray:
-        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_CHANCE)))
+        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_PROBABILITY)))
         far = self.distance > sigmas * max(scale, LEAST_SCALE)
         outliers = np.bincount(self.owner, far)
         undecided = 2.0 * outliers >= self.count

@@ -40,10 +40,10 @@ def refuse_off_surface(
             f"point '{readings.point[means.first[worst]]}' at ({where}) m by "
             f'{distance_m[worst]:.3f} m (limit {MAX_DISTANCE_M:g}); {_hint(surface, places_m)}'
         )
-    # Readings that huddle on a spot of the part, and fit if they are a thousand times larger.
+    # Readings clustered on a spot of the part, and fit if they are a thousand times larger.
     longest = np.ptp(surface.vertices_m, axis=0).max()
-    huddled = len(places_m) > 1 and np.ptp(places_m, axis=0).max() < SPOT * longest
-    if huddled and _fits(surface, 1000.0 * places_m):
+    clustered = len(places_m) > 1 and np.ptp(places_m, axis=0).max() < SPOT * longest
+    if clustered and _fits(surface, 1000.0 * places_m):
         hint = _hint(surface, places_m)
         raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
 

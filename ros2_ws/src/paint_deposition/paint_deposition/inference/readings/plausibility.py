@@ -106,7 +106,7 @@ def check_panel(
         )
 
 
-def check_units_beside(
+def check_units_against_fit(
     readings: Readings, measured_um: np.ndarray, expected_um: np.ndarray
 ) -> None:
     """Refuse points that agree with a robust fit if they are taken for another unit.

@@ -14,7 +14,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
-from paint_deposition.inference.comparison.residual_field import reached, spreading
+from paint_deposition.inference.comparison.residual_field import interpolation_matrix, reached
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise
 from paint_deposition.inference.readings.residuals import Residuals
@@ -107,7 +107,7 @@ class ModelComparison(PaintingNode):
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
         radius_m = self.values['color_radius_m']
-        self._spreading = spreading(self.surface, places, normals, radius_m)
+        self._spreading = interpolation_matrix(self.surface, places, normals, radius_m)
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:

@@ -84,7 +84,7 @@ class PassesAction:
             message=planned.sentence,
             path=path,
             passes=len(planned.passes),
-            index_m=planned.placing.index_m,
+            index_m=planned.placement.index_m,
             speed_m_per_s=planned.style.speed_m_per_s,
             duration_s=planned.cycle_time_s,
             mean_um=planned.mean_um,

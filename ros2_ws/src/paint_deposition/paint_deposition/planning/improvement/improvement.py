@@ -18,16 +18,16 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import evenness
 from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT
 from paint_deposition.planning.improvement.programme import Programme, speed_along
-from paint_deposition.planning.improvement.quadratic_program import WORDS
+from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.improvement.retiming import Retiming
 from paint_deposition.planning.requests import ImproveRequest
 
 DEFAULT_TOLERANCE = 0.1
-# Bag and robot program lay the same film to this share of the peak.
+# The films of bag and robot program should agree to this share of the peak.
 ALIKE = 2e-3
-# A mean film further from the target than this share is warned of.
+# A mean film further from the target than this share gives a warning.
 OFF_TARGET = 0.02
-# The new speed is sampled so often along a pass.
+# Samples of the new speed along a pass.
 SAMPLES = 60
 # Smaller shifts of a trigger are left out of the sentence [m].
 LEAST_SHIFT_M = 0.002
@@ -35,8 +35,8 @@ LEAST_PASS_M = 0.05
 
 
 @dataclass(frozen=True)
-class LaidFilm:
-    """A film on the target region, and what it took."""
+class FilmSummary:
+    """A film on the target region, and the paint and time spent on it."""
 
     film_um: np.ndarray  # (V,) at the vertices of the surface
     # Mean, and standard deviation over it, weighted by area.
@@ -60,12 +60,12 @@ class LaidFilm:
         band_um: tuple[float, float],
         emitted_cm3: float,
         trajectory: Trajectory,
-    ) -> 'LaidFilm':
-        """Sum a film up; ``target_region`` (V,) bool, ``band_um`` least and greatest good film."""
+    ) -> 'FilmSummary':
+        """Summarise a film; ``target_region`` (V,) bool, ``band_um`` the tolerance band."""
         film, area = film_um[target_region], surface.vertex_areas_m2[target_region]
         path, _ = spray_path(trajectory)
         good = (film >= band_um[0]) & (film <= band_um[1])
-        return LaidFilm(
+        return FilmSummary(
             film_um, *evenness(film, area), float(film.min()), float(film.max()),
             float((area / area.sum())[good].sum()), emitted_cm3,
             float(surface.vertex_areas_m2 @ film_um),
@@ -99,7 +99,7 @@ class PassChange:
     def sentence(self) -> str:
         """The change in a line."""
         before, after = self.speed_m_per_s
-        said = [
+        parts = [
             f'{before:.3f} to {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
             f'{self.fastest_m_per_s:.3f} m/s'
         ]
@@ -109,12 +109,12 @@ class PassChange:
         ):
             if abs(metres) >= LEAST_SHIFT_M:
                 side = sides[metres < 0.0]
-                said.append(
+                parts.append(
                     f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
                 )
         if abs(self.flow[1] - self.flow[0]) > 5e-4:
-            said.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
-        return f'pass {self.number}: ' + '; '.join(said)
+            parts.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
+        return f'pass {self.number}: ' + '; '.join(parts)
 
     def to_dict(self) -> dict[str, Any]:
         """The figures by name, with the sentence."""
@@ -127,28 +127,28 @@ class Improvement:
 
     Attributes:
         surface: the part. target_region: (V,) bool, the side whose film counts.
-        model: what the gun sprays. request: what was wanted and allowed.
-        given: the motion as it was; trajectory: the improved one as its bag was read back.
+        model: what the gun sprays. request: objective and limits.
+        original: the motion as it was; trajectory: the improved one as its bag was read back.
         moves: the improved one as moves of a robot program.
         retiming: how it was found.
         before, after: films of both motions.
         program_difference: largest difference between the films of the robot program and of the
             bag, both read back, as a share of the greatest film.
-        odd: what is odd in how the gun runs over the part, with its likely cause.
+        geometry_warnings: oddities of the motion over the part, each with its likely cause.
     """
 
     surface: Surface
     target_region: np.ndarray
     model: DepositionModel
     request: ImproveRequest
-    given: Trajectory
+    original: Trajectory
     trajectory: Trajectory
     moves: Sequence[Move]
     retiming: Retiming
-    before: LaidFilm
-    after: LaidFilm
+    before: FilmSummary
+    after: FilmSummary
     program_difference: float
-    odd: tuple[str, ...] = ()
+    geometry_warnings: tuple[str, ...] = ()
 
     @property
     def target_um(self) -> float:
@@ -176,21 +176,25 @@ class Improvement:
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
         """What changes, pass by pass."""
-        return changes(self.retiming.given, self.retiming.programme)
+        return changes(self.retiming.original, self.retiming.programme)
 
     @cached_property
     def paths(self) -> tuple[SprayPath, SprayPath]:
         """Both motions cut into sub-steps."""
-        return spray_path(self.given)[0], spray_path(self.trajectory)[0]
+        return spray_path(self.original)[0], spray_path(self.trajectory)[0]
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
-        found = list(self.odd)
+        found = list(self.geometry_warnings)
         off = self.after.mean_um / self.target_um - 1.0
         if abs(off) > OFF_TARGET:
             thick = off > 0.0
-            other = (WORDS['slowest'],) if thick else (WORDS[ROBOT], WORDS[BEND], WORDS[LEAD])
+            other = (
+                (LIMIT_NAMES['slowest'],)
+                if thick
+                else (LIMIT_NAMES[ROBOT], LIMIT_NAMES[BEND], LIMIT_NAMES[LEAD])
+            )
             names = [name for name in self.retiming.binding if name not in other]
             remedy = (
                 'a greater speed (speed_max_m_per_s) or a lower flow (flow)'
@@ -206,7 +210,7 @@ class Improvement:
         if self.program_difference > ALIKE:
             found.append(
                 f'the film of the robot program differs from that of the bag by '
-                f'{100 * self.program_difference:.2f} % of the peak: its moves are long against '
+                f'{100 * self.program_difference:.2f} % of the peak: its moves are too long for '
                 'the changes of speed; allow shorter ones (move_min_m, settings_per_s) or more '
                 'smoothness'
             )
@@ -232,7 +236,7 @@ class Improvement:
     def limit_sentences(self) -> tuple[str, ...]:
         """Which limits keep the film from being more even, a line each."""
         found = [
-            f'held back by {limit.name}: sigma_n {100 * limit.sigma_n:.1f} % without it'
+            f'limited by {limit.name}: sigma_n {100 * limit.sigma_n:.1f} % without it'
             for limit in self.retiming.binding_limits
         ]
         found.append(
@@ -268,24 +272,25 @@ class Improvement:
         }
 
 
-def changes(given: Programme, improved: Programme) -> tuple[PassChange, ...]:
+def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
     """The changes of all passes; a pass is a straight stretch with the gun open."""
-    path, _ = spray_path(given.trajectory())
+    path, _ = spray_path(original.trajectory())
     begins = 1 + np.flatnonzero(np.diff(path.stroke))
-    turns = given.travel_at_m(path.stamp_ns[begins]) - path.from_turn_m[begins]
+    turns = original.travel_at_m(path.stamp_ns[begins]) - path.from_turn_m[begins]
     found: list[PassChange] = []
-    for before, after in zip(given.openings, improved.openings, strict=True):
+    for before, after in zip(original.openings, improved.openings, strict=True):
         inside = turns[(turns > after.on_m + LEAST_PASS_M) & (turns < after.off_m - LEAST_PASS_M)]
         ends = [after.on_m, *inside.tolist(), after.off_m]
         for first, last in pairwise(ends):
             earlier = before.on_m - after.on_m if first == after.on_m else 0.0
             later = after.off_m - before.off_m if last == after.off_m else 0.0
             whole = np.array([first, last])
+            old, new = (float(speed_along(p, whole)[0]) for p in (original, improved))
             speed = speed_along(improved, np.linspace(first, last, SAMPLES + 1))
             found.append(
                 PassChange(
                     len(found) + 1,
-                    (float(speed_along(given, whole)[0]), float(speed_along(improved, whole)[0])),
+                    (old, new),
                     float(speed.min()), float(speed.max()), earlier, later,
                     earlier / float(speed[0]), later / float(speed[-1]),
                     (before.flow, after.flow),

@@ -39,17 +39,17 @@ class Nodes:
         return len(self.travel_m)
 
     @property
-    def paired(self) -> np.ndarray:
-        """(k,) nodes that are followed by one of the same opening."""
+    def followed(self) -> np.ndarray:
+        """(k,) nodes with a next one in the same opening."""
         return np.flatnonzero(self.opening[1:] == self.opening[:-1])
 
     @property
     def weights_m(self) -> np.ndarray:
         """(n,) length that each node stands for: slowness times this sums to the time."""
-        steps = np.diff(self.travel_m)[self.paired]
+        steps = np.diff(self.travel_m)[self.followed]
         weights = np.zeros(len(self))
-        np.add.at(weights, self.paired, 0.5 * steps)
-        np.add.at(weights, self.paired + 1, 0.5 * steps)
+        np.add.at(weights, self.followed, 0.5 * steps)
+        np.add.at(weights, self.followed + 1, 0.5 * steps)
         return weights
 
     def rows(self, opening: int) -> slice:
@@ -124,7 +124,7 @@ class SpeedBounds:
     """(n,) greatest speed at each node [m/s], and (n,) which limit sets it."""
 
     greatest_m_per_s: np.ndarray
-    named: np.ndarray
+    limit: np.ndarray
 
 
 ROBOT, BEND, LEAD = 'speed', 'bend', 'lead'
@@ -145,16 +145,16 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
     curvature = np.linalg.norm(bend, axis=1) / BEND_M**2
     allowed = np.sqrt(limits.acceleration_m_per_s2 / np.maximum(curvature, 1e-9))
     greatest = np.full(len(nodes), limits.speed_max_m_per_s)
-    named = np.full(len(nodes), ROBOT, dtype=object)
+    limit = np.full(len(nodes), ROBOT, dtype=object)
     bent = np.maximum(allowed, programmed) < greatest
-    greatest[bent], named[bent] = np.maximum(allowed, programmed)[bent], BEND
+    greatest[bent], limit[bent] = np.maximum(allowed, programmed)[bent], BEND
     for number, ends in enumerate(zip(programme.ends_m, programme.around_m, strict=True)):
         rows = nodes.rows(number)
         for end, far, node in zip(*ends, (rows.start, rows.stop - 1), strict=True):
             fastest = _fastest_m_per_s(programme, end, far, limits)
             if fastest < greatest[node]:
-                greatest[node], named[node] = fastest, LEAD
-    return SpeedBounds(greatest, named)
+                greatest[node], limit[node] = fastest, LEAD
+    return SpeedBounds(greatest, limit)
 
 
 def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: Limits) -> float:

@@ -52,7 +52,7 @@ class Programme:
     travel_m: np.ndarray  # (N,) length of the path up to each pose
     duration_s: np.ndarray  # (N - 1,) time from each pose to the next
     openings: tuple[Opening, ...]  # in order, apart from each other
-    given: Trajectory  # the motion that it was made from
+    original: Trajectory  # the motion that it was made from
 
     @staticmethod
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':
@@ -171,7 +171,7 @@ class Programme:
             flows += [opening.flow, 0.0]
             brushes += [opening.brush] * 2
         return replace(
-            self.given,
+            self.original,
             stamps_ns=stamps,
             positions_m=whole.positions_m,
             quaternions_xyzw=whole.quaternions_xyzw,

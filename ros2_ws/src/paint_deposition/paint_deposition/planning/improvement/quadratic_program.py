@@ -18,20 +18,20 @@ from paint_deposition.errors import PlanError
 from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes, SpeedBounds
 from paint_deposition.planning.requests import ImproveRequest
 
-# The density moves by less than this share at the end; so often at most.
+# Converged when the density changes by less than this share; largest number of rounds.
 SETTLED, ROUNDS = 3e-3, 8
-# The film's bounds count this much more than evenness: they are kept where they can be.
+# Weight of the film's bounds over that of evenness: they are kept where possible.
 BOUND_WEIGHT = 100.0
-# Weight that holds the mean of the best known film at the target. How far the levels of other
-# models lie from it is left alone: even films would be given up for it.
+# Weight that holds the mean of the best known film at the target. The levels of the
+# other models are free: holding them too would cost evenness.
 LEVEL_WEIGHT = 30.0
 # Smoothness is that of slowness over this length [m].
 SLOPE_M = 0.1
 # A constraint that costs more than this, in units of sigma_n squared, binds.
 BINDS = 1e-6
-# Film outside the tolerance counts so much more.
+# Additional weight of film outside the tolerance.
 BEYOND_TOLERANCE = 3.0
-WORDS = {
+LIMIT_NAMES = {
     ROBOT: 'the greatest speed',
     BEND: 'the speed in bends',
     LEAD: 'the way to and from the opening of the gun',
@@ -42,8 +42,8 @@ WORDS = {
 }
 
 
-class Rows(NamedTuple):
-    """Constraints matrix @ x <= limit of one name."""
+class Constraint(NamedTuple):
+    """Constraints ``matrix @ x <= limit`` of one kind."""
 
     name: str
     matrix: csr_matrix
@@ -52,7 +52,7 @@ class Rows(NamedTuple):
 
 @dataclass(frozen=True)
 class Density:
-    """A solution."""
+    """A density of paint along the path: a start or a solution."""
 
     density: np.ndarray  # (n,) of the paint [s/m]
     flow: np.ndarray  # (m,) of each opening
@@ -67,17 +67,16 @@ class Density:
 class Problem:
     """What is to be minimised over densities and flows."""
 
-    # Per draw of the model, the best known first, (n, V) film for a density of 1 s/m at each node
-    # [um].
+    # For each model, the best known first: (n, V) film [um] for a density of 1 s/m at each node.
     films: Sequence[np.ndarray]
     target_um: float  # film wanted
     # Of the path.
     nodes: Nodes
     bounds: SpeedBounds
     request: ImproveRequest  # of the user
-    given_s: float  # paint of the programme [s at the calibrated flow]
-    open_ends: np.ndarray  # (n,) bool, nodes at which the gun may as well be closed
-    without: frozenset[str] = frozenset()  # names of limits that are left out
+    original_s: float  # paint of the original programme [s at the calibrated flow]
+    open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
+    left_out: frozenset[str] = frozenset()  # names of limits that are left out
 
     @property
     def size(self) -> int:
@@ -85,22 +84,22 @@ class Problem:
         return len(self.nodes) + len(self.nodes.openings)
 
     def relaxed(self) -> 'Problem':
-        """For evenness alone, by any densities of paint."""
+        """Without weights and limits, except that on the flow: for evenness alone."""
         weights = dict.fromkeys(('paint_weight', 'time_weight', 'smoothness'), 0.0)
         bounds = dict.fromkeys(('tolerance', 'film_min_um', 'film_max_um'))
         return replace(
             self,
             request=self.request.model_copy(update=weights | bounds),
             open_ends=np.ones(len(self.nodes), dtype=bool),
-            without=frozenset(WORDS) - {'flow'},
+            left_out=frozenset(LIMIT_NAMES) - {'flow'},
         )
 
 
-def solved(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
-    """Minimise, from a start that sets where tangents are taken first, in so many rounds at most.
+def solve(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
+    """Minimise in ``rounds`` at most; the first tangents are taken at the start.
 
     Raises:
-        PlanError: the limits contradict each other; names one that does.
+        PlanError: the limits contradict each other; names one of them.
     """
     now = start
     for _ in range(rounds):
@@ -115,9 +114,11 @@ def solved(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
 def _step(problem: Problem, now: Density) -> Density:
     constraints = _constraints(problem, now)
     matrix, linear = _objective(problem, now)
-    answer = _minimised(matrix, linear, constraints)
+    answer = _minimise(matrix, linear, constraints)
     if answer is None:
-        raise PlanError(f'no motion along this path keeps {_culprit(matrix, linear, constraints)}')
+        raise PlanError(
+            f'no motion along this path keeps {_infeasible_limit(matrix, linear, constraints)}'
+        )
     values, multipliers = answer
     count = len(problem.nodes)
     # A multiplier times a density is what its limit costs, in the units of the objective.
@@ -125,7 +126,9 @@ def _step(problem: Problem, now: Density) -> Density:
     names = np.repeat(
         [rows.name for rows in constraints], [r.matrix.shape[0] for r in constraints]
     )
-    binding = [name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in WORDS]
+    binding = [
+        name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in LIMIT_NAMES
+    ]
     flow = values[count:]
     if not problem.request.flow_is_free:
         flow = np.array([opening.flow for opening in problem.nodes.openings])
@@ -152,12 +155,12 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
             matrix[:count, :count] += share * weight * some @ some.T
             linear[:count] -= share * weight * (1.0 + edge) * some.sum(axis=1)
     weights = nodes.weights_m
-    linear[:count] += request.paint_weight * weights / problem.given_s
+    linear[:count] += request.paint_weight * weights / problem.original_s
     flow = now.flow[nodes.opening]
-    linear[:count] += request.time_weight * weights / (flow * problem.given_s)
+    linear[:count] += request.time_weight * weights / (flow * problem.original_s)
     seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
-    linear[count:] -= request.time_weight * seconds / (now.flow * problem.given_s)
-    pairs = nodes.paired
+    linear[count:] -= request.time_weight * seconds / (now.flow * problem.original_s)
+    pairs = nodes.followed
     mean = float(weights @ now.density / weights.sum())
     unit = np.eye(problem.size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
@@ -185,19 +188,22 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     return [hinge for hinge in found if hinge[0].any()]
 
 
-def _constraints(problem: Problem, now: Density) -> list[Rows]:
+def _constraints(problem: Problem, now: Density) -> list[Constraint]:
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
     unit = identity(problem.size, format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest = problem.bounds.greatest_m_per_s
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
-    rows = [Rows('slowest', y - diags(1.0 / least) @ f), Rows('positive', -y[closable])]
+    rows = [
+        Constraint('slowest', y - diags(1.0 / least) @ f),
+        Constraint('positive', -y[closable]),
+    ]
     for name in (ROBOT, BEND, LEAD):  # y >= f / v
-        some = np.flatnonzero((problem.bounds.named == name) & ~closable)
-        rows.append(Rows(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
+        some = np.flatnonzero((problem.bounds.limit == name) & ~closable)
+        rows.append(Constraint(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
     # Nodes from which the gun sprays on to the next one for certain.
-    pairs = nodes.paired
+    pairs = nodes.followed
     pairs = pairs[~closable[pairs] & ~closable[pairs + 1]]
     reach = limits.acceleration_m_per_s2 * (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs])
     rise = y[pairs + 1] - y[pairs]
@@ -205,7 +211,7 @@ def _constraints(problem: Problem, now: Density) -> list[Rows]:
         # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
         ratio = now.slowness(nodes)[node]
         most = diags(3.0 * reach * ratio**2) @ y[node] - diags(2.0 * reach * ratio**3) @ f[pairs]
-        rows += [Rows('acceleration', rise - most), Rows('acceleration', -rise - most)]
+        rows += [Constraint('acceleration', rise - most), Constraint('acceleration', -rise - most)]
     # y^4 / f^3, for the change of slowness by the jerk alone.
     inner = pairs[:-1][np.diff(pairs) == 1] + 1
     reach = (
@@ -214,17 +220,17 @@ def _constraints(problem: Problem, now: Density) -> list[Rows]:
     ratio = now.slowness(nodes)[inner]
     bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
     most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
-    rows += [Rows('jerk', bend - most), Rows('jerk', -bend - most)]
+    rows += [Constraint('jerk', bend - most), Constraint('jerk', -bend - most)]
     given = np.array([opening.flow for opening in nodes.openings])
-    rows.append(Rows('flow', unit[count:], limits.flow[1] * given))
-    rows.append(Rows('flow', -unit[count:], -limits.flow[0] * given))
-    return [row for row in rows if row.matrix.shape[0] and row.name not in problem.without]
+    rows.append(Constraint('flow', unit[count:], limits.flow[1] * given))
+    rows.append(Constraint('flow', -unit[count:], -limits.flow[0] * given))
+    return [row for row in rows if row.matrix.shape[0] and row.name not in problem.left_out]
 
 
-def _minimised(
-    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Rows]
+def _minimise(
+    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Constraint]
 ) -> tuple[np.ndarray, np.ndarray] | None:
-    """The solution and the multipliers of all constraints, or None where none keeps them."""
+    """The solution and the multipliers of all constraints, or None if infeasible."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
     limit = np.concatenate(
@@ -242,9 +248,11 @@ def _minimised(
     return np.array(answer.x), np.array(answer.z)
 
 
-def _culprit(matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Rows]) -> str:
+def _infeasible_limit(
+    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Constraint]
+) -> str:
     for name in dict.fromkeys(rows.name for rows in constraints):
         others = [rows for rows in constraints if rows.name != name]
-        if name in WORDS and _minimised(matrix, linear, others) is not None:
-            return f'{WORDS[name]} with the other limits; allow more'
+        if name in LIMIT_NAMES and _minimise(matrix, linear, others) is not None:
+            return f'{LIMIT_NAMES[name]} with the other limits; allow more'
     return 'the limits; allow more'

@@ -11,18 +11,23 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.films import FilmAtPoints, stratified_sample
 from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
 from paint_deposition.planning.improvement.programme import Opening, Programme
-from paint_deposition.planning.improvement.quadratic_program import WORDS, Density, Problem, solved
+from paint_deposition.planning.improvement.quadratic_program import (
+    LIMIT_NAMES,
+    Density,
+    Problem,
+    solve,
+)
 from paint_deposition.planning.requests import ImproveRequest
 
 # Nodes per width of the pattern, within bounds.
 NODES_PER_SIGMA = 2.0
 FINEST_M, COARSEST_M = 0.015, 0.05
-# The film of the solution and the one that is laid agree to this share of the target.
-AGREED, ROUNDS = 5e-4, 4
-# Rounds of the solver for what need not be exact: triggers, and what limits cost.
-ROUGHLY = 3
-# A limit is named whose absence would lower sigma_n by this share.
-NAMED = 0.02
+# The film of the solution and that of the timed programme agree to this share of the target.
+FILM_AGREEMENT, ROUNDS = 5e-4, 4
+# Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
+ROUGH_ROUNDS = 3
+# A limit is reported if sigma_n without it would be lower by this share.
+NAMED_GAIN = 0.02
 # An opening is not cut to less than this share of its length.
 LEAST_SHARE = 0.3
 # It is extended only where the path runs on straight, at nearly the speed of its end.
@@ -42,7 +47,7 @@ class BindingLimit:
 class Retiming:
     """A programme with new times and openings."""
 
-    given: Programme  # the programme as it was
+    original: Programme  # the programme as it was
     programme: Programme  # the new one
     target_um: float  # mean film aimed at
     binding: tuple[str, ...]  # names of all limits that bind
@@ -60,15 +65,15 @@ def retime_for_evenness(
     models: Sequence[DepositionModel],
     request: ImproveRequest,
     progress: Callable[[str, float], None] = lambda what, share: None,
-    explained: bool = True,
+    explain: bool = True,
 ) -> Retiming:
     """Choose speeds, flows and triggers along the path of a programme.
 
     The film at points spread evenly over the target region, (V,) bool, is linear in the density of
     paint along the path: a quadratic program gives the best one. Effects that depend on speed,
-    time or film are followed by solving again about the film of the last solution. The models are
-    equally likely, the first is the best known. ``explained`` finds out which limits cost
-    evenness, and how even the path could be.
+    time or film are updated by solving again about the film of the last solution. The models are
+    equally likely, the first is the best known. ``explain`` also determines which limits cost
+    evenness, and how even the film along this path could be.
 
     Raises:
         PlanError: the limits contradict each other.
@@ -81,14 +86,14 @@ def retime_for_evenness(
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
     search = _Search(programme, films, target, target / mean, request, spacing, progress)
-    return search.retiming(explained)
+    return search.retiming(explain)
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The programme as given, and what is wanted of it; ``level`` is target over mean film."""
+    """The original programme and the request; ``level`` is the target over its mean film."""
 
-    given: Programme
+    original: Programme
     films: Sequence[FilmAtPoints]
     target_um: float
     level: float
@@ -96,18 +101,18 @@ class _Search:
     spacing_m: float
     progress: Callable[[str, float], None]
 
-    def retiming(self, explained: bool) -> Retiming:
-        """Choose where the gun opens, then solve and lay the film until both agree."""
+    def retiming(self, explain: bool) -> Retiming:
+        """Choose where the gun opens; then solve and simulate in turn until both films agree."""
         self.progress('triggers', 0.0)
-        wide = replace(self.given, openings=widened(self.given, self.request))
+        wide = replace(self.original, openings=widened(self.original, self.request))
         nodes = Nodes.of(wide.openings, self.spacing_m)
-        open_ends = _may_be_closed(nodes, self.given.openings, self.request)
-        programme, relaxed = self.given, None
+        open_ends = _may_be_closed(nodes, self.original.openings, self.request)
+        programme, relaxed = self.original, None
         if open_ends.any():
             relaxed, density = self._problem(wide, nodes, None, open_ends)
-            density = solved(relaxed, density, ROUGHLY)
+            density = solve(relaxed, density, ROUGH_ROUNDS)
             chosen = _openings(
-                nodes, density.density, open_ends, relaxed.bounds, self.given.openings,
+                nodes, density.density, open_ends, relaxed.bounds, self.original.openings,
                 self.request,
             )  # fmt: skip
             programme = replace(programme, openings=chosen)
@@ -117,45 +122,45 @@ class _Search:
         for round_ in range(ROUNDS):
             self.progress('speeds', round_ / ROUNDS)
             problem, start = self._problem(programme, nodes, found, closed)
-            found = solved(problem, start)
+            found = solve(problem, start)
             timed = self._timed(programme, nodes, found)
             laid = [one.film_um(timed) for one in self.films]
             expected = [found.density @ films for films in problem.films]
             off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
-            if off <= AGREED * self.target_um:
+            if off <= FILM_AGREEMENT * self.target_um:
                 break
         assert found is not None
         limits: tuple[BindingLimit, ...] = ()
         of_path = now = _sigma_n(laid)
-        if explained:
+        if explain:
             limits = self._binding_limits(problem, found, now)
             free = [_solved_sigma_n(problem.relaxed(), found)]
             if relaxed is not None:
                 free.append(_solved_sigma_n(relaxed.relaxed(), density))
             of_path = min(now, *free)
-        names = tuple(WORDS[name] for name in found.binding)
-        return Retiming(self.given, timed, self.target_um, names, limits, of_path)
+        names = tuple(LIMIT_NAMES[name] for name in found.binding)
+        return Retiming(self.original, timed, self.target_um, names, limits, of_path)
 
     def _problem(
         self, programme: Programme, nodes: Nodes, density: Density | None, open_ends: np.ndarray
     ) -> tuple[Problem, Density]:
         """The problem about a density; without one, about even speeds."""
-        given = self.given
-        bounds = speed_bounds(replace(given, openings=programme.openings), nodes, self.request)
-        now = density or self._even(nodes)
+        original = self.original
+        bounds = speed_bounds(replace(original, openings=programme.openings), nodes, self.request)
+        now = density or self._mean_density(nodes)
         timed = self._timed(programme, nodes, now)
         films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
-        flow = np.array([opening.flow for opening in given.openings])
-        sprayed_s = self.level * float(flow @ np.diff(given.seconds_at(given.ends_m))[:, 0])
+        flow = np.array([opening.flow for opening in original.openings])
+        sprayed_s = self.level * float(flow @ np.diff(original.seconds_at(original.ends_m))[:, 0])
         return Problem(
             films, self.target_um, nodes, bounds, self.request, sprayed_s, open_ends
         ), now
 
-    def _even(self, nodes: Nodes) -> Density:
-        """The mean density of each opening as it was given, times the level."""
+    def _mean_density(self, nodes: Nodes) -> Density:
+        """The original mean density of each opening, times the level."""
         flow = np.array([opening.flow for opening in nodes.openings])
-        ends, request = self.given.ends_m, self.request
-        seconds = np.diff(self.given.seconds_at(ends))[:, 0]
+        ends, request = self.original.ends_m, self.request
+        seconds = np.diff(self.original.seconds_at(ends))[:, 0]
         slowness = np.clip(
             self.level * seconds / np.diff(ends)[:, 0],
             1.0 / request.speed_max_m_per_s,
@@ -177,14 +182,14 @@ class _Search:
         limits = []
         for number, name in enumerate(found.binding):
             self.progress('limits', number / len(found.binding))
-            without = _solved_sigma_n(replace(problem, without=frozenset({name})), found)
-            if without < (1.0 - NAMED) * sigma_n:
-                limits.append(BindingLimit(WORDS[name], without))
+            relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
+            if relaxed < (1.0 - NAMED_GAIN) * sigma_n:
+                limits.append(BindingLimit(LIMIT_NAMES[name], relaxed))
         return tuple(sorted(limits, key=lambda limit: limit.sigma_n))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
-    density = solved(problem, start, ROUGHLY).density
+    density = solve(problem, start, ROUGH_ROUNDS).density
     return _sigma_n([density @ films for films in problem.films])
 
 
@@ -214,7 +219,7 @@ def widened(programme: Programme, request: ImproveRequest) -> tuple[Opening, ...
 
 
 def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -> float:
-    """How far the path runs on from an end, straight and steadily."""
+    """How far the path continues from an end, straight and at a steady speed."""
     if most_m <= 0.0:
         return 0.0
     way = np.linspace(0.0, most_m, CHECKS + 1)
@@ -230,13 +235,13 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
 
 
 def _may_be_closed(
-    nodes: Nodes, given: tuple[Opening, ...], request: ImproveRequest
+    nodes: Nodes, original: tuple[Opening, ...], request: ImproveRequest
 ) -> np.ndarray:
-    """(n,) bool, nodes so near the given ends that the gun may be closed there."""
+    """(n,) bool, nodes so near the original ends that the gun may be closed there."""
     near = np.zeros(len(nodes), dtype=bool)
     if not request.trigger_cut_m and not request.trigger_shift_m:
         return near
-    for number, opening in enumerate(given):
+    for number, opening in enumerate(original):
         rows = nodes.rows(number)
         cut = _most_cut_m(opening, request)
         place = nodes.travel_m[rows]
@@ -249,7 +254,7 @@ def _openings(
     density: np.ndarray,
     open_ends: np.ndarray,
     bounds: SpeedBounds,
-    given: tuple[Opening, ...],
+    original: tuple[Opening, ...],
     request: ImproveRequest,
 ) -> tuple[Opening, ...]:
     """Openings that begin and end where the relaxed density reaches half of the least possible."""
@@ -259,11 +264,11 @@ def _openings(
         place = nodes.travel_m[rows]
         least = opening.flow / bounds.greatest_m_per_s[rows]
         worth = (density[rows] - 0.5 * least) / least
-        cut = _most_cut_m(given[number], request)
+        cut = _most_cut_m(original[number], request)
         kept = np.flatnonzero(~open_ends[rows] | (worth > 0.0))
         first, last = int(kept[0]), int(kept[-1])
-        on = min(_crossing_m(place, worth, first, first - 1), given[number].on_m + cut)
-        off = max(_crossing_m(place, worth, last, last + 1), given[number].off_m - cut)
+        on = min(_crossing_m(place, worth, first, first - 1), original[number].on_m + cut)
+        off = max(_crossing_m(place, worth, last, last + 1), original[number].off_m - cut)
         found.append(replace(opening, on_m=on, off_m=off))
     return tuple(found)
 
@@ -274,7 +279,7 @@ def _most_cut_m(opening: Opening, request: ImproveRequest) -> float:
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:
-    """Where the worth vanishes between a node and the next one outward."""
+    """Where the worth crosses zero between a node and the next one outward."""
     if not 0 <= outside < len(place_m):
         return float(place_m[inside])
     share = max(worth[inside], 0.0) / max(worth[inside] - worth[outside], 1e-12)

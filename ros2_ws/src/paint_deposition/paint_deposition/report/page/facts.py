@@ -24,7 +24,7 @@ CHECKS = {
 }
 
 
-def explained(rows: list[dict]) -> str:
+def effect_meanings(rows: list[dict]) -> str:
     return ' '.join(f'{words.capital(row["name"])}: {row["meaning"]}' for row in rows)
 
 
@@ -34,7 +34,7 @@ def with_confounded(row: dict) -> str:
     return f'{row["name"]} (or {words.joined(row["others"], "or")})'
 
 
-def sure(rows: list[dict]) -> str:
+def accepted_words(rows: list[dict]) -> str:
     """How probable each of the effects is; a learned law names none."""
     found = []
     for row in rows:
@@ -49,14 +49,14 @@ def sure(rows: list[dict]) -> str:
     return ' '.join(found)
 
 
-def chance(diagnosis: Diagnosis) -> str:
+def p_value_sentence(diagnosis: Diagnosis) -> str:
     if not diagnosis.p_value < 1.0:
         return ''
     share = 'fewer than 0.1 %' if diagnosis.p_value < 1e-3 else f'{100 * diagnosis.p_value:.2g} %'
     return f'If nothing were missing, readings would look this suspicious in {share} of cases.'
 
 
-def costs(data: ReportData, diagnosis: Diagnosis) -> str:
+def cost_of_missing(data: ReportData, diagnosis: Diagnosis) -> str:
     """By how much predictions are wrong without each effect that was added."""
     found = []
     for before, step in pairwise(diagnosis.history):
@@ -86,15 +86,15 @@ def learned(data: ReportData, diagnosis: Diagnosis, what: str) -> str:
 
 def left_out(data: ReportData) -> str:
     """Slips among the readings, with what was probably meant."""
-    slips = []
-    for slip in data.study.outliers:
-        where, guess_um = slip.point.replace(': ', ' '), slip.guess_um
+    outliers = []
+    for outlier in data.study.outliers:
+        where, guess_um = outlier.point.replace(': ', ' '), outlier.guess_um
         meant = '' if guess_um is None else f' (was it {words.micrometres(guess_um)}?)'
-        slips.append(
-            f'{words.micrometres(slip.thickness_um)} at {where}, where '
-            f'{words.micrometres(slip.expected_um)} is expected{meant}'
+        outliers.append(
+            f'{words.micrometres(outlier.thickness_um)} at {where}, where '
+            f'{words.micrometres(outlier.expected_um)} is expected{meant}'
         )
-    return f'The fit is without {words.joined(slips)}. Measure there again.' if slips else ''
+    return f'The fit is without {words.joined(outliers)}. Measure there again.' if outliers else ''
 
 
 def changes(data: ReportData, diagnosis: Diagnosis) -> str:
@@ -132,12 +132,12 @@ def with_article(name: str) -> str:
     return f'a {words.effect_name(name)}' if words.is_learned(name) else words.effect_name(name)
 
 
-def blind(diagnosis: Diagnosis) -> str:
+def not_testable(diagnosis: Diagnosis) -> str:
     names = [words.effect_name(e) for e in diagnosis.not_testable]
     return f'Not testable with these readings: {words.joined(names)}.' if names else ''
 
 
-def to_do(data: ReportData) -> str:
+def next_steps(data: ReportData) -> str:
     """The spray that settles most."""
     _, sprays = data.proposals
     if not sprays:
@@ -151,5 +151,5 @@ def to_use(data: ReportData, named: list[dict]) -> str:
         CHECKS.get(one, '') for row in named for one in (row['id'], *row['like'])
     )
     plan = 'Simulate and plan with model.yaml of this folder: it holds what was missing.'
-    settle = to_do(data) if data.proposals[1] and any(row['others'] for row in named) else ''
+    settle = next_steps(data) if data.proposals[1] and any(row['others'] for row in named) else ''
     return ' '.join(filter(None, [*checks, plan, settle]))

@@ -61,10 +61,10 @@ def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     rows = facts.accepted_rows(data)
     named = [row for row in rows if not words.is_learned(row['id'])]
     answers = (
-        ('What is missing', facts.explained(named)),
-        ('What it costs', facts.costs(data, diagnosis)),
+        ('What is missing', facts.effect_meanings(named)),
+        ('What it costs', facts.cost_of_missing(data, diagnosis)),
         ('What to do', facts.to_use(data, named)),
-        ('How sure', f'{facts.sure(rows)} {facts.chance(diagnosis)}'),
+        ('How sure', f'{facts.accepted_words(rows)} {facts.p_value_sentence(diagnosis)}'),
         ('What is learned', facts.learned(data, diagnosis, 'What their laws leave over')),
         ('What changes', facts.changes(data, diagnosis)),
         ('What is left out', facts.left_out(data)),
@@ -87,10 +87,10 @@ def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> He
         title = f'{words.capital(names)} was added'
     more = 'Something is missing: run the diagnosis to find the cause.'
     answers = (
-        ('What was added', facts.explained(rows)),
+        ('What was added', facts.effect_meanings(rows)),
         ('What is learned', facts.learned(data, diagnosis, 'It')),
-        ('How sure', f'{facts.sure(rows)} {facts.chance(diagnosis)}'),
-        ('What it does', facts.costs(data, diagnosis)),
+        ('How sure', f'{facts.accepted_words(rows)} {facts.p_value_sentence(diagnosis)}'),
+        ('What it does', facts.cost_of_missing(data, diagnosis)),
         ('What changes', facts.changes(data, diagnosis)),
         ('What to do', more if diagnosis.p_value < ALPHA else ''),
     )
@@ -101,7 +101,7 @@ def _nothing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     answers = (
         ('What is missing', 'Nothing that these readings can show.'),
         ('What to do', 'Simulate and plan with model.yaml of this folder.'),
-        ('How sure', f'{facts.chance(diagnosis)} {facts.blind(diagnosis)}'),
+        ('How sure', f'{facts.p_value_sentence(diagnosis)} {facts.not_testable(diagnosis)}'),
         ('What changes', facts.changes(data, diagnosis)),
         ('What is left out', facts.left_out(data)),
     )
@@ -117,10 +117,13 @@ def _undecided(data: ReportData, diagnosis: Diagnosis) -> Headline:
     more = 'more ' if named else ''
     answers = (
         ('What is missing', f'Something {more}is, most likely {words.joined(causes, "or")}.'),
-        ('How sure', f'{facts.chance(diagnosis)} No single cause is probable enough to be added.'),
+        (
+            'How sure',
+            f'{facts.p_value_sentence(diagnosis)} No single cause is probable enough to be added.',
+        ),
         ('What is learned', facts.learned(data, diagnosis, 'What is missing')),
         ('What changes', facts.changes(data, diagnosis)),
-        ('What to do', facts.to_do(data)),
+        ('What to do', facts.next_steps(data)),
         ('What is left out', facts.left_out(data)),
     )
     title = f'Something {more}is missing; the readings do not say which'
@@ -150,7 +153,7 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
     answers = (
         ('What is missing', reason),
         ('Where it shows', where),
-        ('How sure', facts.chance(diagnosis)),
+        ('How sure', facts.p_value_sentence(diagnosis)),
         ('What is learned', facts.learned(data, diagnosis, 'It')),
         ('What changes', facts.changes(data, diagnosis)),
         ('What to do', remedy),
@@ -206,7 +209,7 @@ def _side_by_side(data: ReportData) -> Headline:
         ('How far off', f'RMSE of {words.joined(each)}; the gauge alone gives {floor}.'),
         ('What to do', f'Take {best}, {remedy}'),
     )
-    return Headline('open', 'Side by side', f'{best} is nearest to the readings', answers)
+    return Headline('open', 'Side by side', f'{best} has the smallest error', answers)
 
 
 def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:

@@ -95,7 +95,7 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     if not isinstance(law, LearnedMap):
         return None
     charts, marker = [], {'size': 3, 'color': INK}
-    for grid, values in law.on_parts():
+    for grid, values in law.values_by_part():
         parts = [e for e in data.experiments if grid.is_of(e.measured_points)]
         neutral, title = 0.0, 'addition [µm]'
         if law.kind == 'factor':

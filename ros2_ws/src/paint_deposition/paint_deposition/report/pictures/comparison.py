@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.comparison.profiles import Profile
-from paint_deposition.inference.comparison.residual_field import spread_over_surface
+from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
 from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import MM, colour_bar, new_figure, quiet
@@ -46,7 +46,7 @@ def part_figure(data: ReportData, index: int) -> Figure:
     scale = residual_scale(np.array([largest]))
     places = part.view.flat(positions)
     for axes, name, residual_um in zip(residuals, names, data.residuals_um, strict=True):
-        field = spread_over_surface(surface, positions, normals, residual_um[rows])
+        field = interpolate_over_surface(surface, positions, normals, residual_um[rows])
         part.dress(axes, low, high)
         part.draw(axes, scale.rgba(field, np.isfinite(field)))
         colours = scale.rgba(residual_um[rows], np.ones(count, dtype=bool)) / 255.0

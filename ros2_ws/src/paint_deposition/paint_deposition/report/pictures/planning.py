@@ -9,7 +9,7 @@ from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.planning.improvement.improvement import Improvement, LaidFilm
+from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement
 from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.chart import (
@@ -137,7 +137,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
     for chart in charts.ravel()[len(openings) :]:
         chart.set_axis_off()
-    programmes = result.retiming.given, result.retiming.programme
+    programmes = result.retiming.original, result.retiming.programme
     for number, chart in enumerate(charts.ravel()[: len(openings)]):
         _draw_speeds(chart, number, programmes)
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
@@ -158,14 +158,14 @@ def _scale(result: Improvement) -> ColourScale:
 
 
 def _draw_film(
-    axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: LaidFilm
+    axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: FilmSummary
 ) -> None:
     part.draw(axes, scale.rgba(laid.film_um, laid.film_um > 1.0))
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
     draw_tool_path(axes, path, part.view, low, high)
 
 
-def _title(name: str, laid: LaidFilm) -> str:
+def _title(name: str, laid: FilmSummary) -> str:
     return (
         f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
         f'{laid.min_um:.1f} to {laid.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '

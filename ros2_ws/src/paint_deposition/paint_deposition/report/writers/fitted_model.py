@@ -38,7 +38,7 @@ def write_fitted(
     Args:
         path: YAML.
         study: the readings that it was fitted to.
-        steps: the models, the one started from, fitted anew, first.
+        steps: the models, the start model, refitted, first.
         start: what was started from: the name stays, the history goes on, and uncertainties
             stay where the fit has no newer ones.
         header_comment: lines to put at the top.
@@ -51,7 +51,7 @@ def write_fitted(
     found = posterior_of(fit, study.campaign)
     few = {'mean': _short(found.mean), 'covariance': _short(found.covariance)}
     posterior: Posterior | None = found.model_copy(update=few)
-    whole = fitted.with_others(start.model)
+    whole = fitted.with_missing_brushes(start.model)
     if whole is not fitted:
         # It is that of some brushes only and would be taken for that of all.
         fitted, posterior = whole, None
@@ -64,12 +64,12 @@ def history_as_list(
     """What was added to a model and the errors it left.
 
     Errors can be compared within one campaign only, so each step names its campaign, with the
-    noise of its gauge. The model started from is the last of the older steps: fitted anew to the
+    noise of its gauge. The start model is the last of the older steps: refitted to the
     same campaign it replaces that step, fitted to another one it follows it.
 
     Args:
         study: the readings.
-        steps: the models, the one started from, fitted anew, first.
+        steps: the models, the start model, refitted, first.
         older: what the start model's own file says.
     """
     campaign = study.campaign.name

@@ -32,7 +32,7 @@ def _write_calibration(
     names = ', '.join(experiment.name for experiment in study.campaign.experiments)
     header = [
         f'Calibrated on {len(study)} points ({names}).',
-        *(f'Mind: {warning}.' for warning in result.warnings),
+        *(f'Warning: {warning}.' for warning in result.warnings),
     ]
     step = Step.of(study, '', result.fit)
     write_fitted(model_file, study, [step], start, '\n'.join(header))

@@ -63,9 +63,9 @@ def _passes(
     pictures: str = 'png',
 ) -> list[Path]:
     surface = result.surface
-    given = result.given.notes if isinstance(result, Improvement) else ()
-    said = {'down': surface.down, 'notes': (*surface.notes, *given)}
-    about = with_provenance(said | dict(made_from or {}), result.model)
+    given = result.original.notes if isinstance(result, Improvement) else ()
+    part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
+    about = with_provenance(part_facts | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     files = write_plan(folder, result, about, part)
     if isinstance(result, Improvement):

@@ -77,6 +77,6 @@ def input_files(made_from: Mapping[str, Any]) -> dict[str, str]:
 def with_provenance(
     made_from: Mapping[str, Any], model: Models, more_files: Mapping[str, str] | None = None
 ) -> dict[str, Any]:
-    """What is said of a result, and the model and the files that it was made from."""
+    """The entries with the provenance of their result: the model and the input files."""
     files = input_files(made_from) | dict(more_files or {})
     return {**made_from, 'provenance': origin(model, files)}

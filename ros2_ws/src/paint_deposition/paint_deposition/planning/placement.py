@@ -1,4 +1,4 @@
-"""Where to lay passes on a part: number, index and start offset, judged by their summed film."""
+"""Placement of passes on a part: number, index and offset, chosen by their summed film."""
 
 from dataclasses import dataclass
 
@@ -9,12 +9,12 @@ from paint_deposition.errors import PlanError
 from paint_deposition.planning.films import LineFilms
 
 INDICES, OFFSETS = 25, 25
-# One pass less is worth this much evenness: relative, and in sigma_n itself.
+# Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
 SLACK, LEAST_SLACK = 1.05, 0.002
 
 
 @dataclass(frozen=True)
-class Placing:
+class Placement:
     """Parallel lines on a part."""
 
     passes: int  # how many
@@ -39,25 +39,25 @@ def place_passes(
     extent_m: tuple[float, float],
     index_range_m: tuple[float, float],
     tolerance: float | None = None,
-) -> Placing:
-    """The most even placing with the fewest passes that come near the best, or the tolerance.
+) -> Placement:
+    """The placement with the fewest passes that is nearly the most even, or within tolerance.
 
     ``extent_m``: ends of the part across the passes; ``index_range_m``: equal ends fix the index.
 
     Raises:
-        PlanError: no placing keeps to the tolerance; names the closest.
+        PlanError: no placement is within the tolerance; names the closest.
     """
     height = extent_m[1] - extent_m[0]
     fewest = max(1, int(height / index_range_m[1]))
     most = max(fewest, int(np.ceil(height / index_range_m[0])) + 1)
     best = [
-        placing
+        placement
         for passes in range(fewest, most + 1)
-        if (placing := best_placing(films, extent_m, index_range_m, passes)) is not None
+        if (placement := best_placement(films, extent_m, index_range_m, passes)) is not None
     ]
-    closest = min(best, key=lambda placing: placing.sigma_n)
+    closest = min(best, key=lambda placement: placement.sigma_n)
     limit = SLACK * closest.sigma_n + LEAST_SLACK if tolerance is None else tolerance
-    good = [placing for placing in best if placing.sigma_n <= limit]
+    good = [placement for placement in best if placement.sigma_n <= limit]
     if not good:
         raise PlanError(
             f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
@@ -68,18 +68,18 @@ def place_passes(
     return good[0]
 
 
-def placed(films: LineFilms, passes: int, index_m: float, middle_m: float) -> Placing:
+def placement_at(films: LineFilms, passes: int, index_m: float, middle_m: float) -> Placement:
     """Lines with sigma_n of their film."""
     sigma_n = float(films.sigma_n(lines_of(passes, index_m, middle_m)))
-    return Placing(passes, index_m, middle_m, sigma_n)
+    return Placement(passes, index_m, middle_m, sigma_n)
 
 
-def best_placing(
+def best_placement(
     films: LineFilms,
     extent_m: tuple[float, float],
     index_range_m: tuple[float, float],
     passes: int,
-) -> Placing | None:
+) -> Placement | None:
     """The most even placing of so many passes; None where it has no room."""
     middle = 0.5 * (extent_m[0] + extent_m[1])
     low, high = index_range_m
@@ -113,4 +113,4 @@ def best_placing(
         options={'xatol': 1e-4, 'fatol': 1e-5, 'maxfev': 200, 'initial_simplex': first + aside},
     )
     there = float(np.clip(found.x[0], low, high))
-    return placed(films, passes, there, middle + float(found.x[1]) * there)
+    return placement_at(films, passes, there, middle + float(found.x[1]) * there)
