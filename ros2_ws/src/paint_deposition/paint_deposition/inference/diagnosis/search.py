@@ -65,6 +65,14 @@ class Trial:
     usual: Remainder
     sizes: Sequence[Sizes]
 
+    @staticmethod
+    def around(run: Run, names: frozenset[str], fit: Fit) -> 'Trial':
+        """A set, and what nature leaves over around its own fit, at the sizes that matter."""
+        usual = Remainder.of(run.study, fit)
+        laws = [*of_effects(run.study, fit, run.candidates)]
+        sizes = probable_sizes(run.plain(fit), usual, laws, run.freedom)
+        return Trial(run, names, fit, usual, sizes)
+
     @property
     def effects(self) -> dict[str, Effect]:
         """Those of the set, as fitted."""
@@ -191,14 +199,8 @@ class Search:
         self._trials: dict[frozenset[str], Trial] = {}
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
-        self.nothing = self._refitted({}, Trial(run, frozenset(), run.fit, *self._around(run.fit)))
+        self.nothing = self._refitted({}, Trial.around(run, frozenset(), run.fit))
         run.testable = testability(self.nothing.space.central, run.seed)
-
-    def _around(self, fit: Fit) -> tuple[Remainder, list[Sizes]]:
-        """What nature leaves over around a fit, and its sizes that matter."""
-        run, usual = self.run, Remainder.of(self.run.study, fit)
-        laws = [*of_effects(run.study, fit, run.candidates)]
-        return usual, probable_sizes(run.plain(fit), usual, laws, run.freedom)
 
     def with_effect(self, parent: Trial, name: str) -> Trial:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
@@ -260,8 +262,7 @@ class Search:
         if best.log_evidence_alone <= nothing.log_evidence_alone + MISLEADS:
             return nothing
         others = self.run.fitted_from_many_starts([*best.effects.values()])
-        tried = [(best.fit, *self._around(best.fit)), (others, *self._around(others))]
-        anew = [replace(best, fit=f, usual=usual, sizes=sizes) for f, usual, sizes in tried]
+        anew = [Trial.around(self.run, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence_alone)
         self._trials, self._tried = {best.names: best}, set()
         self._patterns = (nothing.fit.model,)
