@@ -20,8 +20,9 @@ from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanati
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, Nulls
 from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, Weighed, log_odds
 from paint_deposition.inference.diagnosis.remainder import Sizes
-from paint_deposition.inference.diagnosis.search import Stage, Trial
+from paint_deposition.inference.diagnosis.search import Stage
 from paint_deposition.inference.diagnosis.smooth_laws import RandomLaw
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 READINGS = 24

@@ -22,7 +22,8 @@ from paint_deposition.inference.diagnosis.model_space import (
     log_odds,
 )
 from paint_deposition.inference.diagnosis.run import Run
-from paint_deposition.inference.diagnosis.search import SAME, Search, Stage, Trial
+from paint_deposition.inference.diagnosis.search import SAME, Search, Stage
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.readings.campaign import Campaign
 

@@ -7,7 +7,8 @@ import numpy as np
 from paint_deposition.inference.diagnosis.evidence import left_out
 from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
-from paint_deposition.inference.diagnosis.search import Stage, Trial
+from paint_deposition.inference.diagnosis.search import Stage
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 

@@ -29,7 +29,8 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.learning import choose_laws
 from paint_deposition.inference.diagnosis.run import Run
-from paint_deposition.inference.diagnosis.search import Group, Search, Stage, Trial
+from paint_deposition.inference.diagnosis.search import Group, Search, Stage
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
