@@ -65,6 +65,6 @@ def _found_without(stages: Sequence[Stage], out: np.ndarray) -> Trial:
     """The set of effects that is found while some readings (P,) are left out."""
     for stage, following in zip(stages, [*stages[1:], None], strict=True):
         chosen = stage.chosen(~out)
-        if following is None or chosen is not following.here:
+        if following is None or chosen.names != following.here.names:
             break
     return chosen
