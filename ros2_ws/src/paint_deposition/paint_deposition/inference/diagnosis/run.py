@@ -15,7 +15,11 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import Explanation, of_any_form
+from paint_deposition.inference.diagnosis.explanations import (
+    Explanation,
+    of_any_form,
+    of_places,
+)
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
@@ -99,8 +103,10 @@ class Run:
 
     @cached_property
     def any_form(self) -> list[Explanation]:
-        """Laws of any form, for what is outside the library."""
-        return of_any_form(self.study, self.history[0].model)
+        """Laws of any form, for what is outside the library: over a condition or over a part."""
+        model = self.history[0].model
+        found = [*of_any_form(self.study, model), *of_places(self.study, model)]
+        return [replace(e, share=0.5 * e.share) for e in found]
 
     @property
     def freedom(self) -> float:
