@@ -115,13 +115,20 @@ def of_any_form(study: Study, model: DepositionModel) -> list[Explanation]:
     return [of_random(study, law, 1.0 / len(laws)) for law in laws]
 
 
-def of_places(study: Study, model: DepositionModel) -> list[Explanation]:
-    """Smooth factors on the film over places of a part, for what no covariate carries."""
+def of_places(study: Study, model: DepositionModel, each: bool = False) -> list[Explanation]:
+    """Smooth factors on the film over places of a part, for what no covariate carries.
+
+    Args:
+        study: the readings.
+        model: whose film they are factors on.
+        each: only on one part at a time, not on all together.
+    """
     if model.effect(LearnedMap.id) is not None:
         return []
     laws = [
         basis.random(FACTOR_OF_PLACE, length).centred
         for basis in map_bases(study, model)
+        if not each or len(basis.settings['maps']) == 1
         for length in LENGTHS[PLACE]
     ]
     return [of_random(study, law, 1.0 / len(laws)) for law in laws]

@@ -103,10 +103,10 @@ class Run:
 
     @cached_property
     def any_form(self) -> list[Explanation]:
-        """Laws of any form, for what is outside the library: over a condition or over a part."""
+        """Laws of any form, for what is outside the library: over a condition, or on a part."""
         model = self.history[0].model
-        found = [*of_any_form(self.study, model), *of_places(self.study, model)]
-        return [replace(e, share=0.5 * e.share) for e in found]
+        found = [of_any_form(self.study, model), of_places(self.study, model, each=True)]
+        return [replace(e, share=0.5 * e.share) for laws in found for e in laws]
 
     @property
     def freedom(self) -> float:
@@ -132,6 +132,7 @@ class Run:
         free: np.ndarray | None = None,
         model: DepositionModel | None = None,
         remainder: np.ndarray | None = None,
+        others: Sequence[DepositionModel] = (),
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
@@ -140,6 +141,7 @@ class Run:
             free: (P, n) directions over the noise that are left free beside them.
             model: to start from; default the newest.
             remainder: (P, P) covariance of what nature leaves over, if that is allowed for.
+            others: models whose patterns are starts, too.
         """
         model = model or self.fit.model
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
@@ -147,7 +149,9 @@ class Run:
         nuisance = self.study.nuisance
         if free is not None:
             nuisance = np.hstack([nuisance, free])
-        return self.study.fit(self._free(start), nuisance=nuisance, remainder=remainder)
+        return self.study.fit(
+            self._free(start), nuisance=nuisance, remainder=remainder, others=others
+        )
 
     def fitted_from_many_starts(self, effects: Sequence[Effect]) -> Fit:
         """The start model with these effects, its pattern searched as in the first fit."""

@@ -74,8 +74,7 @@ class Search:
         if names not in self._tried:
             self._tried.add(names)
             effects = parent.effects | {name: parent.space.by_law(name)}
-            for pattern in (parent.fit.model, *self._patterns):
-                self._refitted(effects, parent, pattern)
+            self._refitted(effects, parent, self._patterns)
         return self._trials[names]
 
     def without(self, trial: Trial, *names: str) -> Trial:
@@ -88,11 +87,13 @@ class Search:
         return self._refitted(fewer, trial)
 
     def _refitted(
-        self, effects: dict[str, Effect], start: Trial, pattern: DepositionModel | None = None
+        self, effects: dict[str, Effect], start: Trial, others: Sequence[DepositionModel] = ()
     ) -> Trial:
-        """A set fitted beside the remainder of another one, from its pattern or this one."""
-        remainder, model = start.best.null.remainder, pattern or start.fit.model
-        fit = self.run.fitted_with([*effects.values()], model=model, remainder=remainder)
+        """A set fitted beside the remainder of another one, from its pattern or one of others."""
+        model, remainder = start.fit.model, start.best.null.remainder
+        fit = self.run.fitted_with(
+            [*effects.values()], model=model, remainder=remainder, others=others
+        )
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
         if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:

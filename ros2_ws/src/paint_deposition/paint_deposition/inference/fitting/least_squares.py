@@ -1,5 +1,6 @@
 """Weighted least squares on the readings, through the forward simulation."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -109,6 +110,7 @@ def fit_readings(
     seed: int = 0,
     nuisance: np.ndarray | None = None,
     remainder: np.ndarray | None = None,
+    others: Sequence[DepositionModel] = (),
 ) -> Fit:
     """Find the most probable values (maximum a posteriori).
 
@@ -120,6 +122,7 @@ def fit_readings(
         nuisance: (P, n) nuisance directions, over the standard deviation, along which the
             readings may deviate further with unit variance; default: none.
         remainder: (P, P) covariance of what nature leaves over; default: nothing is.
+        others: models whose patterns are starts, too, of which the best is taken to the end.
     """
     if nuisance is None:
         nuisance = np.empty((len(measured_um), 0))
@@ -128,9 +131,12 @@ def fit_readings(
     candidates = [first]
     if starts > 1:
         candidates += _best_starts(problem, first, starts - 1, seed)
+    for other in others:
+        candidates.append(parameters.encode(parameters.start.with_patterns(other.patterns)))
+    if len(candidates) > 1:
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
         rough.sort(key=lambda result: result.cost)
-        candidates = [result.x for result in rough[:REFINED_STARTS]]
+        candidates = [result.x for result in rough[: REFINED_STARTS if starts > 1 else 1]]
     found = [problem.search(start, MOST_STEPS) for start in candidates]
     best = min(found, key=lambda result: result.cost)
     model = parameters.decode(best.x)

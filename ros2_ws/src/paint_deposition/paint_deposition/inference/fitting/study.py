@@ -1,5 +1,6 @@
 """A campaign prepared for inference: point means, noise, blocks and forward model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -140,10 +141,11 @@ class Study:
     def fit(
         self, parameters: FreeParameters, starts: int = 1, seed: int = 0,
         nuisance: np.ndarray | None = None, remainder: np.ndarray | None = None,
+        others: Sequence[DepositionModel] = (),
     ) -> Fit:  # fmt: skip
         """Fit these parameters to the points; see ``fit_readings``."""
         data = self.forward, self.measured_um, self.sigma_um
-        return fit_readings(*data, parameters, starts, seed, nuisance, remainder)
+        return fit_readings(*data, parameters, starts, seed, nuisance, remainder, others)
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].
