@@ -13,6 +13,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.errors import ModelError
 from paint_deposition.files.json_files import json_text
+from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
@@ -82,7 +83,7 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     # In one valley a shielded film and a gauge that reads low there look alike.
     assert 'faraday_shielding' in best.members
     assert {EFFECTS[name].family for name in best.members} == {'curvature'}
-    assert best.probability > 0.9
+    assert best.probability > SURE
     assert best.holdout_rmse_um['after'] < best.holdout_rmse_um['before']
     assert [step.added for step in found.history] == ['', best.best]
     assert found.history[1].rmse_um < 0.8 * found.history[0].rmse_um

@@ -34,6 +34,8 @@ MAP_STEP_M, RADII = 0.06, 10
 WIDTHS = 3.0
 # Angles at which a pattern is averaged, and a flux that is none [um/s].
 ANGLES, NO_FLUX = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False), 1e-12
+# Share of the pattern's largest change from which on it follows a footprint.
+HARDLY_SHOWS = 1e-4
 # Distance of knots that have nothing in common.
 FAR = 1e6
 
@@ -287,11 +289,10 @@ def beside_pattern(
     moved = fit.vector + np.diag(steps)
     relative = np.stack([(log_flux(moved[k]) - here) / steps[k] for k in range(count)], axis=1)
     change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-    # Within what is known of it before, else a pattern that few readings show goes anywhere.
-    prior = fit.parameters.prior.whitening[:count, :count]
-    slopes = np.vstack([fit.jacobian[:, :count], prior])
-    change = np.vstack([change, np.zeros((count, change.shape[1]))])
-    followed = np.linalg.lstsq(slopes, change, rcond=None)[0]
+    # A pattern that hardly shows in the readings would go anywhere.
+    scale = fit.parameters.prior.factor[:count, :count]
+    slopes = fit.jacobian[:, :count] @ scale
+    followed = scale @ np.linalg.lstsq(slopes, change, rcond=HARDLY_SHOWS)[0]
     return at_knots - relative @ followed, followed
 
 
