@@ -22,10 +22,7 @@ COMMANDS = {
     'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
     'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
-    'improve': (
-        'improve',
-        'Make the film of a programme more even: speeds, flows, triggers.',
-    ),
+    'improve': ('improve', 'Make the film of a programme more even: speeds, flows, triggers.'),
     'measure': ('measure', 'Choose where to put the gauge on a part.'),
     'compare': ('inference', 'Compare the model with gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),

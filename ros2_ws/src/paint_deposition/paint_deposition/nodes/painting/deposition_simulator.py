@@ -55,8 +55,7 @@ SIMULATOR = PAINTING | {
     'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
     'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
     'publish_mesh': NodeParameter(
-        True,
-        'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]',
+        True, 'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]'
     ),
     'output_directory': NodeParameter(
         'runs',
