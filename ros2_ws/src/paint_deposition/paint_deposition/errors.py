@@ -37,11 +37,7 @@ class ManyError(PaintError):
 
 
 def require_above_zero(**values: float) -> None:
-    """Refuse what is no number above 0, by its name.
-
-    Raises:
-        PlanError: a value is not.
-    """
+    """Refuse what is no number above 0, by its name. Raises PlanError: a value is not."""
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')

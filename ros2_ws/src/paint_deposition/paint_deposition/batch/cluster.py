@@ -173,11 +173,7 @@ def _run_case(work: Callable[..., Columns], parameters: bytes, *inputs: bytes) -
 
 
 def _result(future: Future) -> tuple[Columns, str | None]:
-    """The columns of a case, or why there are none.
-
-    Raises:
-        ManyError: the scheduler is lost.
-    """
+    """The columns of a case, or why there are none. Raises ManyError: the scheduler is lost."""
     from distributed.scheduler import KilledWorker
 
     try:

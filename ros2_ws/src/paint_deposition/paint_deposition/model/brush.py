@@ -45,8 +45,7 @@ class Brush(SetPoints):
     """The pattern of eq. (1) at one setting of the atomizer.
 
     Attributes:
-        number: by which programmes choose it, 1 to MOST; from BETWEEN on it stands for
-            set-points.
+        number: by which programmes choose it, 1 to MOST; from BETWEEN on it stands for set-points.
         planar: its pattern.
         interpolated: whether the pattern follows from those of the other brushes, see
             ``brush_law``.

@@ -75,11 +75,7 @@ class IndexRequest(PassRequest):
     )
 
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
-        """Range to search for a pass of this SB50 [m].
-
-        Raises:
-            PlanError: it is empty.
-        """
+        """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
         least, greatest = USUAL_HALF_WIDTHS_M
         usual = USUAL_RANGE_M
         if not least <= half_width_m <= greatest:

@@ -11,9 +11,8 @@ a closed form (Gelman et al., Bayesian Data Analysis, 2013, chapters 5 and 15). 
 for all that no effect explains: without it any error of the model, seen often enough, would be
 taken for an effect.
 
-Effects are found one after the other, by their evidence. Each set of effects is evaluated with
-the scales that are the most probable with it: those fitted without an effect
-would take it for noise.
+Effects are found one after the other, by their evidence. Each set of effects is evaluated with the
+scales that are the most probable with it: those fitted without an effect would take it for noise.
 """
 
 from __future__ import annotations
