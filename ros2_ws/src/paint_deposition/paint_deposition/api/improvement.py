@@ -1,7 +1,5 @@
 """A programme's speeds, flows and triggers, chosen for a more even film."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path

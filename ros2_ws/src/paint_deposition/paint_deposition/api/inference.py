@@ -3,8 +3,6 @@
 A campaign is painted parts with their readings; ``progress`` is called with a line for each step.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 

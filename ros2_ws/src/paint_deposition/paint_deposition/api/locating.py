@@ -1,7 +1,5 @@
 """Where a part stands in the frame of the robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from paint_deposition.errors import RecordingError

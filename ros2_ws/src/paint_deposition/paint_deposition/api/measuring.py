@@ -1,7 +1,5 @@
 """Where to measure a part."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Where passes should lie: the index on a plane, and passes on a part."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

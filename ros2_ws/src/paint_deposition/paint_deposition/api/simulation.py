@@ -1,7 +1,5 @@
 """The film that recorded motions leave on a part, and how the guns ran over it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """The command `paint`: simulate, measure up, find what is missing, plan."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """Options of a command from the model of its request: names, types, bounds, defaults and help."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import reduce, wraps

@@ -1,7 +1,5 @@
 """Progress of work that lasts, on stderr: what is being done, how far it is, for how long."""
 
-from __future__ import annotations
-
 import sys
 from threading import Event, Thread
 
@@ -33,7 +31,7 @@ class Progress:
         self._done = Event()
         self._clock = Thread(target=self._redraw, daemon=True)
 
-    def __enter__(self) -> Progress:
+    def __enter__(self) -> 'Progress':
         if not self._bar.disable:
             self._clock.start()
         return self

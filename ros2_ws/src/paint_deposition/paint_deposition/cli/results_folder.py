@@ -1,7 +1,5 @@
 """A folder of results that appears, or takes the place of an older one, as a whole."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Iterator

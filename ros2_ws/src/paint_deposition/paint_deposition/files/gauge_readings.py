@@ -1,7 +1,5 @@
 """Gauge readings and measuring points from the files that gauges and spreadsheets write."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -96,7 +94,7 @@ class MeasuringPoints:
     words: str
 
     @staticmethod
-    def read(path: Path, layout: Layout, surface: Surface | None) -> MeasuringPoints:
+    def read(path: Path, layout: Layout, surface: Surface | None) -> 'MeasuringPoints':
         """Read a list: point label and x, y, z, or from_left, height."""
         read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         positions, normals, place_words = _places(read, surface)

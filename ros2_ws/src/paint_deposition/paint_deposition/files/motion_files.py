@@ -1,7 +1,5 @@
 """Reading the motion of guns from files of any kind, in the frame of the part."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The options of campaigns and commands on which motion to read, and where the part stood."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Literal
 

@@ -4,8 +4,6 @@ A plan lies in a folder with its ``model.yaml``; its bag holds a copy. Bag, RAPI
 ``plan.json`` hold the digest of the model, so that another ``model.yaml`` is not taken for it.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a run or a result was made with, so that a film can be explained years later."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from pathlib import Path

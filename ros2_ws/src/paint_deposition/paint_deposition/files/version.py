@@ -1,7 +1,5 @@
 """Which state of the repository a package is, without loading anything."""
 
-from __future__ import annotations
-
 import subprocess
 from pathlib import Path
 

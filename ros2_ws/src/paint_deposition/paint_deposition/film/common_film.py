@@ -1,7 +1,5 @@
 """The one film that several guns lay on a part."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """What a mesh that is coarser than its curvature allows costs the film."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """What the gun has before it: the nearest surface, and where its straight rays land."""
 
-from __future__ import annotations
-
 import math
 from functools import cached_property
 

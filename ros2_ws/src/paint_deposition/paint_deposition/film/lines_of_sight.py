@@ -1,7 +1,5 @@
 """Which points the gun sees along its path, traced where paint arrives only."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -30,12 +28,12 @@ class Sight:
     first: np.ndarray  # (S, B) where in ``seen`` the run of a tracing and a block begins
     tracing: np.ndarray  # (M,) row of ``first`` that holds on each sub-step
 
-    def select(self, steps: np.ndarray) -> Sight:
+    def select(self, steps: np.ndarray) -> 'Sight':
         """On some of the sub-steps."""
         return Sight(self.seen, self.first, self.tracing[steps])
 
     @staticmethod
-    def free(steps: int, blocks: int) -> Sight:
+    def free(steps: int, blocks: int) -> 'Sight':
         """Everything is seen on all sub-steps."""
         run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
         return Sight(run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64))

@@ -1,7 +1,5 @@
 """How the gun ran over the part: passes, speed, standoff, lean of its axis, paint beside it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Poses in another frame than the part's: brought to the part by where it stands."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -38,7 +36,7 @@ class Rigid:
     translation_m: np.ndarray
 
     @staticmethod
-    def of(values: Sequence[float] | np.ndarray) -> Rigid:
+    def of(values: Sequence[float] | np.ndarray) -> 'Rigid':
         """From [x y z qx qy qz qw]; the quaternion is normalised."""
         quaternion = np.asarray(values[3:], dtype=float)
         x, y, z, w = (quaternion / np.linalg.norm(quaternion)).tolist()
@@ -51,13 +49,13 @@ class Rigid:
         )
         return Rigid(rotation, (x, y, z, w), np.asarray(values[:3], dtype=float))
 
-    def inverse(self) -> Rigid:
+    def inverse(self) -> 'Rigid':
         """The inverse transform."""
         x, y, z, w = self.quaternion_xyzw
         back = self.rotation.T
         return Rigid(back, (-x, -y, -z, w), -back @ self.translation_m)
 
-    def __matmul__(self, first: Rigid) -> Rigid:
+    def __matmul__(self, first: 'Rigid') -> 'Rigid':
         """The transform that does the other one first, and then this one."""
         position, quaternion = self.applied(first.translation_m, np.array(first.quaternion_xyzw))
         return Rigid.of([*position, *quaternion])

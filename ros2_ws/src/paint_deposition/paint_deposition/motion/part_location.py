@@ -1,7 +1,5 @@
 """Where a part stands, from named points on it that the robot touched."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Programmed moves of the TCP as a timed motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

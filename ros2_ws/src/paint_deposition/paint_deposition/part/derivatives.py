@@ -1,7 +1,5 @@
 """Derivatives on the surface: its curvature, and the slope of a field on it."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 

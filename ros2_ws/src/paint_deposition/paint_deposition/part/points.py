@@ -1,7 +1,5 @@
 """Points on a part at which the film is wanted, with what the part is like there."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -114,7 +112,7 @@ class SurfacePoints:
         """
         return self._covariate('slope_per_m')
 
-    def select(self, rows: np.ndarray | slice | list[int]) -> SurfacePoints:
+    def select(self, rows: np.ndarray | slice | list[int]) -> 'SurfacePoints':
         """The chosen rows (mask, slice or indices), covariates computed only if used.
 
         Slopes need neighbours: a row some of whose neighbours are not chosen has slope zero.

@@ -1,7 +1,5 @@
 """Series over the parts of a line (level, misfit, amplitudes), and their steps and drifts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from datetime import datetime, timezone

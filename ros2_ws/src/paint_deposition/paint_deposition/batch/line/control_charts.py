@@ -5,8 +5,6 @@ Montgomery, Introduction to Statistical Quality Control, 2012, chapters 6 and 9;
 the Markov chain of Lucas and Saccucci (1990).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

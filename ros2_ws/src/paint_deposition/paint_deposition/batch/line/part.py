@@ -1,7 +1,5 @@
 """One run of a line, as a worker computes it: its film, and what its readings say."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import suppress

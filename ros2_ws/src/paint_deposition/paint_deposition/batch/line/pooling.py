@@ -15,8 +15,6 @@ Effects are found one after the other, by their evidence. Each set of effects is
 scales that are the most probable with it: those fitted without an effect would take it for noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
@@ -138,7 +136,9 @@ class SufficientStatistics:
     between_jobs: np.ndarray
 
     @staticmethod
-    def of(parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH) -> SufficientStatistics:
+    def of(
+        parts: Sequence[Measured], pattern: PatternVector = ONE_BRUSH
+    ) -> 'SufficientStatistics':
         """Of at least one part."""
         place_m, place_of = places(parts)
         rows = []
@@ -240,7 +240,7 @@ class MisfitMixture:
     log_prior: np.ndarray
 
     @staticmethod
-    def fitted(statistics: SufficientStatistics, chosen: Sequence[int]) -> MisfitMixture:
+    def fitted(statistics: SufficientStatistics, chosen: Sequence[int]) -> 'MisfitMixture':
         """With the most probable level and noise given these amplitudes."""
         misfits: list[tuple[float, float] | None] = [None, *MISFITS]
         grids: dict[str, Any] = {'misfit': misfits, 'noise': NOISES, 'level': LEVELS}

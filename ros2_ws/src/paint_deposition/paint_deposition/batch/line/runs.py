@@ -1,7 +1,5 @@
 """A folder of runs over days: what all have in common, the runs in it, and each as a case."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """One case of a sweep, as a worker computes it: by the functions that the commands go through."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Mapping
 from dataclasses import replace

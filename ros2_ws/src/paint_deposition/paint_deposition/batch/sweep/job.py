@@ -1,7 +1,5 @@
 """The cases of a sweep and the inputs that they share, each read once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -59,7 +57,7 @@ class Job:
     @staticmethod
     def of(
         file: SweepFile, folder: Path, progress: Callable[[str], None] = lambda line: None
-    ) -> Job:
+    ) -> 'Job':
         """Read everything that a sweep names, each file once.
 
         Raises:

@@ -1,7 +1,5 @@
 """Sweep files: what is fixed and what varies."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -39,7 +37,7 @@ class Distribution(BaseModel, extra='forbid'):
     uniform: tuple[Number, Number] | None = None
 
     @model_validator(mode='after')
-    def _is_one_distribution(self) -> Distribution:
+    def _is_one_distribution(self) -> 'Distribution':
         if (self.normal is None) == (self.uniform is None):
             raise ValueError('give one of normal, uniform')
         if self.normal and not self.normal[1] > 0.0:

@@ -1,7 +1,5 @@
 """What a sweep varies: every combination of its grid, its cases and its draws."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import product
 from typing import Any

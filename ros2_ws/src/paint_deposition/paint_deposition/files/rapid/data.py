@@ -1,7 +1,5 @@
 """The data of a RAPID module while it runs: values by name, frames, speeds and zones."""
 
-from __future__ import annotations
-
 import copy
 import operator
 import re

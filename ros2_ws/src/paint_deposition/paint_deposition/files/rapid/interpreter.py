@@ -1,7 +1,5 @@
 """Interpreting a RAPID module: its moves of the TCP, with the gun's switching."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

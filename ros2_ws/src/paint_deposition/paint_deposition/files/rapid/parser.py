@@ -4,8 +4,6 @@ RAPID ignores case: names are converted to lower case. Blocks (IF, FOR, WHILE, T
 evaluated; an instruction inside one names it, so that the interpreter can refuse it.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """ABB RAPID programs: read as moves of the TCP, as a trajectory, and as text."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

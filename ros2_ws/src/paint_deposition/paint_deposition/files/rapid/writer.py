@@ -1,7 +1,5 @@
 """Planned passes as ABB RAPID modules."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

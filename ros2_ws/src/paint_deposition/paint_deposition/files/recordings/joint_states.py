@@ -1,7 +1,5 @@
 """Forward kinematics of recorded joint states, by the URDF of the robot."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +27,7 @@ class Robot:
     chain: list[Any]
 
     @staticmethod
-    def read(path: Path, tip: str | None = None, base: str | None = None) -> Robot:
+    def read(path: Path, tip: str | None = None, base: str | None = None) -> 'Robot':
         """Read a URDF.
 
         ``tip`` is the link of the TCP, by default tool0 or the only last link; ``base`` is the

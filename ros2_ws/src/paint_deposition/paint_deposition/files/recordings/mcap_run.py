@@ -4,8 +4,6 @@ A folder `<run>/` with `<run>_0.mcap` and, once the run is complete, `metadata.y
 The folder without `metadata.yaml` is an unfinished run, as it is for rosbag2.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import time
@@ -173,7 +171,7 @@ class RunWriter:
         """Close the file as it is; the run stays unfinished."""
         self._raw.close()
 
-    def __enter__(self) -> RunWriter:
+    def __enter__(self) -> 'RunWriter':
         return self
 
     def __exit__(self, exception_type: type[BaseException] | None, *_: object) -> None:

@@ -1,7 +1,5 @@
 """Signals of the cell: a number or Bool in a field of any message, and when it is on."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -30,7 +28,7 @@ class Signal:
     level: float = 0.0
 
     @staticmethod
-    def parse(text: str) -> Signal | None:
+    def parse(text: str) -> 'Signal | None':
         """Parse a signal, None for other text; raises RecordingError for an invalid level."""
         match = SYNTAX.fullmatch(text.strip())
         if match is None:

@@ -1,7 +1,5 @@
 """The transforms of a recording: /tf_static, part_pose, and /tf over time."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -87,7 +85,7 @@ class _Chain:
     moving: list[Edge]
 
     @staticmethod
-    def from_bag(bag: Bag, source: str, target: str) -> tuple[_Chain | None, list[str]]:
+    def from_bag(bag: Bag, source: str, target: str) -> 'tuple[_Chain | None, list[str]]':
         """The chain, None if the frames are not connected, and the names of all frames."""
         graph = nx.Graph()
         for moves in (False, True):
@@ -190,7 +188,7 @@ class StaticFrames:
             self._graph.add_edge(edge.parent, edge.child, child=edge.child, place=place)
 
     @staticmethod
-    def from_bag(bag: Bag) -> StaticFrames:
+    def from_bag(bag: Bag) -> 'StaticFrames':
         """The transforms of /tf_static and part_pose."""
         return StaticFrames(_edges(bag, static=True))
 

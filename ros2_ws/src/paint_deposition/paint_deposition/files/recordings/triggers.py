@@ -1,7 +1,5 @@
 """The trigger of a recording: AtomizerState, Bool, or a number in a field of any message."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass

@@ -1,7 +1,5 @@
 """Headings of columns: their words and their units."""
 
-from __future__ import annotations
-
 import re
 import unicodedata
 from dataclasses import dataclass
@@ -28,7 +26,7 @@ class Heading:
     unit: str = ''
 
     @staticmethod
-    def of(text: str) -> Heading:
+    def of(text: str) -> 'Heading':
         """'X [mm]', 'x_mm', 'DFT, µm', 'Dicke in µm' and '/pose/orientation/w' are understood.
 
         A text in brackets that is no known unit stays as the unit, for the reader to refuse.

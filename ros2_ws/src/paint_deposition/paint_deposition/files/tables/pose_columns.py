@@ -1,7 +1,5 @@
 """The columns of a table of poses, known by their names."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
@@ -38,7 +36,7 @@ class PoseTable(Table):
     names: list[str] = field(default_factory=list)
 
     @staticmethod
-    def read(path: Path) -> PoseTable:
+    def read(path: Path) -> 'PoseTable':
         """Find the headings and the rows below them; without them the file is refused."""
         sheet, header = find_table(path, RecordingError, _known)
         if header is None:

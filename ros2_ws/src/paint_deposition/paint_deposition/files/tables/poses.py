@@ -1,7 +1,5 @@
 """A table of poses as a trajectory: timed poses, or programmed passes with their speeds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from pathlib import Path
 

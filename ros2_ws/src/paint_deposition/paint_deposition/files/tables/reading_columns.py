@@ -4,8 +4,6 @@ Columns are known by the project's own names, by a few usual English and German 
 the user names them, see ``Layout``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Any

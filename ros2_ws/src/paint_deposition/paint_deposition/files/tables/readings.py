@@ -1,7 +1,5 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
@@ -46,7 +44,7 @@ class ReadingTable:
     @staticmethod
     def read(
         path: Path, films: bool, layout: Layout, labels: Collection[str] = ()
-    ) -> ReadingTable:
+    ) -> 'ReadingTable':
         """Find the table of readings (``films``) or places in a file.
 
         A row with one of ``labels``, those of the listed points, is no statistic. Raises

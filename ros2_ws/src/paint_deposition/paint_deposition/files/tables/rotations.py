@@ -1,7 +1,5 @@
 """Orientations in a table of poses: quaternions, rotation vectors and Euler angles."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
-from __future__ import annotations
-
 import csv
 import re
 import zipfile
@@ -39,7 +37,7 @@ class Sheet:
     form: str
 
     @staticmethod
-    def of(numbered: Iterable[tuple[int, list[Cell]]], form: str) -> Sheet:
+    def of(numbered: Iterable[tuple[int, list[Cell]]], form: str) -> 'Sheet':
         """The rows that are not blank."""
         kept = [(line, row) for line, row in numbered if any(cell != '' for cell in row)]
         return Sheet([row for _, row in kept], [line for line, _ in kept], form)

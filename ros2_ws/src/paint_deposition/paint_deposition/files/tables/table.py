@@ -1,7 +1,5 @@
 """A table in a file: headings, the rows under them, and their numbers."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,7 +1,5 @@
 """Node `model_comparison`: compares gauge readings with the film of a model during painting."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

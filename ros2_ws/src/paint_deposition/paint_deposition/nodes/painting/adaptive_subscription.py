@@ -1,7 +1,5 @@
 """A subscription that adapts its quality of service to that of its publishers."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """The subscriptions to a gun's poses and states, which pass poses on in batches."""
 
-from __future__ import annotations
-
 import math
 import time
 from collections import Counter

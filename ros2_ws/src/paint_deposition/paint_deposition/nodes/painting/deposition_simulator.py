@@ -1,7 +1,5 @@
 """Node `deposition_simulator`: the film on a part as the atomizer paints it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor

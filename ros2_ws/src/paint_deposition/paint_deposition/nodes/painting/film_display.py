@@ -1,7 +1,5 @@
 """The publishers of the simulator's film: statistics, legend, mesh, cloud and field."""
 
-from __future__ import annotations
-
 import sys
 import time
 from array import array

@@ -1,7 +1,5 @@
 """Saving the film of a node, and its statistics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Transforming poses into the frame of the part."""
 
-from __future__ import annotations
-
 import contextlib
 from collections import deque
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """A colour bar beside the part, for viewers without one of their own."""
 
-from __future__ import annotations
-
 import numpy as np
 from geometry_msgs.msg import Point, Vector3
 from std_msgs.msg import ColorRGBA

@@ -1,7 +1,5 @@
 """Which side of the part is outward: the side that the guns point at."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from paint_deposition.film.live_film import LiveFilm

@@ -1,7 +1,5 @@
 """The diagnostics of the nodes that paint."""
 
-from __future__ import annotations
-
 import functools
 import math
 import time

@@ -1,7 +1,5 @@
 """The base class of the nodes that paint: the part, the incoming motion, the models."""
 
-from __future__ import annotations
-
 import time
 from abc import ABC, abstractmethod
 from collections import deque

@@ -1,7 +1,5 @@
 """The parameters that all painting nodes share, and the parts and films built from them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Changing the part in the cell: the film is saved, and a new film and a new run begin."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Repainting the motion so far with other models, in a thread beside the live painting."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable
 from concurrent.futures import Future

@@ -1,7 +1,5 @@
 """The action server that plans passes on a part."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Mapping
 from concurrent.futures import CancelledError, ThreadPoolExecutor

@@ -1,7 +1,5 @@
 """Node `index_planner`: recommends the index between passes, and plans passes on a part."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """The messages that are still valid when a run begins, and are repeated at its beginning."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 
 from rcl_interfaces.msg import ParameterEvent

@@ -1,7 +1,5 @@
 """A recorded topic: the subscription to its serialised messages, and their counts."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The parameters of the recorder, and the topics that it records by default."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS

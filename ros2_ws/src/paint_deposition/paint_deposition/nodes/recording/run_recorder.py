@@ -1,7 +1,5 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
-from __future__ import annotations
-
 import itertools
 import shutil
 import time

@@ -1,7 +1,5 @@
 """Node `bag_player`: replays the poses and the trigger of a bag."""
 
-from __future__ import annotations
-
 import math
 import threading
 from typing import Any

@@ -1,7 +1,5 @@
 """Flow control of a replay: it waits for the subscribers of the poses."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

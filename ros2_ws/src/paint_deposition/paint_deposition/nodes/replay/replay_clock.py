@@ -1,7 +1,5 @@
 """The time in a bag during its replay, which also advances between the messages."""
 
-from __future__ import annotations
-
 import math
 import threading
 import time

@@ -1,7 +1,5 @@
 """The messages that a bag player publishes: poses, states of the atomizer, transforms."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from itertools import groupby

@@ -1,7 +1,5 @@
 """Node `atomizer_source`: poses and states of the gun from the topics of a robot driver."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from functools import partial

@@ -1,7 +1,5 @@
 """The pose of a robot's tip, from its joint states or from tf."""
 
-from __future__ import annotations
-
 import time
 from collections import deque
 from collections.abc import Callable, Mapping

@@ -1,7 +1,5 @@
 """Managed (lifecycle) nodes, which can also configure and activate themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -4,8 +4,6 @@ A Marker of 100,000 triangles takes a second to build from Python objects. Here 
 once, and for each publication only its stamp and colours are rewritten in the bytes.
 """
 
-from __future__ import annotations
-
 import importlib
 import struct
 

@@ -1,7 +1,5 @@
 """The parameters that select a node's deposition model, and reading that model."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

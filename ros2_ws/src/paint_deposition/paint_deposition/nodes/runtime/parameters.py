@@ -1,7 +1,5 @@
 """Tables of node parameters, from which they are declared, described and validated."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """The process of a node: it spins, closes the node once, and ends with an exit code."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Names and quality of service of the topics."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

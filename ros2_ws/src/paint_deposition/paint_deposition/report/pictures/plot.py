@@ -1,7 +1,5 @@
 """Pictures of results on axes of the caller's."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from matplotlib.axes import Axes

@@ -1,7 +1,5 @@
 """One function that writes every result, and what the writers share."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from functools import singledispatch
