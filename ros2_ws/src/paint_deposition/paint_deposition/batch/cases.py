@@ -29,31 +29,22 @@ Columns = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Case:
-    """One piece of work.
+    """One piece of work."""
 
-    Attributes:
-        digest: of all that it is computed from; the same digest is never computed twice.
-        parameters: of this case alone, small.
-        inputs: names of what it shares with other cases, such as a part or a motion.
-        known: columns of its row that need no computation.
-    """
-
-    digest: str
-    parameters: Any
+    digest: str  # of all that it is computed from; the same digest is never computed twice
+    parameters: Any  # of this case alone, small
+    # Names of what it shares with other cases, such as a part or a motion.
     inputs: tuple[str, ...] = ()
+    # Columns of its row that need no computation.
     known: Mapping[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class ResultCache:
-    """A folder of results, a Parquet file for each case: a run that was cut off is resumed.
+    """A folder of results, a Parquet file for each case: a run that was cut off is resumed."""
 
-    Attributes:
-        folder: of the files, each written as a whole.
-        failures: columns of cases that could not be computed; the next run tries them again.
-    """
-
-    folder: Path
+    folder: Path  # of the files, each written as a whole
+    # Columns of cases that could not be computed; the next run tries them again.
     failures: dict[str, Columns] = field(default_factory=dict)
 
     def has(self, digest: str) -> bool:

@@ -35,28 +35,18 @@ class GunSwitch:
 
 @dataclass(frozen=True)
 class Move:
-    """A move to a pose of the TCP.
+    """A move to a pose of the TCP."""
 
-    Attributes:
-        position_m: (3,) TCP at the end of the move [m].
-        quaternion_xyzw: (4,) orientation of the tool there, scalar last.
-        spraying: whether the gun is on as the move begins.
-        via_m: (3,) point that a circular move passes through, None for straight ones.
-        switches: of the gun during the move, in the order written.
-        line: where it stands in its file, 0 for none.
-        flow: of the gun while it is on, relative to the calibrated one.
-        brush: its number while it is on; 0 is the only one.
-    """
-
-    position_m: np.ndarray
-    quaternion_xyzw: np.ndarray
+    position_m: np.ndarray  # (3,) TCP at the end of the move [m]
+    quaternion_xyzw: np.ndarray  # (4,) orientation of the tool there, scalar last
     speed_m_per_s: float
-    spraying: bool
+    spraying: bool  # whether the gun is on as the move begins
+    # (3,) point that a circular move passes through, None for straight ones.
     via_m: np.ndarray | None = None
-    switches: tuple[GunSwitch, ...] = ()
-    line: int = 0
-    flow: float = 1.0
-    brush: int = ONLY_BRUSH
+    switches: tuple[GunSwitch, ...] = ()  # of the gun during the move, in the order written
+    line: int = 0  # where it stands in its file, 0 for none
+    flow: float = 1.0  # of the gun while it is on, relative to the calibrated one
+    brush: int = ONLY_BRUSH  # its number while it is on; 0 is the only one
 
 
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:

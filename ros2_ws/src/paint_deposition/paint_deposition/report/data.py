@@ -32,18 +32,14 @@ class Change(NamedTuple):
 
 @dataclass(frozen=True)
 class ReportData:
-    """Everything the report is made of.
+    """Everything the report is made of."""
 
-    Attributes:
-        comparisons: of the first and the best model; one where nothing was added.
-        diagnosis: or None after a comparison alone.
-        older: history of the model that a diagnosis started from, as in its file.
-        names: of models that stand side by side; none where one model followed from another.
-    """
-
+    # Of the first and the best model; one where nothing was added.
     comparisons: tuple[Comparison, ...]
-    diagnosis: Diagnosis | None = None
+    diagnosis: Diagnosis | None = None  # or None after a comparison alone
+    # History of the model that a diagnosis started from, as in its file.
     older: Sequence[Mapping[str, Any]] = ()
+    # Of models that stand side by side; none where one model followed from another.
     names: tuple[str, ...] = ()
 
     @staticmethod

@@ -41,23 +41,16 @@ SECONDS_A_DAY = 86400.0
 
 @dataclass(frozen=True)
 class Series:
-    """A quantity of n parts.
+    """A quantity of n parts."""
 
-    Attributes:
-        name: 'level', 'misfit', or an effect's 'id.parameter'.
-        unit: of values. members: correlated amplitudes that share the chart, itself first.
-        values, sd: (n,) estimate from each part alone, and its standard deviation.
-        baseline: number of first parts that give the centre.
-        run_length: of each of its charts.
-    """
-
-    name: str
-    unit: str
-    members: tuple[str, ...]
+    name: str  # 'level', 'misfit', or an effect's 'id.parameter'
+    unit: str  # of values
+    members: tuple[str, ...]  # correlated amplitudes that share the chart, itself first
+    # (n,) estimate from each part alone, and its standard deviation.
     values: np.ndarray
     sd: np.ndarray
-    baseline: int
-    run_length: float
+    baseline: int  # number of first parts that give the centre
+    run_length: float  # of each of its charts
 
     @cached_property
     def centre(self) -> float:
@@ -155,31 +148,25 @@ def _grouped(known: Sequence[int], standard: np.ndarray, first: Sequence[int]) -
 
 @dataclass(frozen=True)
 class Change:
-    """One change of a series.
+    """One change of a series."""
 
-    Attributes:
-        series, unit, members: of what. kind: 'step' or 'drift'.
-        part: row of the first part after it. time_s: of that part; earliest_s, latest_s: its
-            95 % interval.
-        before, after: means (of a drift: at its beginning and at the end). sd: of their
-            difference. per_day: of a drift, else None.
-        strength: the difference in standard deviations of it.
-        also: weaker series that changed with it; their effects look alike on the film.
-    """
-
+    # Of what.
     series: str
     unit: str
     members: tuple[str, ...]
-    kind: str
-    part: int
-    time_s: float
+    kind: str  # 'step' or 'drift'
+    part: int  # row of the first part after it
+    time_s: float  # of that part
+    # Its 95 % interval.
     earliest_s: float
     latest_s: float
+    # Means (of a drift: at its beginning and at the end).
     before: float
     after: float
-    sd: float
-    per_day: float | None
-    strength: float
+    sd: float  # of their difference
+    per_day: float | None  # of a drift, else None
+    strength: float  # the difference in standard deviations of it
+    # Weaker series that changed with it; their effects look alike on the film.
     also: tuple[str, ...] = ()
 
     @property

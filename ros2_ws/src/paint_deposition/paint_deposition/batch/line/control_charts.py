@@ -22,16 +22,12 @@ STATES = 101
 
 @dataclass(frozen=True)
 class Charts:
-    """The two charts of n values in standard deviations from the centre.
+    """The two charts of n values in standard deviations from the centre."""
 
-    Attributes:
-        values: (n,) for Shewhart. ewma: (n,).
-        shewhart_limit, ewma_limit: a value beyond, either way, is an alarm; that of the EWMA is
-            (n,), for it widens over the first parts.
-    """
-
-    values: np.ndarray
-    ewma: np.ndarray
+    values: np.ndarray  # (n,) for Shewhart
+    ewma: np.ndarray  # (n,)
+    # A value beyond, either way, is an alarm; that of the EWMA is (n,), for it widens over the
+    # first parts.
     shewhart_limit: float
     ewma_limit: np.ndarray
 

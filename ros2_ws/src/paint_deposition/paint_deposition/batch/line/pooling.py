@@ -47,25 +47,18 @@ ONE_BRUSH = PatternVector()
 
 @dataclass(frozen=True)
 class Measured:
-    """One part and its P points.
+    """One part and its P points."""
 
-    Attributes:
-        name: of the part. time_s: when it was painted, seconds since 1970.
-        residual_um, sigma_um, predicted_um: (P,) measured minus predicted; standard deviation;
-            predicted [um].
-        positions_m: (P, 3).
-        by_pattern: (P, k) derivatives by the coordinates of the pattern, of all brushes [um].
-        by_effect: (P, A) by each amplitude of the catalogue in its typical size [um].
-    """
-
-    name: str
-    time_s: float
+    name: str  # of the part
+    time_s: float  # when it was painted, seconds since 1970
+    # (P,) measured minus predicted; standard deviation; predicted [um].
     residual_um: np.ndarray
     sigma_um: np.ndarray
     predicted_um: np.ndarray
-    positions_m: np.ndarray
+    positions_m: np.ndarray  # (P, 3)
+    # (P, k) derivatives by the coordinates of the pattern, of all brushes [um].
     by_pattern: np.ndarray
-    by_effect: np.ndarray
+    by_effect: np.ndarray  # (P, A) by each amplitude of the catalogue in its typical size [um]
 
     def __len__(self) -> int:
         return len(self.residual_um)
@@ -113,26 +106,17 @@ def places(parts: Sequence[Measured]) -> tuple[np.ndarray, list[np.ndarray]]:
 
 @dataclass(frozen=True)
 class SufficientStatistics:
-    """Of the readings of all parts, for K = k + F + A columns: pattern, places, effects.
+    """Of the readings of all parts, for K = k + F + A columns: pattern, places, effects."""
 
-    Attributes:
-        gram: (K, K) Gram matrix of the columns over the noise. score: (K,) their products with the
-            residuals. square: sum of squared residuals over the noise.
-        level_gram: (n, K) of each part, its film with the columns; level_score: (n,) with the
-            residuals; level_square: (n,) the film's square.
-        count: of the readings. place_m: (F, 3) places [m].
-        between_jobs: (k, k) covariance of the pattern's coordinates, of all brushes, before the
-            readings.
-    """
-
-    gram: np.ndarray
-    score: np.ndarray
-    square: float
-    level_gram: np.ndarray
-    level_score: np.ndarray
-    level_square: np.ndarray
-    count: int
-    place_m: np.ndarray
+    gram: np.ndarray  # (K, K) Gram matrix of the columns over the noise
+    score: np.ndarray  # (K,) their products with the residuals
+    square: float  # sum of squared residuals over the noise
+    level_gram: np.ndarray  # (n, K) of each part, its film with the columns
+    level_score: np.ndarray  # (n,) with the residuals
+    level_square: np.ndarray  # (n,) the film's square
+    count: int  # of the readings
+    place_m: np.ndarray  # (F, 3) places [m]
+    # (k, k) covariance of the pattern's coordinates, of all brushes, before the readings.
     between_jobs: np.ndarray
 
     @staticmethod
@@ -167,17 +151,11 @@ class SufficientStatistics:
 
 @dataclass(frozen=True)
 class Scales:
-    """The hyperparameters, which have no closed form.
+    """The hyperparameters, which have no closed form."""
 
-    Attributes:
-        level: standard deviation of the parts' levels, as a share.
-        noise: factor on the stated noise.
-        misfit: size and width of the misfit, None for none.
-    """
-
-    level: float
-    noise: float
-    misfit: tuple[float, float] | None
+    level: float  # standard deviation of the parts' levels, as a share
+    noise: float  # factor on the stated noise
+    misfit: tuple[float, float] | None  # size and width of the misfit, None for none
 
 
 @dataclass(frozen=True)
@@ -271,24 +249,19 @@ class MisfitMixture:
 
 @dataclass(frozen=True)
 class Cause:
-    """An effect that the parts share.
+    """An effect that the parts share."""
 
-    Attributes:
-        effect, parameter, unit: which.
-        value, sd: its amplitude and the standard deviation of it.
-        probability: that one of ``members`` acts, given what was accepted before.
-        members: effects that these readings cannot distinguish from it, itself first.
-        all_parts: its distance from zero in standard deviations, all parts together.
-    """
-
+    # Which.
     effect: str
     parameter: str
     unit: str
+    # Its amplitude and the standard deviation of it.
     value: float
     sd: float
-    probability: float
+    probability: float  # that one of ``members`` acts, given what was accepted before
+    # Effects that these readings cannot distinguish from it, itself first.
     members: tuple[str, ...]
-    all_parts: float
+    all_parts: float  # its distance from zero in standard deviations, all parts together
 
     @property
     def sentence(self) -> str:
@@ -307,16 +280,11 @@ class Cause:
 
 @dataclass(frozen=True)
 class Pooled:
-    """What the parts share.
+    """What the parts share."""
 
-    Attributes:
-        causes: accepted effects, in the order found. chosen: numbers of their amplitudes.
-        posterior: with the most probable scales given them.
-    """
-
-    causes: tuple[Cause, ...]
-    posterior: LinePosterior
-    chosen: tuple[int, ...]
+    causes: tuple[Cause, ...]  # accepted effects, in the order found
+    posterior: LinePosterior  # with the most probable scales given them
+    chosen: tuple[int, ...]  # numbers of their amplitudes
 
     @cached_property
     def _mean(self) -> np.ndarray:

@@ -44,22 +44,15 @@ MOST_SHOWN = 6
 
 @dataclass(frozen=True)
 class Line:
-    """The parts of a line.
+    """The parts of a line."""
 
-    Attributes:
-        folder: of the runs. model: of all. files: shared by all, by what they are.
-        table: a row for each part and point, in the order of the runs.
-        computed: how many runs were computed now. workers: what computed them, in words.
-        unmatched: names of files of the folder that belong to no run.
-    """
-
-    folder: Path
-    model: DepositionModel
-    files: Mapping[str, Path]
-    table: pa.Table
-    computed: int
-    workers: str
-    unmatched: Sequence[str] = ()
+    folder: Path  # of the runs
+    model: DepositionModel  # of all
+    files: Mapping[str, Path]  # shared by all, by what they are
+    table: pa.Table  # a row for each part and point, in the order of the runs
+    computed: int  # how many runs were computed now
+    workers: str  # what computed them, in words
+    unmatched: Sequence[str] = ()  # names of files of the folder that belong to no run
 
     @cached_property
     def parts(self) -> list[Measured]:

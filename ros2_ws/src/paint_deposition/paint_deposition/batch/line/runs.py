@@ -42,18 +42,13 @@ class LineFile(MotionSource, extra='forbid'):
 
 @dataclass(frozen=True)
 class Run:
-    """One run of the line, named for its recording.
-
-    Attributes:
-        path: its recording. readings: on the part, or None.
-        problem: why it cannot be used; remark: why its readings are not used; '' if they are.
-    """
+    """One run of the line, named for its recording."""
 
     name: str
-    path: Path
-    readings: Path | None = None
-    problem: str = ''
-    remark: str = ''
+    path: Path  # its recording
+    readings: Path | None = None  # on the part, or None
+    problem: str = ''  # why it cannot be used
+    remark: str = ''  # why its readings are not used; '' if they are
 
 
 def read_line(folder: Path) -> LineFile:

@@ -33,24 +33,17 @@ NOTHING = 'nothing'
 
 @dataclass
 class Job:
-    """The cases of a sweep and their inputs.
+    """The cases of a sweep and their inputs."""
 
-    Attributes:
-        file: the sweep. folder: that its paths are relative to.
-        values: of each case, what varies. cases: in the same order.
-        inputs: what they share, by name.
-        files: read for it, by what they are.
-        notes: for the user, a line each.
-        effects: by id, those of the library and users' own of the models.
-    """
-
-    file: SweepFile
-    folder: Path
-    values: list[Values] = field(default_factory=list)
-    cases: list[Case] = field(default_factory=list)
+    file: SweepFile  # the sweep
+    folder: Path  # that its paths are relative to
+    values: list[Values] = field(default_factory=list)  # of each case, what varies
+    cases: list[Case] = field(default_factory=list)  # in the same order
+    # What they share, by name.
     inputs: dict[str, Any] = field(default_factory=lambda: {NOTHING: None})
-    files: dict[str, Path] = field(default_factory=dict)
-    notes: dict[str, None] = field(default_factory=dict)
+    files: dict[str, Path] = field(default_factory=dict)  # read for it, by what they are
+    notes: dict[str, None] = field(default_factory=dict)  # for the user, a line each
+    # By id, those of the library and users' own of the models.
     effects: dict[str, type[Effect]] = field(default_factory=dict)
     _read: dict[Any, Any] = field(default_factory=dict, repr=False)
 

@@ -39,19 +39,12 @@ CHARTED = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
 
 @dataclass(frozen=True)
 class Sweep:
-    """The finished cases of a sweep.
+    """The finished cases of a sweep."""
 
-    Attributes:
-        job: what was swept.
-        table: a row for each case in the order of the job: what varied, then its figures.
-        computed: how many cases this run computed; the others had been finished before.
-        workers: what computed them, in words.
-    """
-
-    job: Job
-    table: pa.Table
-    computed: int
-    workers: str
+    job: Job  # what was swept
+    table: pa.Table  # a row for each case in the order of the job: what varied, then its figures
+    computed: int  # how many cases this run computed; the others had been finished before
+    workers: str  # what computed them, in words
 
     @staticmethod
     def of(job: Job, results: ResultCache, computed: int, workers: str) -> Sweep:

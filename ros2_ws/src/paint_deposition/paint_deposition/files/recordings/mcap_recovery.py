@@ -36,19 +36,14 @@ DAMAGE = (
 
 @dataclass
 class Recovery:
-    """The result of a recovery.
+    """The result of a recovery."""
 
-    Attributes:
-        folder: the new run. counts: messages by topic.
-        damaged_chunks: number of chunks left out because their content is damaged.
-        breaks: where and why reading stopped, one line for each incomplete file.
-        skipped_topics: topics that a rosbag2 folder cannot hold (not CDR, or without a schema).
-    """
-
-    folder: Path
-    counts: dict[str, int] = field(default_factory=dict)
-    damaged_chunks: int = 0
+    folder: Path  # the new run
+    counts: dict[str, int] = field(default_factory=dict)  # messages by topic
+    damaged_chunks: int = 0  # number of chunks left out because their content is damaged
+    # Where and why reading stopped, one line for each incomplete file.
     breaks: list[str] = field(default_factory=list)
+    # Topics that a rosbag2 folder cannot hold (not CDR, or without a schema).
     skipped_topics: list[str] = field(default_factory=list)
 
     @property

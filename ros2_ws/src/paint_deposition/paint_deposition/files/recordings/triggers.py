@@ -23,24 +23,17 @@ MOST_FIELDS = 12
 
 @dataclass(frozen=True)
 class RecordedTrigger:
-    """The trigger changes of a recording.
+    """The trigger changes of a recording."""
 
-    Attributes:
-        stamps_ns: (M,) int64 times of the changes; log times if ``by_log_time``.
-        flow: (M,) relative flow from then on.
-        brush: (M,) int64 brush from then on; empty if it is not recorded.
-        set_points: (M, 4) as in a trajectory; empty if none are recorded.
-        settings: median of each setting while the gun sprays.
-        notes: how the trigger was interpreted, one line each.
-    """
-
-    stamps_ns: np.ndarray
-    flow: np.ndarray
-    brush: np.ndarray
+    stamps_ns: np.ndarray  # (M,) int64 times of the changes; log times if ``by_log_time``
+    flow: np.ndarray  # (M,) relative flow from then on
+    brush: np.ndarray  # (M,) int64 brush from then on; empty if it is not recorded
+    # (M, 4) as in a trajectory; empty if none are recorded.
     set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    # Median of each setting while the gun sprays.
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  # how the trigger was interpreted, one line each
 
 
 def choose_state_topic(bag: Bag, name: str) -> BagTopic:

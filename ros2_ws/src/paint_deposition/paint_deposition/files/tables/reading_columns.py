@@ -46,18 +46,14 @@ BESIDE_AXIS = {'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', '
 
 @dataclass(frozen=True)
 class Layout:
-    """What the user says of a table; what is left out is found.
+    """What the user says of a table; what is left out is found."""
 
-    Attributes:
-        columns: heading, or number from 1, of a quantity's column.
-        unit: metres in the unit of 'position' and of 'thickness'.
-        decimal: '.' or ','. sheet: name of a workbook's sheet.
-    """
-
+    # Heading, or number from 1, of a quantity's column.
     columns: Mapping[Any, str | int] = field(default_factory=dict)
+    # Metres in the unit of 'position' and of 'thickness'.
     unit: Mapping[Any, float] = field(default_factory=dict)
-    decimal: str = ''
-    sheet: str = ''
+    decimal: str = ''  # '.' or ','
+    sheet: str = ''  # name of a workbook's sheet
 
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:

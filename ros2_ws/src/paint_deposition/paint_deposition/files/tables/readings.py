@@ -25,21 +25,16 @@ STATISTIC = re.compile(
 
 @dataclass(frozen=True)
 class ReadingTable:
-    """Rows of readings or points, apart from all that stands around them.
-
-    Attributes:
-        at: columns of each quantity; several of the thickness where each row holds repeats.
-        order: number of each row from 1, those without a reading counted.
-        film_unit_m: metres in the unit of the thickness where a line above or a column has it.
-        left_out: what was not taken for a row, for the user.
-    """
+    """Rows of readings or points, apart from all that stands around them."""
 
     table: Table
+    # Columns of each quantity; several of the thickness where each row holds repeats.
     at: dict[str, list[int]]
     layout: Layout
-    order: list[int]
+    order: list[int]  # number of each row from 1, those without a reading counted
+    # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
-    left_out: str
+    left_out: str  # what was not taken for a row, for the user
 
     @staticmethod
     def read(

@@ -29,21 +29,13 @@ SEED = 0
 
 @dataclass(frozen=True)
 class Region:
-    """Neighbouring points whose mean residual is significant.
+    """Neighbouring points whose mean residual is significant."""
 
-    Attributes:
-        description: in words, for a report.
-        experiment: name.
-        rows: (n,) points of the study.
-        readings: single readings at those points.
-        mean_residual_um: measured minus predicted [um].
-    """
-
-    description: str
-    experiment: str
-    rows: np.ndarray
-    readings: int
-    mean_residual_um: float
+    description: str  # in words, for a report
+    experiment: str  # name
+    rows: np.ndarray  # (n,) points of the study
+    readings: int  # single readings at those points
+    mean_residual_um: float  # measured minus predicted [um]
 
     def to_dict(self) -> dict[str, Any]:
         """An entry of ``regions`` in the files of results."""
@@ -129,12 +121,9 @@ def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How far the model is off on some of the readings.
+    """How far the model is off on some of the readings."""
 
-    Attributes:
-        experiment, kind, label: which readings: kind is 'experiment', 'group' or 'pass'.
-    """
-
+    # Which readings: kind is 'experiment', 'group' or 'pass'.
     experiment: str
     kind: str
     label: str

@@ -26,26 +26,18 @@ MOST_STRIPS = 6
 
 @dataclass(frozen=True)
 class Profile:
-    """One column or row of readings.
+    """One column or row of readings."""
 
-    Attributes:
-        experiment, label: name of the experiment and of the column or row.
-        axis: what the position is measured along, in words.
-        rows: (n,) points of the study, in order along the line.
-        position_m: (n,) of the points along the axis [m].
-        line_m: (L,) positions of the model's lines [m]; empty where there are too few readings.
-        lines_um: (models, L) what a gauge would show there [um].
-        passes_um: (passes, L) paint that each single pass brought, last model [um].
-    """
-
+    # Name of the experiment and of the column or row.
     experiment: str
     label: str
-    axis: str
-    rows: np.ndarray
-    position_m: np.ndarray
+    axis: str  # what the position is measured along, in words
+    rows: np.ndarray  # (n,) points of the study, in order along the line
+    position_m: np.ndarray  # (n,) of the points along the axis [m]
+    # (L,) positions of the model's lines [m]; empty where there are too few readings.
     line_m: np.ndarray
-    lines_um: np.ndarray
-    passes_um: np.ndarray
+    lines_um: np.ndarray  # (models, L) what a gauge would show there [um]
+    passes_um: np.ndarray  # (passes, L) paint that each single pass brought, last model [um]
 
 
 def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile]:

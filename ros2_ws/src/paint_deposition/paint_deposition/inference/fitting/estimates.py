@@ -23,23 +23,16 @@ TOO_CLOSE = 0.95
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter of the fitted model.
+    """A parameter of the fitted model."""
 
-    Attributes:
-        name: as in the model file; 'effect.parameter' for effects.
-        value: fitted. sigma: its standard deviation.
-        low, high: 95 % interval, within what is possible.
-        determined: whether the readings say anything about it.
-        reason: if not, why.
-    """
-
-    name: str
-    value: float
-    sigma: float
+    name: str  # as in the model file; 'effect.parameter' for effects
+    value: float  # fitted
+    sigma: float  # its standard deviation
+    # 95 % interval, within what is possible.
     low: float
     high: float
-    determined: bool
-    reason: str = ''
+    determined: bool  # whether the readings say anything about it
+    reason: str = ''  # if not, why
 
 
 @dataclass(frozen=True)

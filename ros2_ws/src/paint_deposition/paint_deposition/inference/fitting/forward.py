@@ -91,14 +91,10 @@ class Forward:
 
 @dataclass(frozen=True)
 class Terms:
-    """The readings as a function of the pattern's gains, for one r, sigma1 and sigma2.
+    """The readings as a function of the pattern's gains, for one r, sigma1 and sigma2."""
 
-    Attributes:
-        model: whose shape and effects they are.
-        predict_um: (P,) gauge readings [um] for (7 B,) weights of the films' terms, by brush.
-    """
-
-    model: DepositionModel
+    model: DepositionModel  # whose shape and effects they are
+    # (P,) gauge readings [um] for (7 B,) weights of the films' terms, by brush.
     predict_um: Callable[[np.ndarray], np.ndarray]
 
     def with_gains_um(self, patterns: Sequence[PlanarPattern]) -> np.ndarray:

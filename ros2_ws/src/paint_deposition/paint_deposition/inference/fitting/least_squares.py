@@ -38,30 +38,20 @@ on_one_thread = threadpool_limits.wrap(limits=1, user_api='blas')
 
 @dataclass(frozen=True)
 class Fit:
-    """A model fitted to readings.
+    """A model fitted to readings."""
 
-    Attributes:
-        parameters: what was varied.
-        vector: (k,) best values.
-        model: the model they stand for.
-        predicted_um: (P,) [um].
-        residual: (P,) measured minus predicted, over the standard deviation.
-        jacobian: (P, k) derivative of predictions over the standard deviation.
-        converged: whether the last search ended by itself.
-        nuisance: (P, n) nuisance directions that the fit allowed for, over the standard
-            deviation; their amplitudes are independent and standard normal.
-        remainder: (P, P) covariance of what nature leaves over, which the fit allowed for, or
-            None if it did not.
-    """
-
-    parameters: FreeParameters
-    vector: np.ndarray
-    model: DepositionModel
-    predicted_um: np.ndarray
-    residual: np.ndarray
-    jacobian: np.ndarray
-    converged: bool
+    parameters: FreeParameters  # what was varied
+    vector: np.ndarray  # (k,) best values
+    model: DepositionModel  # the model they stand for
+    predicted_um: np.ndarray  # (P,) [um]
+    residual: np.ndarray  # (P,) measured minus predicted, over the standard deviation
+    jacobian: np.ndarray  # (P, k) derivative of predictions over the standard deviation
+    converged: bool  # whether the last search ended by itself
+    # (P, n) nuisance directions that the fit allowed for, over the standard deviation; their
+    # amplitudes are independent and standard normal.
     nuisance: np.ndarray
+    # (P, P) covariance of what nature leaves over, which the fit allowed for, or None if it did
+    # not.
     remainder: np.ndarray | None = None
 
     @cached_property

@@ -40,24 +40,15 @@ NEGLIGIBLE = 1e-3
 
 @dataclass(frozen=True)
 class FittedPoints:
-    """Readings beside a fitted model.
+    """Readings beside a fitted model."""
 
-    Attributes:
-        residual_um: (P,) measured minus predicted.
-        predicted_um: (P,).
-        gauge_um: (P,) standard deviation of the points without the film's texture.
-        free_um: (P, n) directions in which the model may be off, for unit amplitudes.
-        experiment_of: (P,) part of each point. positions_m: (P, 3).
-        covariates: of the points.
-    """
-
-    residual_um: np.ndarray
-    predicted_um: np.ndarray
-    gauge_um: np.ndarray
-    free_um: np.ndarray
-    experiment_of: np.ndarray
-    positions_m: np.ndarray
-    covariates: tuple[Covariate, ...]
+    residual_um: np.ndarray  # (P,) measured minus predicted
+    predicted_um: np.ndarray  # (P,)
+    gauge_um: np.ndarray  # (P,) standard deviation of the points without the film's texture
+    free_um: np.ndarray  # (P, n) directions in which the model may be off, for unit amplitudes
+    experiment_of: np.ndarray  # (P,) part of each point
+    positions_m: np.ndarray  # (P, 3)
+    covariates: tuple[Covariate, ...]  # of the points
 
     @cached_property
     def leave_one_out(self) -> 'LeaveOneOut':
@@ -74,21 +65,13 @@ class FittedPoints:
 
 @dataclass(frozen=True)
 class LeaveOneOut:
-    """Leave-one-out predictions of the readings by each of M models.
+    """Leave-one-out predictions of the readings by each of M models."""
 
-    Attributes:
-        log_weight: (M,) logarithm of prior share times likelihood.
-        texture: (M,) of each model.
-        expected_um: (M, P) residual that the other readings predict.
-        sigma_um: (M, P) standard deviation of that prediction.
-        residual_um: (P,).
-    """
-
-    log_weight: np.ndarray
-    texture: np.ndarray
-    expected_um: np.ndarray
-    sigma_um: np.ndarray
-    residual_um: np.ndarray
+    log_weight: np.ndarray  # (M,) logarithm of prior share times likelihood
+    texture: np.ndarray  # (M,) of each model
+    expected_um: np.ndarray  # (M, P) residual that the other readings predict
+    sigma_um: np.ndarray  # (M, P) standard deviation of that prediction
+    residual_um: np.ndarray  # (P,)
 
     @staticmethod
     def of(misfit: FittedPoints) -> 'LeaveOneOut':
@@ -176,16 +159,11 @@ GUESS_SIGMAS = 3.0
 
 @dataclass(frozen=True)
 class Outlier:
-    """A reading that was left out, and what model and other readings predict there.
+    """A reading that was left out, and what model and other readings predict there."""
 
-    Attributes:
-        point: its label, which names the part.
-        thickness_um: as it was given.
-        expected_um, sigma_um: what the model and the other readings predict there.
-    """
-
-    point: str
-    thickness_um: float
+    point: str  # its label, which names the part
+    thickness_um: float  # as it was given
+    # What the model and the other readings predict there.
     expected_um: float
     sigma_um: float
 

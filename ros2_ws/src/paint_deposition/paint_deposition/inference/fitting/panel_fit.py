@@ -33,15 +33,11 @@ NARROWEST, WIDEST = 0.02, 1.0
 
 @dataclass(frozen=True)
 class CollapseFit:
-    """The three Gaussians of a pass.
+    """The three Gaussians of a pass."""
 
-    Attributes:
-        collapse: eq. (3) for the first pass's speed.
-        residuals: of the P points, with the film of all passes as the prediction.
-    """
-
+    # Eq. (3) for the first pass's speed.
     collapse: ThreeGaussianCollapse
-    residuals: Residuals
+    residuals: Residuals  # of the P points, with the film of all passes as the prediction
 
 
 def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) -> CollapseFit:
@@ -92,22 +88,14 @@ STRIPS_M = (0.05, 0.1)
 
 @dataclass(frozen=True)
 class Reach:
-    """How far the readings of a panel reach to both sides of the pass that they cover best.
+    """How far the readings of a panel reach to both sides of the pass that they cover best."""
 
-    Attributes:
-        experiment: its number. name: its name.
-        across_m: (P,) coordinate of its points across the passes [m].
-        ends_m: distance of the outermost reading on either side [m].
-        beyond: share of the pass's paint that lands further out on either side.
-        needed_m: distance at which both sides would be reached [m].
-    """
-
-    experiment: int
-    name: str
-    across_m: np.ndarray
-    ends_m: tuple[float, float]
-    beyond: tuple[float, float]
-    needed_m: float
+    experiment: int  # its number
+    name: str  # its name
+    across_m: np.ndarray  # (P,) coordinate of its points across the passes [m]
+    ends_m: tuple[float, float]  # distance of the outermost reading on either side [m]
+    beyond: tuple[float, float]  # share of the pass's paint that lands further out on either side
+    needed_m: float  # distance at which both sides would be reached [m]
 
     def __str__(self) -> str:
         return (

@@ -19,15 +19,10 @@ from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
 
 @dataclass(frozen=True)
 class Prior:
-    """A normal distribution, its covariance given by a square root.
+    """A normal distribution, its covariance given by a square root."""
 
-    Attributes:
-        centre: (k,) mean.
-        factor: (k, k) lower Cholesky factor of the covariance.
-    """
-
-    centre: np.ndarray
-    factor: np.ndarray
+    centre: np.ndarray  # (k,) mean
+    factor: np.ndarray  # (k, k) lower Cholesky factor of the covariance
 
     @cached_property
     def width(self) -> np.ndarray:
@@ -55,24 +50,17 @@ SHAPE_DEVIATIONS = 4.0
 
 @dataclass(frozen=True)
 class EffectParameter:
-    """One entry of the vector for an effect: an amplitude, or a shape such as a length.
+    """One entry of the vector for an effect: an amplitude, or a shape such as a length."""
 
-    Attributes:
-        effect: id. name: of the parameter.
-        neutral, low, high: its neutral (for a shape: default) value and its bounds.
-        unit: an amplitude's typical size; for a shape, the logarithm that counts as one.
-        is_shape: whether it is a shape.
-        coordinate: its name in a posterior, where it is ``offset`` + ``unit`` times the entry.
-    """
-
-    effect: str
-    name: str
+    effect: str  # id
+    name: str  # of the parameter
+    # Its neutral (for a shape: default) value and its bounds.
     neutral: float
     low: float
     high: float
-    unit: float
-    is_shape: bool
-    coordinate: str
+    unit: float  # an amplitude's typical size; for a shape, the logarithm that counts as one
+    is_shape: bool  # whether it is a shape
+    coordinate: str  # its name in a posterior, where it is ``offset`` + ``unit`` times the entry
 
     @staticmethod
     def of(effect: Effect, name: str) -> 'EffectParameter':
@@ -105,17 +93,12 @@ class EffectParameter:
 
 @dataclass(frozen=True)
 class FreeParameters:
-    """The parameters of a model that are varied.
+    """The parameters of a model that are varied."""
 
-    Attributes:
-        start: the model that fixes everything else, effects included.
-        varied: (effect id, parameter name) of the amplitudes and shapes that are varied.
-        known: what is known of them from an earlier job, or None.
-    """
-
-    start: DepositionModel
+    start: DepositionModel  # the model that fixes everything else, effects included
+    # (effect id, parameter name) of the amplitudes and shapes that are varied.
     varied: tuple[tuple[str, str], ...] = ()
-    known: Posterior | None = None
+    known: Posterior | None = None  # what is known of them from an earlier job, or None
 
     @staticmethod
     def of(

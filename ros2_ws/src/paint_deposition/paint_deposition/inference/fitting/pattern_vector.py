@@ -28,13 +28,9 @@ LEAST_K3 = 1e-3
 
 @dataclass(frozen=True)
 class PatternVector:
-    """Positions of the patterns in the vector.
+    """Positions of the patterns in the vector."""
 
-    Attributes:
-        brushes: their numbers; a single pattern needs none.
-    """
-
-    brushes: tuple[int, ...] = ()
+    brushes: tuple[int, ...] = ()  # their numbers; a single pattern needs none
 
     @property
     def count(self) -> int:

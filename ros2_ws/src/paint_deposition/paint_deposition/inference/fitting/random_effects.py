@@ -26,37 +26,26 @@ NOTABLE = 2.0
 
 @dataclass(frozen=True)
 class RandomEffects:
-    """Those of one kind.
+    """Random effects of one kind."""
 
-    Attributes:
-        kind: 'part level', or 'gauge zero'.
-        unit: of their amounts.
-        mixing: (n, n) amounts in the unit for amplitudes of unit variance.
-        columns: (P, n) directions over the noise, for amplitudes of unit variance.
-    """
-
-    kind: str
-    unit: str
+    kind: str  # 'part level', or 'gauge zero'
+    unit: str  # of their amounts
     names: tuple[str, ...]
-    mixing: np.ndarray
-    columns: np.ndarray
+    mixing: np.ndarray  # (n, n) amounts in the unit for amplitudes of unit variance
+    columns: np.ndarray  # (P, n) directions over the noise, for amplitudes of unit variance
 
 
 @dataclass(frozen=True)
 class Amount:
-    """The estimate of one random effect.
+    """The estimate of one random effect."""
 
-    Attributes:
-        kind, of: which, and of what part or session.
-        value, sd: posterior mean and standard deviation.
-        unit: of both.
-    """
-
+    # Which, and of what part or session.
     kind: str
     of: str
+    # Posterior mean and standard deviation.
     value: float
     sd: float
-    unit: str
+    unit: str  # of both
 
     @property
     def is_notable(self) -> bool:

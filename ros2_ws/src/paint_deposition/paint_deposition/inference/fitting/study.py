@@ -36,13 +36,10 @@ class Texture:
     """The film's own variation from spot to spot, which no model predicts.
 
     Repeats at one spot do not average it out, and it is no error of the gauge.
-
-    Attributes:
-        share: standard deviation as a share of the film.
-        source: 'neighbours' if estimated from readings near each other, else 'assumed'.
     """
 
-    share: float = TEXTURE_SHARE
+    share: float = TEXTURE_SHARE  # standard deviation as a share of the film
+    # 'neighbours' if estimated from readings near each other, else 'assumed'.
     source: str = 'assumed'
 
     def __str__(self) -> str:
@@ -54,22 +51,14 @@ class Texture:
 
 @dataclass(frozen=True)
 class Study:
-    """A campaign with everything that inference needs of it.
+    """A campaign with everything that inference needs of it."""
 
-    Attributes:
-        campaign: the experiments.
-        forward: predicts the P points.
-        noise: of single readings.
-        texture: of the film.
-        outliers: single readings that were left out, see ``clean_and_fit``.
-        facet_um: (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
-    """
-
-    campaign: Campaign
-    forward: Forward
-    noise: GaugeNoise
-    texture: Texture = Texture()
-    outliers: tuple[Outlier, ...] = ()
+    campaign: Campaign  # the experiments
+    forward: Forward  # predicts the P points
+    noise: GaugeNoise  # of single readings
+    texture: Texture = Texture()  # of the film
+    outliers: tuple[Outlier, ...] = ()  # single readings that were left out, see ``clean_and_fit``
+    # (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
     facet_um: np.ndarray | None = None
     _rays: dict = field(default_factory=dict, repr=False)
 

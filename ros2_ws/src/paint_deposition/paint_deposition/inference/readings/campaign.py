@@ -24,35 +24,25 @@ STENCIL_M = 0.006
 
 @dataclass(frozen=True)
 class Experiment:
-    """One painted part: the surface, the path that painted it, the readings taken on it.
+    """One painted part: the surface, the path that painted it, the readings taken on it."""
 
-    Attributes:
-        name: for reports.
-        surface: the refined part.
-        path: sub-steps of the recorded motion.
-        readings: those that are used.
-        means: the readings averaged over repeats; its P points are what is fitted.
-        points: the P measured points on the surface, followed by the stencils around them from
-            which the film's slope is taken.
-        taken: all readings; used: (N,) which of them are used.
-        files: where mesh, trajectory and readings came from, for reports.
-        settings: of the process, by name, where known.
-        switched_off: of the cell while the part was painted: 'voltage', 'draught'.
-        frame_id: of the recorded poses, '' where not known.
-    """
-
-    name: str
-    surface: Surface
-    path: SprayPath
-    readings: Readings
-    means: PointMeans
+    name: str  # for reports
+    surface: Surface  # the refined part
+    path: SprayPath  # sub-steps of the recorded motion
+    readings: Readings  # those that are used
+    means: PointMeans  # the readings averaged over repeats; its P points are what is fitted
+    # The P measured points on the surface, followed by the stencils around them from which the
+    # film's slope is taken.
     points: SurfacePoints
-    taken: Readings
-    used: np.ndarray
+    taken: Readings  # all readings
+    used: np.ndarray  # (N,) which of them are used
+    # Where mesh, trajectory and readings came from, for reports.
     files: dict[str, str] = field(default_factory=dict)
+    # Of the process, by name, where known.
     settings: Mapping[str, float] = field(default_factory=dict)
+    # Of the cell while the part was painted: 'voltage', 'draught'.
     switched_off: frozenset[str] = frozenset()
-    frame_id: str = ''
+    frame_id: str = ''  # of the recorded poses, '' where not known
 
     @staticmethod
     def of(

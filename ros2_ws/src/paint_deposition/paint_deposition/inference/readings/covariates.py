@@ -17,15 +17,10 @@ ROUNDING = 1e-4
 
 @dataclass(frozen=True)
 class Covariate:
-    """One quantity at each point.
+    """One quantity at each point."""
 
-    Attributes:
-        name: with its unit, as in the report.
-        values: (P,).
-    """
-
-    name: str
-    values: np.ndarray
+    name: str  # with its unit, as in the report
+    values: np.ndarray  # (P,)
 
     @property
     def varies(self) -> bool:
@@ -35,23 +30,16 @@ class Covariate:
 
 @dataclass(frozen=True)
 class Rays:
-    """Straight rays from the M sub-steps that spray to the P points, for eqs. (1) and (2) alone.
+    """Straight rays from the M spraying sub-steps to the P points, for eqs. (1) and (2) alone."""
 
-    Attributes:
-        share: (M, P) film that each sub-step leaves at each point [um].
-        x_m, y_m: (M, P) where the ray pierces the model plane, tool axes [m].
-        cos_incidence: (M, P). standoff_ratio: (M, P) distance along the axis over Omega.
-        rows: (M,) rows of the experiment's path.
-        experiment: whose path and points they join.
-    """
-
-    share: np.ndarray
+    share: np.ndarray  # (M, P) film that each sub-step leaves at each point [um]
+    # (M, P) where the ray pierces the model plane, tool axes [m].
     x_m: np.ndarray
     y_m: np.ndarray
-    cos_incidence: np.ndarray
-    standoff_ratio: np.ndarray
-    rows: np.ndarray
-    experiment: Experiment
+    cos_incidence: np.ndarray  # (M, P)
+    standoff_ratio: np.ndarray  # (M, P) distance along the axis over Omega
+    rows: np.ndarray  # (M,) rows of the experiment's path
+    experiment: Experiment  # whose path and points they join
 
     @staticmethod
     def of(experiment: Experiment, model: DepositionModel) -> 'Rays':

@@ -131,18 +131,12 @@ class _Repeats:
 
 @dataclass(frozen=True)
 class GaugeNoise:
-    """Standard deviation of one reading.
+    """Standard deviation of one reading."""
 
-    Attributes:
-        sigma_um: (N,) of each reading [um].
-        source: 'repeats', 'stated' or 'assumed'.
-        degrees_of_freedom: of the estimate; inf where stated, few where assumed.
-        gross: (N,) readings that contradict others at their point; the noise is without them.
-    """
-
-    sigma_um: np.ndarray
-    source: str
-    degrees_of_freedom: float
+    sigma_um: np.ndarray  # (N,) of each reading [um]
+    source: str  # 'repeats', 'stated' or 'assumed'
+    degrees_of_freedom: float  # of the estimate; inf where stated, few where assumed
+    # (N,) readings that contradict others at their point; the noise is without them.
     gross: np.ndarray
 
     @property

@@ -21,25 +21,16 @@ INNER, STRAIGHT_M = (0.05, 0.95), 0.02
 
 @dataclass(frozen=True)
 class Panel:
-    """Where readings and passes lie across the direction of travel.
+    """Where readings and passes lie across the direction of travel."""
 
-    Attributes:
-        across_m: (P,) coordinate of each point [m].
-        passes_m: (n,) coordinate of each pass's line [m].
-        speed_m_per_s: (n,) of each pass.
-        mirrored: (n,) bool, passes on which the gun was turned by half a turn against the first.
-        distance_m: mean distance of the TCP from the surface, the standoff [m].
-        travel_rad: direction of the first pass in the tool's x-y frame [rad].
-        brush: number of the brush of all passes.
-    """
-
-    across_m: np.ndarray
-    passes_m: np.ndarray
-    speed_m_per_s: np.ndarray
+    across_m: np.ndarray  # (P,) coordinate of each point [m]
+    passes_m: np.ndarray  # (n,) coordinate of each pass's line [m]
+    speed_m_per_s: np.ndarray  # (n,) of each pass
+    # (n,) bool, passes on which the gun was turned by half a turn against the first.
     mirrored: np.ndarray
-    distance_m: float
-    travel_rad: float
-    brush: int = ONLY_BRUSH
+    distance_m: float  # mean distance of the TCP from the surface, the standoff [m]
+    travel_rad: float  # direction of the first pass in the tool's x-y frame [rad]
+    brush: int = ONLY_BRUSH  # number of the brush of all passes
 
     @staticmethod
     def of(experiment: Experiment) -> 'Panel | None':

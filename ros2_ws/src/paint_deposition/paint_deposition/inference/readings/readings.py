@@ -87,19 +87,12 @@ class Readings:
 
 @dataclass(frozen=True)
 class PointMeans:
-    """Readings averaged over their repeats: one row a point, in order of first appearance.
+    """Readings averaged over their repeats: one row a point, in order of first appearance."""
 
-    Attributes:
-        first: (P,) row of the point's first reading.
-        repeats: (P,) number of readings.
-        mean_um: (P,) [um].
-        owner: (N,) point of each reading.
-    """
-
-    first: np.ndarray
-    repeats: np.ndarray
-    mean_um: np.ndarray
-    owner: np.ndarray
+    first: np.ndarray  # (P,) row of the point's first reading
+    repeats: np.ndarray  # (P,) number of readings
+    mean_um: np.ndarray  # (P,) [um]
+    owner: np.ndarray  # (N,) point of each reading
 
     @staticmethod
     def of(readings: Readings) -> 'PointMeans':

@@ -16,16 +16,12 @@ def root_mean_square(values: np.ndarray) -> float:
 
 @dataclass(frozen=True)
 class Residuals:
-    """Measured and predicted film; residual = measured minus predicted.
+    """Measured and predicted film; residual = measured minus predicted."""
 
-    Attributes:
-        measured_um, predicted_um: (N,) films [um].
-        sigma_um: (N,) standard deviations of the measurements [um].
-    """
-
+    # (N,) films [um].
     measured_um: np.ndarray
     predicted_um: np.ndarray
-    sigma_um: np.ndarray
+    sigma_um: np.ndarray  # (N,) standard deviations of the measurements [um]
 
     def __len__(self) -> int:
         return len(self.measured_um)

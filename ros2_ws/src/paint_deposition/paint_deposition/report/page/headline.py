@@ -21,17 +21,13 @@ LIKELY = 0.5
 
 @dataclass(frozen=True)
 class Headline:
-    """What stands at the top of the report.
+    """What stands at the top of the report."""
 
-    Attributes:
-        tone: 'good', 'found', 'open' or 'bad'.
-        kicker, title: what kind of verdict, and the verdict.
-        facts: (question, answer) in the order of reading; an empty answer is left out.
-    """
-
-    tone: str
+    tone: str  # 'good', 'found', 'open' or 'bad'
+    # What kind of verdict, and the verdict.
     kicker: str
     title: str
+    # (question, answer) in the order of reading; an empty answer is left out.
     facts: tuple[tuple[str, str], ...]
 
 

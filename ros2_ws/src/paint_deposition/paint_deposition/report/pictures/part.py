@@ -29,21 +29,13 @@ HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 
 @dataclass(frozen=True)
 class PartPicture:
-    """What a picture shows of a part.
+    """What a picture shows of a part."""
 
-    Attributes:
-        view: the directions of the picture.
-        flat_m: (V, 2) places of the vertices in the picture [m].
-        faces: (F, 3) triangles that look at the viewer, the farthest first.
-        seen: (F,) bool, those of them with nothing before their middle.
-        edges_m: (E, 2, 2) visible creases and free edges in the picture [m].
-    """
-
-    view: View
-    flat_m: np.ndarray
-    faces: np.ndarray
-    seen: np.ndarray
-    edges_m: np.ndarray
+    view: View  # the directions of the picture
+    flat_m: np.ndarray  # (V, 2) places of the vertices in the picture [m]
+    faces: np.ndarray  # (F, 3) triangles that look at the viewer, the farthest first
+    seen: np.ndarray  # (F,) bool, those of them with nothing before their middle
+    edges_m: np.ndarray  # (E, 2, 2) visible creases and free edges in the picture [m]
 
     @staticmethod
     def of(surface: Surface) -> 'PartPicture':

@@ -12,16 +12,12 @@ SNAP_COSINE = 0.9
 
 @dataclass(frozen=True)
 class View:
-    """The directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer.
-
-    Attributes:
-        labels: names of the axes to the right and up.
-    """
+    """Directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer."""
 
     right: np.ndarray
     up: np.ndarray
     toward: np.ndarray
-    labels: tuple[str, str]
+    labels: tuple[str, str]  # names of the axes to the right and up
 
     @staticmethod
     def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':

@@ -36,18 +36,14 @@ COLUMNS = (
 
 @dataclass(frozen=True)
 class Passes:
-    """A motion in the part's frame, timed and as moves of a robot program, and its model.
-
-    Attributes:
-        made: how, for the head of the program, as 'Planned'.
-        part: the robot's frame and the pose of the part in it; bag and table have their poses in
-            that frame then, and the program defines its work object so. None: the part's frame.
-    """
+    """A motion in the part's frame, timed and as moves of a robot program, and its model."""
 
     trajectory: Trajectory
     moves: Sequence[Move]
     model: DepositionModel
-    made: str
+    made: str  # how, for the head of the program, as 'Planned'
+    # The robot's frame and the pose of the part in it; bag and table have their poses in that
+    # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
 
 
