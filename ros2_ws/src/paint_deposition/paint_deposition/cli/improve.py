@@ -1,5 +1,7 @@
 """The command `improve`: speeds, flows and triggers of a given programme for a more even film."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """Commands that set the model against readings: `calibrate`, `compare`, `diagnose`, `refit`."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from pathlib import Path

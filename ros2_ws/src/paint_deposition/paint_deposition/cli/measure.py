@@ -1,5 +1,7 @@
 """The command `measure`: where to put the gauge on a part."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

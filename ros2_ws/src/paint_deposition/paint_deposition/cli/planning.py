@@ -1,5 +1,7 @@
 """Commands that lay out passes: `recommend` and `plan`."""
 
+from __future__ import annotations
+
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any

@@ -1,5 +1,7 @@
 """The command `simulate`: the film on a part from a recorded trajectory."""
 
+from __future__ import annotations
+
 import math
 from collections.abc import Iterator
 from pathlib import Path
