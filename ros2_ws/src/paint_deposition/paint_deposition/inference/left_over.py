@@ -8,14 +8,10 @@ import numpy as np
 
 @dataclass(frozen=True)
 class FootprintProfile:
-    """The footprint from its middle outward, averaged over the angle, over the peak of eq. (1).
+    """The footprint from its middle outward, averaged over the angle, over the peak of eq. (1)."""
 
-    Attributes:
-        radius_m: (n,) on the model plane [m].
-        eq1, found, sd: (n,) of eq. (1), as the readings have it, and how well they know it.
-    """
-
-    radius_m: np.ndarray
+    radius_m: np.ndarray  # (n,) on the model plane [m]
+    # (n,) of eq. (1), as the readings have it, and how well they know it.
     eq1: np.ndarray
     found: np.ndarray
     sd: np.ndarray
@@ -27,22 +23,16 @@ class FootprintProfile:
 
 @dataclass(frozen=True)
 class RemainderFigures:
-    """What nature leaves over in a campaign, as far as its readings show it.
+    """What nature leaves over in a campaign, as far as its readings show it."""
 
-    Attributes:
-        setting_share, part_share: by how much the film of a setting differs from any law, and
-            parts of one setting from each other, as shares of the thickest film.
-        length_m: over which neighbours differ alike [m].
-        footprint_of_peak: largest deviation of the footprint from eq. (1) that shows, over its
-            peak.
-        profile: of the footprint.
-    """
-
+    # By how much the film of a setting differs from any law, and parts of one setting from each
+    # other, as shares of the thickest film.
     setting_share: float
     part_share: float
-    length_m: float
+    length_m: float  # over which neighbours differ alike [m]
+    # Largest deviation of the footprint from eq. (1) that shows, over its peak.
     footprint_of_peak: float
-    profile: FootprintProfile
+    profile: FootprintProfile  # of the footprint
 
     def to_dict(self) -> dict[str, float]:
         """Sizes and length, for JSON."""

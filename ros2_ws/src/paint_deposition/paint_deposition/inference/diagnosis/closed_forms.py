@@ -51,21 +51,13 @@ class Parameter:
 
 @dataclass(frozen=True)
 class ClosedForm:
-    """A law in two to four parameters, the level among them.
+    """A law in two to four parameters, the level among them."""
 
-    Attributes:
-        name: of the form, as 'power'.
-        formula: over the variable's name, for people.
-        code: over x, in Python, with exp and log.
-        parameters: by name; positions and scales are those of the variable.
-        probability: among the forms tried, none of them being none.
-    """
-
-    name: str
-    formula: str
-    code: str
-    parameters: dict[str, Parameter]
-    probability: float
+    name: str  # of the form, as 'power'
+    formula: str  # over the variable's name, for people
+    code: str  # over x, in Python, with exp and log
+    parameters: dict[str, Parameter]  # by name; positions and scales are those of the variable
+    probability: float  # among the forms tried, none of them being none
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """The factor, or the addition [um], at values of the variable."""
@@ -83,16 +75,12 @@ class ClosedForm:
 
 @dataclass(frozen=True)
 class _Shape:
-    """A parameter of a form before it is fitted, in units of the range of the variable.
+    """A parameter of a form before it is fitted, in units of the range of the variable."""
 
-    Attributes:
-        power: of the variable's unit. role: 'amplitude', 0 where the form is flat, or 'shape'.
-        starts, bounds: of the fit.
-    """
-
-    power: int
+    power: int  # of the variable's unit
     words: str
-    role: str = 'amplitude'
+    role: str = 'amplitude'  # 'amplitude', 0 where the form is flat, or 'shape'
+    # Of the fit.
     starts: tuple[float, ...] = (0.0,)
     bounds: tuple[float, float] = (-20.0, 20.0)
 

@@ -24,22 +24,17 @@ UNSEEN = 1e-9
 
 @dataclass(frozen=True)
 class NullModel:
-    """The null hypothesis that nothing is missing, as the distribution it gives the readings.
+    """The null hypothesis that nothing is missing, as the distribution it gives the readings."""
 
-    Attributes:
-        columns: (P, m) directions in which the base model and the nuisance vary, for unit
-            amplitudes, over the noise.
-        raw: (P,) deviations over the noise from the base model at the centre of its priors.
-        remainder: (P, P) covariance of what nature leaves over, or None if nothing is.
-        lower: (P, P) Cholesky factor of the deviations' covariance.
-        deviation: (P,) whitened deviations; standard normal if nothing is missing.
-    """
-
+    # (P, m) directions in which the base model and the nuisance vary, for unit amplitudes, over
+    # the noise.
     columns: np.ndarray
+    # (P,) deviations over the noise from the base model at the centre of its priors.
     raw: np.ndarray
+    # (P, P) covariance of what nature leaves over, or None if nothing is.
     remainder: np.ndarray | None
-    lower: np.ndarray
-    deviation: np.ndarray
+    lower: np.ndarray  # (P, P) Cholesky factor of the deviations' covariance
+    deviation: np.ndarray  # (P,) whitened deviations; standard normal if nothing is missing
 
     @staticmethod
     def of(
@@ -140,18 +135,12 @@ def hold_out(null: NullModel, folds: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Principal:
-    """Whitened directions of one explanation, turned to be orthogonal to each other.
+    """Whitened directions of one explanation, turned to be orthogonal to each other."""
 
-    Attributes:
-        columns: (P, m) the directions.
-        axes: (n, m) what each amplitude, a row, is along them.
-        signed: (q, m) rows of the amplitudes whose sign is known. sides: (q,) +1 or -1.
-    """
-
-    columns: np.ndarray
-    axes: np.ndarray
-    signed: np.ndarray
-    sides: np.ndarray
+    columns: np.ndarray  # (P, m) the directions
+    axes: np.ndarray  # (n, m) what each amplitude, a row, is along them
+    signed: np.ndarray  # (q, m) rows of the amplitudes whose sign is known
+    sides: np.ndarray  # (q,) +1 or -1
 
     @staticmethod
     def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':

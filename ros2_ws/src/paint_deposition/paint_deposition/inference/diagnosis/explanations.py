@@ -45,25 +45,17 @@ LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25), FOOTPRINT: (2.0, 6.0)}
 
 @dataclass(frozen=True)
 class Explanation:
-    """One way in which a cause explains the readings.
+    """One way in which a cause explains the readings."""
 
-    Attributes:
-        cause: an effect's id, or ``UNKNOWN``.
-        columns: (P, n) directions over the noise, for amplitudes of unit variance.
-        sides: (n,) +1 or -1 where physics fixes the sign of an amplitude, else 0.
-        share: prior share of this explanation among those of its cause.
-        law: of an effect; its directions are ``columns``. None for a law of any form.
-        random: the law of any form whose amplitudes the directions are, or None.
-        corrects: id of the effect whose law it corrects, if it does.
-    """
-
-    cause: str
-    columns: np.ndarray
-    sides: np.ndarray
-    share: float
+    cause: str  # an effect's id, or ``UNKNOWN``
+    columns: np.ndarray  # (P, n) directions over the noise, for amplitudes of unit variance
+    sides: np.ndarray  # (n,) +1 or -1 where physics fixes the sign of an amplitude, else 0
+    share: float  # prior share of this explanation among those of its cause
+    # Of an effect; its directions are ``columns``. None for a law of any form.
     law: Sensitivity | None = None
+    # The law of any form whose amplitudes the directions are, or None.
     random: RandomLaw | None = None
-    corrects: str = ''
+    corrects: str = ''  # id of the effect whose law it corrects, if it does
 
     @property
     def learns(self) -> str:

@@ -20,19 +20,15 @@ WORTH_LEARNING = 6.0
 
 @dataclass(frozen=True)
 class Nulls:
-    """What a law of each kind must say more than.
+    """What a law of each kind must say more than."""
 
-    Attributes:
-        footprint: for a footprint: pattern, nuisance, what the accepted laws may be off by, and
-            what nature leaves over of parts and settings.
-        correction: for a correction of an accepted law: the same with the footprint, without what
-            that law may be off by.
-        any_form: for all others: all of it.
-    """
-
+    # For a footprint: pattern, nuisance, what the accepted laws may be off by, and what nature
+    # leaves over of parts and settings.
     footprint: NullModel
+    # For a correction of an accepted law: the same with the footprint, without what that law may
+    # be off by.
     correction: NullModel
-    any_form: NullModel
+    any_form: NullModel  # for all others: all of it
 
     def of(self, explanation: Explanation) -> NullModel:
         """That for an explanation."""

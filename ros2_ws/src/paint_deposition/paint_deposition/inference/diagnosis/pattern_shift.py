@@ -16,16 +16,12 @@ USUAL, ALARMING = 0.95, 0.999
 
 @dataclass(frozen=True)
 class PatternShift:
-    """Distance between the fitted pattern and the calibrated one.
+    """Distance between the fitted pattern and the calibrated one."""
 
-    Attributes:
-        distance: Mahalanobis distance, in standard deviations of what was known before: the
-            calibration's posterior, widened by what differs between jobs.
-        by_coordinate: signed, of each coordinate alone.
-    """
-
+    # Mahalanobis distance, in standard deviations of what was known before: the calibration's
+    # posterior, widened by what differs between jobs.
     distance: float
-    by_coordinate: dict[str, float]
+    by_coordinate: dict[str, float]  # signed, of each coordinate alone
 
     @staticmethod
     def of(fit: Fit) -> PatternShift | None:

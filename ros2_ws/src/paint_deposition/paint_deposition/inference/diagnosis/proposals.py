@@ -49,31 +49,20 @@ class Place:
 
 @dataclass(frozen=True)
 class Spray:
-    """A proposed experiment.
+    """A proposed experiment."""
 
-    Attributes:
-        what: in words; names the part where there are several.
-        separates: the explanations that it is to separate, effect ids or 'unknown'.
-        separation: standard deviations between the two that are least apart with it.
-        now: the same without it.
-        readings: number of points to be measured on the new part.
-        experiment: the part that is painted anew. changes: what is done otherwise, by key.
-        chance: probability that one explanation is left, on average over which is the true one.
-        peak_um: thickest film at these points. peak_now_um: as measured on that part.
-        stand: where the gun stands still, if it does.
-    """
-
-    what: str
-    separates: tuple[str, ...]
-    separation: float
-    now: float
-    readings: int = 0
-    experiment: str = ''
-    changes: tuple[str, ...] = ()
+    what: str  # in words; names the part where there are several
+    separates: tuple[str, ...]  # the explanations that it is to separate, effect ids or 'unknown'
+    separation: float  # standard deviations between the two that are least apart with it
+    now: float  # the same without it
+    readings: int = 0  # number of points to be measured on the new part
+    experiment: str = ''  # the part that is painted anew
+    changes: tuple[str, ...] = ()  # what is done otherwise, by key
+    # Probability that one explanation is left, on average over which is the true one.
     chance: float = float('nan')
-    peak_um: float = float('nan')
-    peak_now_um: float = float('nan')
-    stand: StationarySpray | None = None
+    peak_um: float = float('nan')  # thickest film at these points
+    peak_now_um: float = float('nan')  # as measured on that part
+    stand: StationarySpray | None = None  # where the gun stands still, if it does
 
     @property
     def film_words(self) -> str:

@@ -26,17 +26,12 @@ STEP = 1e-3
 
 @dataclass(frozen=True)
 class Marks:
-    """What readings at C places would show, over their noise.
+    """What readings at C places would show, over their noise."""
 
-    Attributes:
-        free: (C, k) change with each parameter of the model, in standard deviations of its prior.
-        columns: (C, m) change with each amplitude of the effects at its typical size.
-        effects: (m,) id of the effect of each column.
-    """
-
+    # (C, k) change with each parameter of the model, in standard deviations of its prior.
     free: np.ndarray
-    columns: np.ndarray
-    effects: np.ndarray
+    columns: np.ndarray  # (C, m) change with each amplitude of the effects at its typical size
+    effects: np.ndarray  # (m,) id of the effect of each column
 
     @property
     def weights(self) -> np.ndarray:
@@ -55,19 +50,12 @@ class Marks:
 
 @dataclass(frozen=True)
 class Design:
-    """Some of the places, the model refitted to their readings.
+    """Some of the places, the model refitted to their readings."""
 
-    Attributes:
-        marks: of all places.
-        covariance: (k, k) of the model's parameters.
-        slopes: (k, m) by which the parameters imitate each column.
-        information: (m, m) products of what they cannot imitate.
-    """
-
-    marks: Marks
-    covariance: np.ndarray
-    slopes: np.ndarray
-    information: np.ndarray
+    marks: Marks  # of all places
+    covariance: np.ndarray  # (k, k) of the model's parameters
+    slopes: np.ndarray  # (k, m) by which the parameters imitate each column
+    information: np.ndarray  # (m, m) products of what they cannot imitate
 
     @property
     def noncentralities(self) -> np.ndarray:

@@ -60,19 +60,15 @@ SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 @dataclass(frozen=True)
 class Sizes:
-    """One choice of the hyperparameters.
+    """One choice of the hyperparameters."""
 
-    Attributes:
-        setting, part: shares of the thickest film; the latter 0 where no parts were painted alike.
-        length, footprint: numbers among LENGTHS and FOOTPRINTS.
-        log_prior: of this choice, among those of nature or among those beyond it.
-    """
-
+    # Shares of the thickest film; the latter 0 where no parts were painted alike.
     setting: float
     part: float
+    # Numbers among LENGTHS and FOOTPRINTS.
     length: int
     footprint: int
-    log_prior: float
+    log_prior: float  # of this choice, among those of nature or among those beyond it
 
     @property
     def is_beyond_nature(self) -> bool:
@@ -82,16 +78,12 @@ class Sizes:
 
 @dataclass(frozen=True)
 class Footprints:
-    """Deviations of the footprint, which all parts share, for amplitudes of unit variance.
+    """Deviations of the footprint, which all parts share, for amplitudes of unit variance."""
 
-    Attributes:
-        columns: for each size (P, n), of the readings over the noise.
-        of_peak: for each (K, n), at the knots of a footprint, as shares of its peak.
-        radius_m, flux: (RADII,) distance of the knots, and the mean flux there over the peak's.
-    """
-
-    columns: tuple[np.ndarray, ...]
+    columns: tuple[np.ndarray, ...]  # for each size (P, n), of the readings over the noise
+    # For each (K, n), at the knots of a footprint, as shares of its peak.
     of_peak: tuple[np.ndarray, ...]
+    # (RADII,) distance of the knots, and the mean flux there over the peak's.
     radius_m: np.ndarray
     flux: np.ndarray
 
@@ -131,28 +123,19 @@ class Footprints:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What nature leaves over at P points, over the noise.
+    """What nature leaves over at P points, over the noise."""
 
-    Attributes:
-        model: around which it is taken.
-        footprint: deviations that all parts share.
-        shapes: (P, P) covariance of the pattern's parameters and its place in each setting.
-        settings, parts: for each length (P, P), covariances of fields of size one over parts
-            painted alike together, and over each by itself; of the latter only where parts were
-            painted alike.
-        is_repeated: whether any were.
-        lengths_m: of these fields [m].
-        setting_of: (P,) number of the setting of each point, see ``painted_alike``.
-    """
-
-    model: DepositionModel
-    footprint: Footprints
+    model: DepositionModel  # around which it is taken
+    footprint: Footprints  # deviations that all parts share
+    # (P, P) covariance of the pattern's parameters and its place in each setting.
     shapes: np.ndarray
+    # For each length (P, P), covariances of fields of size one over parts painted alike together,
+    # and over each by itself; of the latter only where parts were painted alike.
     settings: tuple[np.ndarray, ...]
     parts: tuple[np.ndarray, ...]
-    is_repeated: bool
-    lengths_m: tuple[float, ...]
-    setting_of: np.ndarray
+    is_repeated: bool  # whether any were
+    lengths_m: tuple[float, ...]  # of these fields [m]
+    setting_of: np.ndarray  # (P,) number of the setting of each point, see ``painted_alike``
 
     @staticmethod
     def of(study: Study, fit: Fit) -> 'Remainder':

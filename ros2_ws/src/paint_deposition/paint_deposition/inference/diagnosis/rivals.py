@@ -39,34 +39,24 @@ THINNED = 6
 
 @dataclass(frozen=True)
 class Rival:
-    """One explanation that competes.
+    """One explanation that competes."""
 
-    Attributes:
-        name: effect id, ``UNKNOWN`` or ``FOOTPRINT``.
-        effect: as fitted, or neutral in the shape that fits best; None for a shapeless cause.
-        along: covariates over which the law may be off, or of which the shapeless cause is a
-            function.
-    """
-
-    name: str
+    name: str  # effect id, ``UNKNOWN`` or ``FOOTPRINT``
+    # As fitted, or neutral in the shape that fits best; None for a shapeless cause.
     effect: Effect | None
+    # Covariates over which the law may be off, or of which the shapeless cause is a function.
     along: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Rivals:
-    """All explanations that compete, linear around one fit.
-
-    Attributes:
-        fit: where to linearise; what competes may be part of its model.
-        found: the explanations. here: what each predicts for the readings at hand.
-        scales: mean and standard deviation of each covariate at the readings at hand.
-    """
+    """All explanations that compete, linear around one fit."""
 
     study: Study
-    fit: Fit
-    found: tuple[Rival, ...]
-    here: tuple[Predicted, ...]
+    fit: Fit  # where to linearise; what competes may be part of its model
+    found: tuple[Rival, ...]  # the explanations
+    here: tuple[Predicted, ...]  # what each predicts for the readings at hand
+    # Mean and standard deviation of each covariate at the readings at hand.
     scales: Mapping[str, tuple[float, float]]
 
     @staticmethod

@@ -18,19 +18,13 @@ SHAPES = 5
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Sensitivity of the readings to one effect, for one choice of its shape parameters.
+    """Sensitivity of the readings to one effect, for one choice of its shape parameters."""
 
-    Attributes:
-        effect: at the point of linearisation.
-        names: of the n amplitudes.
-        columns: (P, n) derivative of the readings by each amplitude in its typical size, over the
-            noise.
-        low, high: (n,) bounds of the amplitudes, from neutral, in typical sizes.
-    """
-
-    effect: Effect
-    names: tuple[str, ...]
+    effect: Effect  # at the point of linearisation
+    names: tuple[str, ...]  # of the n amplitudes
+    # (P, n) derivative of the readings by each amplitude in its typical size, over the noise.
     columns: np.ndarray
+    # (n,) bounds of the amplitudes, from neutral, in typical sizes.
     low: np.ndarray
     high: np.ndarray
 

@@ -28,23 +28,18 @@ MOST_STEPS, TOLERANCE = 12, 0.1
 
 @dataclass(frozen=True)
 class Predicted:
-    """What an explanation predicts for P readings, over their noise.
+    """What an explanation predicts for P readings, over their noise."""
 
-    Attributes:
-        law: (P, m) change of the readings by each amplitude.
-        along: (P, n) random functions of the covariates along which the law may be off, together
-            of unit variance.
-        amounts: (m,) amplitudes as the readings at hand suggest them.
-        low, high: (m,) bounds of the amplitudes.
-        precision: of the amplitudes before the readings: those of a law are free within their
-            bounds, those of a shapeless cause are not.
-    """
-
-    law: np.ndarray
+    law: np.ndarray  # (P, m) change of the readings by each amplitude
+    # (P, n) random functions of the covariates along which the law may be off, together of unit
+    # variance.
     along: np.ndarray
-    amounts: np.ndarray
+    amounts: np.ndarray  # (m,) amplitudes as the readings at hand suggest them
+    # (m,) bounds of the amplitudes.
     low: np.ndarray
     high: np.ndarray
+    # Of the amplitudes before the readings: those of a law are free within their bounds, those of
+    # a shapeless cause are not.
     precision: float = ALMOST_FREE
 
     @cached_property
@@ -92,21 +87,15 @@ class Predicted:
 
 @dataclass(frozen=True)
 class Imitation:
-    """One explanation imitated by another.
+    """One explanation imitated by another."""
 
-    Attributes:
-        amounts: (m,) amplitudes of the imitator; inside: (m,) which are at no bound.
-        stiffness: by how much the errors of the two laws were made smaller to stay errors.
-        mean: (k,) of all that is free. lower: (k, k) Cholesky factor of its precision.
-        separation: standard deviations that are left.
-    """
-
-    amounts: np.ndarray
-    inside: np.ndarray
+    amounts: np.ndarray  # (m,) amplitudes of the imitator
+    inside: np.ndarray  # (m,) which are at no bound
+    # By how much the errors of the two laws were made smaller to stay errors.
     stiffness: np.ndarray
-    mean: np.ndarray
-    lower: np.ndarray
-    separation: float
+    mean: np.ndarray  # (k,) of all that is free
+    lower: np.ndarray  # (k, k) Cholesky factor of its precision
+    separation: float  # standard deviations that are left
 
     def gains(self, free: np.ndarray, shown: Predicted, imitator: Predicted) -> np.ndarray:
         """(C,) by how much each further reading would raise the squared separation.

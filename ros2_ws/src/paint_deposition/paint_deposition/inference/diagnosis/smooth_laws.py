@@ -42,23 +42,14 @@ FAR = 1e6
 
 @dataclass(frozen=True)
 class Basis:
-    """Laws over one covariate, by their values at K knots.
+    """Laws over one covariate, by their values at K knots."""
 
-    Attributes:
-        law: what the values become in a model.
-        settings: what the law needs besides them.
-        film_um: (P, K) change of the film for a value of 1 (1 um) at each knot.
-        knots: (K, D) their places, in the unit in which lengths of correlation are given.
-        shortest: length that the knots resolve, in that unit.
-        edges: whether the law may change within less than its length of correlation.
-    """
-
-    law: type[LearnedLaw]
-    settings: Mapping[str, Any]
-    film_um: np.ndarray
-    knots: np.ndarray
-    shortest: float
-    edges: bool = False
+    law: type[LearnedLaw]  # what the values become in a model
+    settings: Mapping[str, Any]  # what the law needs besides them
+    film_um: np.ndarray  # (P, K) change of the film for a value of 1 (1 um) at each knot
+    knots: np.ndarray  # (K, D) their places, in the unit in which lengths of correlation are given
+    shortest: float  # length that the knots resolve, in that unit
+    edges: bool = False  # whether the law may change within less than its length of correlation
 
     def random(self, size: float, length: float) -> 'RandomLaw':
         """Random laws.
@@ -81,15 +72,10 @@ class Basis:
 
 @dataclass(frozen=True)
 class RandomLaw:
-    """A law that is a random function.
+    """A law that is a random function."""
 
-    Attributes:
-        basis: its values at knots.
-        at_knots: (K, n) those values for n independent amplitudes of unit variance.
-    """
-
-    basis: Basis
-    at_knots: np.ndarray
+    basis: Basis  # its values at knots
+    at_knots: np.ndarray  # (K, n) those values for n independent amplitudes of unit variance
 
     @property
     def change_um(self) -> np.ndarray:

@@ -21,23 +21,16 @@ DEEPEST_M = 0.15
 
 @dataclass(frozen=True)
 class Change:
-    """What is done otherwise than in a recorded spray.
+    """What is done otherwise than in a recorded spray."""
 
-    Attributes:
-        key: one word.
-        words: complete 'the same passes ...'.
-        made: gives the experiment painted that way, or None where the part does not allow it.
-        kind: changes of one kind exclude each other.
-        cost: 1 for an entry in the programme; more where someone must lay hands on part or cell.
-        both: the two changes that this one consists of, if it does.
-    """
-
-    key: str
-    words: str
+    key: str  # one word
+    words: str  # complete 'the same passes ...'
+    # Gives the experiment painted that way, or None where the part does not allow it.
     made: Callable[[Experiment], Experiment | None]
-    kind: str
+    kind: str  # changes of one kind exclude each other
+    # 1 for an entry in the programme; more where someone must lay hands on part or cell.
     cost: float = 1.0
-    both: tuple['Change', ...] = ()
+    both: tuple['Change', ...] = ()  # the two changes that this one consists of, if it does
 
     @property
     def keys(self) -> tuple[str, ...]:

@@ -24,25 +24,17 @@ OF_WHOLE_JOBS = ('order', 'level')
 
 @dataclass(frozen=True)
 class StationarySpray:
-    """A gun that sprays on one spot, square to the part.
+    """A gun that sprays on one spot, square to the part."""
 
-    Attributes:
-        position_m: (3,) of the spot. normal: (3,) of the part there, outward.
-        across: (3,) unit vector of the tool's x axis.
-        standoff_m: of the TCP. dwell_s: for which the gun is open. flow: relative to calibrated.
-        film_um: measured there now. peak_um: thickest film to expect.
-        brush: number of the brush, that which sprayed the part longest.
-    """
-
-    position_m: np.ndarray
-    normal: np.ndarray
-    across: np.ndarray
-    standoff_m: float
-    dwell_s: float
-    flow: float
-    film_um: float
-    peak_um: float
-    brush: int
+    position_m: np.ndarray  # (3,) of the spot
+    normal: np.ndarray  # (3,) of the part there, outward
+    across: np.ndarray  # (3,) unit vector of the tool's x axis
+    standoff_m: float  # of the TCP
+    dwell_s: float  # for which the gun is open
+    flow: float  # relative to calibrated
+    film_um: float  # measured there now
+    peak_um: float  # thickest film to expect
+    brush: int  # number of the brush, that which sprayed the part longest
 
     @staticmethod
     def before(

@@ -31,20 +31,13 @@ LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of effects with the model refitted to them.
-
-    Attributes:
-        names: of the effects.
-        fit: of the model with them, what nature leaves over being allowed for.
-        usual: what nature leaves over beside the model that the run began with.
-        sizes: of the remainder that matter.
-    """
+    """A set of effects with the model refitted to them."""
 
     run: Run
-    names: frozenset[str]
-    fit: Fit
-    usual: Remainder
-    sizes: Sequence[Sizes]
+    names: frozenset[str]  # of the effects
+    fit: Fit  # of the model with them, what nature leaves over being allowed for
+    usual: Remainder  # what nature leaves over beside the model that the run began with
+    sizes: Sequence[Sizes]  # of the remainder that matter
 
     @staticmethod
     def around(run: Run, names: frozenset[str], fit: Fit) -> 'Trial':

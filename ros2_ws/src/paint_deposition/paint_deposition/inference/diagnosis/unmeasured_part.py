@@ -31,20 +31,13 @@ from paint_deposition.part.surface import Surface
 
 @dataclass(frozen=True)
 class UnmeasuredPart:
-    """A part as it was, or will be, painted.
-
-    Attributes:
-        path: sub-steps of the gun's motion.
-        model: as far as it is known.
-        library: effects that may be missing, by id.
-        known: what is known of the model from earlier readings, or None.
-    """
+    """A part as it was, or will be, painted."""
 
     surface: Surface
-    path: SprayPath
-    model: DepositionModel
-    library: Mapping[str, type[Effect]]
-    known: Posterior | None = None
+    path: SprayPath  # sub-steps of the gun's motion
+    model: DepositionModel  # as far as it is known
+    library: Mapping[str, type[Effect]]  # effects that may be missing, by id
+    known: Posterior | None = None  # what is known of the model from earlier readings, or None
 
     @cached_property
     def candidates(self) -> dict[str, list[Effect]]:

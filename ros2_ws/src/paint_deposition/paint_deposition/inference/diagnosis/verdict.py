@@ -45,53 +45,34 @@ class Interval:
 
 @dataclass(frozen=True)
 class EffectClass:
-    """Effects that these readings cannot tell apart.
+    """Effects that these readings cannot tell apart."""
 
-    Attributes:
-        members: ids, most probable first.
-        probability: that one of them is missing.
-        best: id of the most probable member.
-        parameters: of the best member, by name.
-        holdout_rmse_um: before and after adding the best member, on points left out.
-    """
-
-    members: tuple[str, ...]
-    probability: float
-    best: str
-    parameters: dict[str, Interval] = field(default_factory=dict)
+    members: tuple[str, ...]  # ids, most probable first
+    probability: float  # that one of them is missing
+    best: str  # id of the most probable member
+    parameters: dict[str, Interval] = field(default_factory=dict)  # of the best member, by name
+    # Before and after adding the best member, on points left out.
     holdout_rmse_um: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Unknown:
-    """Where something shows that the library does not explain.
+    """Where something shows that the library does not explain."""
 
-    Attributes:
-        covariate: the one that the residual depends on most.
-        p_value: of that dependence.
-        curve: values of the covariate and mean residual there [um].
-        where: in words.
-    """
-
-    covariate: str
-    p_value: float
-    curve: dict[str, list[float]]
-    where: str
+    covariate: str  # the one that the residual depends on most
+    p_value: float  # of that dependence
+    curve: dict[str, list[float]]  # values of the covariate and mean residual there [um]
+    where: str  # in words
 
 
 @dataclass(frozen=True)
 class Step:
-    """One model of the history.
+    """One model of the history."""
 
-    Attributes:
-        added: effect id, '' for the model that the run started from.
-        fit: of the model to the readings.
-        rmse_um, holdout_rmse_um: on the fitted points and on points left out [um], both beside
-            the estimated levels of the parts, see ``Study.residuals``.
-    """
-
-    added: str
-    fit: Fit
+    added: str  # effect id, '' for the model that the run started from
+    fit: Fit  # of the model to the readings
+    # On the fitted points and on points left out [um], both beside the estimated levels of the
+    # parts, see ``Study.residuals``.
     rmse_um: float
     holdout_rmse_um: float
 
