@@ -1,7 +1,5 @@
 """The files in config/: examples that work as they stand, and views of what is published."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

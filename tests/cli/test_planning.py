@@ -40,9 +40,6 @@ def is_picture(path) -> bool:
         return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
 
 
-# --- recommend
-
-
 @pytest.mark.slow
 def test_recommendation_is_printed_and_written(model_file, tmp_path):
     arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
@@ -91,9 +88,6 @@ def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-# --- calibrate
-
-
 @pytest.mark.slow
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
@@ -138,9 +132,6 @@ def test_readings_in_mixed_units_are_refused(tmp_path):
     done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
     assert_refused(done, 'panel_577.csv', 'look like mils, multiply them by 25.4')
     assert not (tmp_path / 'out').exists()
-
-
-# --- plan
 
 
 @pytest.mark.slow

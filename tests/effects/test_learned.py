@@ -51,9 +51,6 @@ def passes():
     return path_of(serpentine((0.08, -0.08)))
 
 
-# --- the curve
-
-
 @LAW
 def test_the_curve_has_its_values_at_even_steps_and_is_linear_between(law):
     learned = law_over(law.covariate)
@@ -85,9 +82,6 @@ def test_how_well_it_is_known_is_told_within_its_range_only(law):
     assert np.isnan(plain.deviation(np.array([2.5]))).all()
     many = np.concatenate([beyond, np.linspace(-1.0, 6.0, 30)])
     assert np.array_equal(known.curve(many), plain.curve(many))
-
-
-# --- what it does to the film
 
 
 @pytest.mark.parametrize('covariate', PATH_LAWS)
@@ -169,9 +163,6 @@ def test_a_pass_by_itself_knows_no_time_and_no_number(covariate):
     plain = collapse_um(MODEL, across, 0.3)
     with_law = collapse_um(MODEL.with_effect(law), across, 0.3)
     np.testing.assert_allclose(with_law, plain, rtol=0.0, atol=2e-6 * plain.max())
-
-
-# --- how it is called and what is refused
 
 
 @LAW

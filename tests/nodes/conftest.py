@@ -1,7 +1,5 @@
 """Nodes of a small paint cell, spinning."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

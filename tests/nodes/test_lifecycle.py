@@ -1,16 +1,11 @@
 """The managed nodes under a lifecycle manager, over real DDS."""
 
-from __future__ import annotations
-
 import os
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState

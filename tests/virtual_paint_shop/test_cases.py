@@ -1,7 +1,5 @@
 """Cases are repeatable, as hard as they say, and their noise is what it is said to be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What is written can be read back by others' tools, and gives nothing away."""
 
-from __future__ import annotations
-
 import csv
 import json
 

@@ -1,7 +1,5 @@
 """Other forms of the laws keep what their effect is: sign, reference, limits, conservation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

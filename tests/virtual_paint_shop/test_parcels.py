@@ -1,7 +1,5 @@
 """The plume is eq. (1), solids are kept, and the noise of counting parcels is small."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A part painted by a given programme is painted as by the shop's own."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation

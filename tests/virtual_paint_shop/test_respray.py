@@ -1,7 +1,5 @@
 """Another part of the same hidden world: what is changed changes, the rest stays."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

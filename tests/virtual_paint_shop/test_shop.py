@@ -1,7 +1,5 @@
 """Campaigns are repeatable and believable, and the shop keeps to itself."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Every hidden effect changes the film the way its physics says."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -4,8 +4,6 @@ The layouts follow what the makers' manuals and programs show: lines about the b
 units in its headings or in a column of its own, and the statistics of the batch below it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -137,9 +137,6 @@ def test_a_calibration_carries_on_what_it_started_from(calibrated, tmp_path):
     assert [step['added'] for step in written.history] == ['pattern', 'refit']
 
 
-# --- readings that cannot be what they are said to be
-
-
 def with_film(panel, film_um, points=None, repeats=1) -> Campaign:
     points = column() if points is None else points
     return Campaign((panel.with_readings(readings_at(points, film_um, 0.0, repeats)),))

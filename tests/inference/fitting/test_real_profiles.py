@@ -67,9 +67,6 @@ def share_on_the_axis(angle_deg: np.ndarray) -> np.ndarray:
     return film.film_um / film.film_um.max()
 
 
-# --- everywhere, on the shipped figures
-
-
 def test_eq3_comes_back_from_the_profile_that_it_draws():
     depth = COLLAPSE.thickness_um(STATIONS_FT)
     found = fitted_transect(STATIONS_FT, depth)
@@ -99,9 +96,6 @@ def test_eq2_on_the_axis_is_the_cosine_that_the_coating_follows():
     np.testing.assert_allclose(share_on_the_axis(angle), np.sin(np.radians(angle)), rtol=1e-12)
     shipped = SHIPPED['eq2']
     assert shipped['cosine_exponent'] == pytest.approx(1.0, abs=shipped['cosine_error'])
-
-
-# --- where the measurements are
 
 
 def test_eq3_follows_a_moving_sprinkler(shared_data):

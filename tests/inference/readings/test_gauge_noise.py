@@ -61,9 +61,6 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
     return ''.join(2 * chr(ord('A') + k) for k in range(count)), thickness.tolist()
 
 
-# --- honest readings stay
-
-
 @pytest.mark.parametrize('layout', LAYOUTS)
 def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     """100 campaigns with 20 degrees of freedom or more know a standard deviation to 1.6 %."""
@@ -81,9 +78,6 @@ def test_a_display_in_whole_micrometres_makes_no_outliers():
     """Nine pairs in ten without any scatter are no reason to doubt the tenth."""
     labels, _ = honest_pairs()
     assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
-
-
-# --- slips are found
 
 
 def test_one_slip_does_not_raise_the_noise():
@@ -125,9 +119,6 @@ def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
     assert not gross_outliers(at_points('', [])).any()
 
 
-# --- and are named
-
-
 def test_what_is_left_out_is_named():
     taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
     lines = left_out_lines(taken, np.array([False, True, False, False, True]))
@@ -159,9 +150,6 @@ def test_a_study_goes_without_slips_and_says_so(sample):
     assert study.measured_um == pytest.approx(without.measured_um)
     assert study.sigma_um == pytest.approx(without.sigma_um)
     assert study.noise.degrees_of_freedom == clean.noise.degrees_of_freedom - 1
-
-
-# --- means, and noise pooled
 
 
 def test_repeats_are_averaged_in_order_of_first_appearance():

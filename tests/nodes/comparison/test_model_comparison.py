@@ -1,12 +1,7 @@
 """The live comparison with gauge readings over real DDS."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray

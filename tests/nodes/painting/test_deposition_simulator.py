@@ -1,16 +1,11 @@
 """The live film over real DDS."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
-
-pytest.importorskip('rclpy')
-
 from visualization_msgs.msg import Marker
 
 from nodes.cell import offline_um, parameters, two_passes, write_panel
