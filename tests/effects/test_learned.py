@@ -23,20 +23,12 @@ SURFACE_LAWS = (
 )  # fmt: skip
 # A range of each covariate inside what the scenes below have.
 RANGES = {
-    'incidence_deg': (10.0, 50.0),
-    'standoff_ratio': (0.8, 1.3),
-    'time_s': (1.0, 4.0),
-    'spray_pass': (0.0, 1.0),
-    'stroke_end_m': (0.1, 0.3),
-    'since_trigger_s': (0.1, 0.6),
-    'speed_m_per_s': (0.1, 0.5),
-    'curvature_per_m': (-2.0, 2.0),
-    'edge_distance_m': (0.02, 0.1),
-    'sky_view_factor': (0.6, 0.9),
-    'height_fraction': (0.2, 0.6),
-    'across_m': (-0.1, 0.2),
+    'incidence_deg': (10.0, 50.0), 'standoff_ratio': (0.8, 1.3), 'time_s': (1.0, 4.0),
+    'spray_pass': (0.0, 1.0), 'stroke_end_m': (0.1, 0.3), 'since_trigger_s': (0.1, 0.6),
+    'speed_m_per_s': (0.1, 0.5), 'curvature_per_m': (-2.0, 2.0), 'edge_distance_m': (0.02, 0.1),
+    'sky_view_factor': (0.6, 0.9), 'height_fraction': (0.2, 0.6), 'across_m': (-0.1, 0.2),
     'film_um': (2.0, 12.0),
-}
+}  # fmt: skip
 VALUES = (0.3, -0.2, 0.1, 0.4)
 
 

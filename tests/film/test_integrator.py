@@ -32,13 +32,9 @@ def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
     """1 um m^2 is 1 cm^3: the film summed over the plane is K1 times the time sprayed."""
     turned = Rotation.from_quat(LOOKING_DOWN) * Rotation.from_euler('y', tilt_rad)
     trajectory = straight_pass(
-        np.arange(0.0, 2.0, 0.02),
-        (-0.3, 0.0, 0.25),
-        (0.3, 0.0, 0.3),
-        turned.as_quat(),
-        trigger_stamps_ns=stamps_ns([0.3337, 1.5]),
-        trigger_flow=np.array([0.8, 0.0]),
-    )
+        np.arange(0.0, 2.0, 0.02), (-0.3, 0.0, 0.25), (0.3, 0.0, 0.3), turned.as_quat(),
+        trigger_stamps_ns=stamps_ns([0.3337, 1.5]), trigger_flow=np.array([0.8, 0.0]),
+    )  # fmt: skip
     points = lying_plane(1.0, 201)
     film = painted(points, trajectory, NARROW)
     emitted = 1.3 * 0.8 * (1.5 - 0.3337)

@@ -124,12 +124,9 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
     rest = PoseBatch.joined([event for event in coming[half:] if isinstance(event, PoseBatch)])
     second = Trajectory(
-        rest.stamps_ns,
-        rest.positions_m,
-        rest.quaternions_xyzw,
-        trigger_stamps_ns=stamps_ns([2.2]),
-        trigger_flow=np.array([0.8]),
-    )
+        rest.stamps_ns, rest.positions_m, rest.quaternions_xyzw,
+        trigger_stamps_ns=stamps_ns([2.2]), trigger_flow=np.array([0.8]),
+    )  # fmt: skip
     assert np.allclose(
         film.snapshot().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
     )

@@ -47,11 +47,9 @@ def at_points(points: str, thickness_um, sigma_um=np.nan) -> Readings:
     """Readings at points of one letter each."""
     count = len(thickness_um)
     return Readings.of(
-        np.zeros((count, 3)),
-        thickness_um,
-        point=np.array(list(points)),
+        np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
         sigma_um=np.broadcast_to(sigma_um, count).astype(float),
-    )
+    )  # fmt: skip
 
 
 def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[float]]:

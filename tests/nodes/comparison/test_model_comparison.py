@@ -51,12 +51,9 @@ def comparison(ros_context, spin, readings, tmp_path):
 
     def comparison(**values) -> ModelComparison:
         chosen = {
-            'mesh_file': str(tmp_path / 'panel.stl'),
-            'max_edge_length_m': 0.05,
-            'measurements_file': str(readings),
-            'publish_rate_hz': 10.0,
-            'pose_queue_depth': 1000,
-        } | values
+            'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
+            'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
+        } | values  # fmt: skip
         node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
         spin(node)
         return node
