@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.results_folder import MARKER
@@ -105,18 +104,6 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
         assert is_picture(folder / name)
     assert 'panel_577: 70 points' in done.stdout
     assert 'warning: phi_rad is not determined' in done.stderr
-
-
-@pytest.mark.slow
-def test_calibrated_model_predicts_the_other_panels(calibrated):
-    _, folder = calibrated
-    model = pd.read_model(folder / 'model.yaml')
-    found = pd.compare(pd.read_campaign(STUDY / 'unseen.yaml'), model).misfits
-    panels = [one for one in found if one.kind == 'experiment']
-    assert [panel.experiment for panel in panels] == ['panel_525', 'panel_625']
-    for panel in panels:
-        assert abs(panel.residuals.bias_um) < 0.2
-        assert panel.residuals.rmse_um < 0.85
 
 
 def test_readings_in_mixed_units_are_refused(tmp_path):

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from brushes import two_brushes
 from inference.fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, PlanError
+from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -176,12 +175,3 @@ def test_impossible_requests_say_why(what, words):
     with pytest.raises(PlanError, match=words) as refusal:
         recommended(**what)
     assert '\n' not in str(refusal.value)
-
-
-def test_an_index_is_for_one_brush():
-    model, request = two_brushes(), IndexRequest(speed_m_per_s=0.3)
-    with pytest.raises(ModelError, match='an index is for one brush and the model has 1, 2'):
-        recommend(model, request)
-    of_one = recommend(model.with_brush(1), request)
-    unoptimised = recommend(model.with_brush(1).model_copy(update={'brushes': ()}), request)
-    assert of_one.index_m == unoptimised.index_m

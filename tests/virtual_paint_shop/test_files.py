@@ -1,11 +1,9 @@
 """What is written can be read back by others' tools, and gives nothing away."""
 
-import csv
 import json
 
 import numpy as np
 import pytest
-import trimesh
 import yaml
 from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
@@ -57,20 +55,6 @@ def test_bag_holds_the_log(campaign, folder):
     assert np.allclose(poses[:, 4:].astype(float), log.quaternions_xyzw)
     assert np.array_equal([t[0] for t in triggers], log.trigger_stamps_ns)
     assert np.array_equal([t[1] for t in triggers], log.trigger_on)
-
-
-def test_readings_and_mesh_read_back(campaign, folder):
-    with (folder / 'door.csv').open() as file:
-        rows = list(csv.DictReader(file))
-    table = campaign.experiments[1].readings
-    assert len(rows) == len(table) == 100
-    assert [float(r['thickness_um']) for r in rows] == table.thickness_um.tolist()
-    assert len({r['point'] for r in rows}) == 75
-    mesh = trimesh.load(folder / 'door.stl')
-    spots = np.array([[float(r[c]) for c in ('x_m', 'y_m', 'z_m')] for r in rows])
-    _, distance, face = trimesh.proximity.closest_point(mesh, spots)
-    assert distance.max() < 5e-4
-    assert np.min(np.sum(mesh.face_normals[face] * table.normals, axis=1)) > 0.97
 
 
 @pytest.mark.parametrize('style', ['columns', 'rows', 'random'])

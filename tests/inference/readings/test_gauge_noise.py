@@ -1,14 +1,11 @@
 """Repeats: the noise they show, and gross outliers among them, which are found and named."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.gauge_noise import (
     ASSUMED_FREEDOM,
     gauge_noise,
@@ -125,29 +122,6 @@ def test_what_is_left_out_is_named():
         'again',
         "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
     ]
-
-
-def test_a_study_goes_without_slips_and_says_so(sample):
-    door = sample.experiments[1]
-    # At a point with one reading only, nothing would contradict a slip.
-    point = int(np.flatnonzero(door.means.repeats == 3)[0])
-    slip, *others = np.flatnonzero(door.means.owner == point)
-    thickness = door.readings.thickness_um.copy()
-    thickness[slip] -= 11.0
-    slipped = door.with_readings(replace(door.readings, thickness_um=thickness))
-    study, clean = Study.of(Campaign((slipped,))), Study.of(Campaign((door,)))
-    beside = ', '.join(f'{value:.4g}' for value in thickness[others])
-    assert study.notes == (
-        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} µm beside {beside}; "
-        'left out of the fit, measure it again',
-    )
-    assert clean.notes == ()
-    kept = study.campaign.experiments[0]
-    assert np.flatnonzero(~kept.used).tolist() == [slip]
-    without = Study.of(Campaign((door.without(~kept.used),)))
-    assert study.measured_um == pytest.approx(without.measured_um)
-    assert study.sigma_um == pytest.approx(without.sigma_um)
-    assert study.noise.degrees_of_freedom == clean.noise.degrees_of_freedom - 1
 
 
 def test_repeats_are_averaged_in_order_of_first_appearance():
