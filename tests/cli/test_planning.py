@@ -106,21 +106,6 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
     assert 'warning: phi_rad is not determined' in done.stderr
 
 
-def test_readings_in_mixed_units_are_refused(tmp_path):
-    for name in ('panel.stl', 'campaign.yaml'):
-        (tmp_path / name).write_bytes((STUDY / name).read_bytes())
-    (tmp_path / 'panel_577').symlink_to(STUDY / 'panel_577')
-    lines = (STUDY / 'panel_577.csv').read_text().splitlines()
-    for row in range(20, 26):
-        values = lines[row].split(',')
-        values[3] = f'{float(values[3]) / 25.4:.3f}'
-        lines[row] = ','.join(values)
-    (tmp_path / 'panel_577.csv').write_text('\n'.join(lines) + '\n')
-    done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
-    assert_refused(done, 'panel_577.csv', 'look like mils, multiply them by 25.4')
-    assert not (tmp_path / 'out').exists()
-
-
 @pytest.mark.slow
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'

@@ -13,7 +13,7 @@ from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -116,32 +116,11 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
     assert np.array_equal(read.film_um, plain.film_um)
 
 
-def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
-    log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
-    bag = write_pose_bag(tmp_path / 'pass', log)
-    done = paint(
-        'simulate', '--mesh', panel, '--trajectory', bag, *COARSE, '--json',
-        '-o', tmp_path / 'out',
-    )  # fmt: skip
-    (line,) = done.stderr.splitlines()
-    assert line.startswith(f'note: recording {bag}: /atomizer/state (std_msgs/msg/Bool) is not')
-    assert '--state-topic' in line
-    assert line == f'note: {json.loads(done.stdout)["notes"][0]}'
-
-
 def refused(tmp_path, *arguments):
     """What `paint simulate` says; nothing may have been written."""
     done = paint('simulate', *arguments, '-o', tmp_path / 'out')
     assert not (tmp_path / 'out').exists()
     return done
-
-
-def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
-    inputs = ('--mesh', panel, '--trajectory', DOOR_BAG)
-    done = refused(tmp_path, *inputs, '--pose-topic', '/robot/tcp')
-    assert_refused(done, '/robot/tcp', '/atomizer/pose')
-    done = refused(tmp_path, *inputs, '--state-topic', '/gun')
-    assert_refused(done, '/gun', '/atomizer/state')
 
 
 @pytest.mark.parametrize(
@@ -163,15 +142,6 @@ def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):
     options[option] = value if isinstance(value, tuple) else (value,)
     arguments = [part for name, values in options.items() for part in (name, *values)]
     assert_refused(refused(tmp_path, *arguments), *words)
-
-
-def test_readings_off_the_part_are_refused_before_anything_is_written(panel, one_pass, tmp_path):
-    (tmp_path / 'readings.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0,0.5,0,9\n')
-    done = refused(
-        tmp_path, '--mesh', panel, '--trajectory', one_pass, *COARSE,
-        '--at', tmp_path / 'readings.csv',
-    )  # fmt: skip
-    assert_refused(done, 'readings.csv', "off the part's surface", '0.5')
 
 
 def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):

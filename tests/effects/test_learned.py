@@ -5,7 +5,6 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from booth import MODEL, door, painted, panel, path_of, serpentine, spot
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
@@ -164,22 +163,3 @@ def test_it_is_called_by_its_covariate(law):
     assert law.__doc__
     assert law.over in law.__doc__
     assert pickle.loads(pickle.dumps(law.typical())) == law.typical()
-
-
-@pytest.mark.parametrize(
-    ('covariate', 'values', 'words'),
-    [
-        ('time_s', {'low': 2.0, 'high': 2.0}, 'must be above low'),
-        ('edge_distance_m', {'low': 0.4, 'high': 0.5}, 'must be above low'),
-        ('time_s', {'learned': (0.1,)}, 'two or more'),
-        ('time_s', {'learned': (0.1, float('nan'))}, 'finite'),
-        ('time_s', {'learned': VALUES, 'sd': (0.1, 0.2)}, 'sd has 2 values and learned 4'),
-        ('time_s', {'sd': (0.1, -0.2)}, 'sd has -0.2; a standard deviation is 0 or more'),
-        ('time_s', {'kind': 'addition'}, 'give factor'),
-        ('incidence_deg', {'kind': 'addition'}, 'give factor'),
-        ('height_fraction', {'kind': 'sum'}, "'factor' or 'addition'"),
-    ],
-)
-def test_what_is_no_curve_is_refused(covariate, values, words):
-    with pytest.raises(ValidationError, match=words):
-        CURVES[covariate](**values)

@@ -11,7 +11,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
@@ -78,15 +77,6 @@ def test_a_lag_takes_the_brush_along(lag_s):
     path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
     sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
     assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
-
-
-def test_terms_are_kept_apart_by_brush():
-    path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
-    film = FilmIntegrator(lying_plane(), MODEL, 'double')
-    terms = film.terms(film.steps(path))
-    weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
-    film.add(path)
-    assert np.abs(weights @ terms - film.film_um).max() < 1e-9 * film.film_um.max()
 
 
 def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():

@@ -99,14 +99,6 @@ def test_corner_slowdown_adds_paint_near_the_reversals_only():
     assert film[48] == pytest.approx(clean[48], rel=0.002)
 
 
-def test_flow_drift_grows_from_pass_to_pass():
-    clean, film = change('flow_drift', COLUMN, 0.03, passes=3, index_m=0.3)
-    gain = relative(clean, film)
-    top, middle, bottom = gain[np.searchsorted(COLUMN[1], [0.8, 0.5, 0.2])]
-    assert bottom - middle == pytest.approx(0.03, abs=0.005)
-    assert middle - top == pytest.approx(0.03, abs=0.005)
-
-
 @pytest.mark.parametrize(
     ('truth_id', 'at_m', 'sign'), [('convex_attraction', 0.5, 1), ('faraday_shielding', 0.25, -1)]
 )

@@ -3,22 +3,19 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker
 
-from nodes.cell import offline_um, parameters, two_passes, write_panel
+from nodes.cell import offline_um, two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 from paint_deposition.part.facing import toward_the_gun
@@ -89,21 +86,3 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     )
     assert len({header_stamp_ns(mesh) for mesh in meshes}) > 3
     assert min(map(len, meshes)) > 120 * 100_000
-
-
-def test_bad_input_is_one_line(ros_context, tmp_path):
-    panel = {'mesh_file': str(write_panel(tmp_path / 'panel.stl'))}
-    for values, words in (
-        ({'mesh_file': ''}, 'mesh_file is empty'),
-        ({'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        ({'model_file': 'nowhere.yaml'}, 'nowhere.yaml: no such file'),
-        ({'color_min_um': 5.0, 'color_max_um': 5.0}, 'color_min_um 5 is not below'),
-        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'part_parent_frame'),
-        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]}, 'unit quaternion'),
-        ({'down': [0.0, 0.0, 0.0]}, 'not all zero'),
-        ({'mesh_fil': 'x'}, "did you mean 'mesh_file'?"),
-    ):
-        overrides = parameters(**panel | values)
-        with pytest.raises(PaintError, match=words) as caught:
-            DepositionSimulator(context=ros_context, parameter_overrides=overrides)
-        assert '\n' not in str(caught.value)
