@@ -126,18 +126,6 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     assert is_picture(tmp_path / 'plan' / 'film.png')
 
 
-@pytest.mark.slow
-def test_plan_in_words_and_replaces_an_older_one(tmp_path):
-    given = ('--mesh', SAMPLES / 'panel.stl', '--max-edge-length-m', 0.05, '--speed', 0.3)
-    arguments = ('plan', *given, '-o', tmp_path)
-    done = paint(*arguments, '--direction', 'vertical', '--index', 0.3)
-    assert done.returncode == 0, done.stderr
-    assert 'vertical passes at 300 mm' in done.stdout
-    assert 'on a plane: sigma_n' in done.stdout
-    assert paint(*arguments, '--one-way').returncode == 0
-    assert json.loads((tmp_path / 'plan.json').read_text())['travel'] == 'one_way'
-
-
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [

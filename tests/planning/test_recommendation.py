@@ -66,13 +66,6 @@ def test_drift_limits_are_where_the_tolerance_breaks():
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
 
 
-def test_mean_film_and_speed_for_a_target():
-    answer = recommend(SYMMETRIC, IndexRequest(target_um=20.0))
-    assert answer.mean_um == pytest.approx(20.0, rel=1e-9)
-    solids = SYMMETRIC.planar.K1_cm3_per_s
-    assert answer.speed_m_per_s == pytest.approx(solids / (20.0 * answer.index_m), rel=1e-9)
-
-
 def test_passes_cover_the_width_to_its_edges():
     width = 1.5
     answer = recommended(tolerance=0.05, width_m=width, target_um=20.0)

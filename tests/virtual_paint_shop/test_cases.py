@@ -51,11 +51,3 @@ def test_repeats_share_the_texture_and_parts_their_level():
         for k in range(500)
     ]
     assert np.std(levels) == pytest.approx(0.05, rel=0.1)
-
-
-def test_one_reading_in_a_hundred_is_mistyped():
-    film = np.full(20_000, 31.2)
-    noise = GaugeNoise(floor_um=0.0, relative=0.0, slip_fraction=0.01)
-    session = measure(np.arange(20_000), film, film, noise, np.random.default_rng(1))
-    assert session.slipped.mean() == pytest.approx(0.01, abs=0.002)
-    assert np.all((session.thickness_um != 31.2) == session.slipped)
