@@ -50,7 +50,7 @@ def case(effect: type[Effect], *more: str):
     return pytest.param(effect, *more, id='-'.join([effect.id, *more]), marks=marks)
 
 
-EFFECT = pytest.mark.parametrize('effect', map(case, ALL))
+EFFECT = pytest.mark.parametrize('effect', [case(effect) for effect in ALL])
 AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in AMPLITUDES])
 
 
@@ -151,7 +151,7 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
     assert np.linalg.norm(forward - other) <= 0.02 * scale + 1e-8
 
 
-@pytest.mark.parametrize('effect', map(case, WITH_LAW))
+@pytest.mark.parametrize('effect', [case(effect) for effect in WITH_LAW])
 def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = door().points().select(slice(None, None, 7))
     path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))

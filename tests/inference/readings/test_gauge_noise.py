@@ -160,12 +160,6 @@ def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
     assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
 
 
-def test_stated_noise_wins():
-    noise = gauge_noise(at_points('aaaaaaaa', np.arange(8.0), 0.5))
-    assert (noise.source, noise.degrees_of_freedom) == ('stated', np.inf)
-    assert noise.typical_um == 0.5
-
-
 def test_repeats_of_stated_readings_say_nothing_of_the_others():
     """A precise instrument for some points must not make the gauge look precise."""
     values = [5.0, 5.001, 4.999] * 3 + [0.0, 2.0, -2.0, 1.0, -1.0, 2.0, -2.0]
