@@ -91,12 +91,9 @@ def serpentine(
     flows = np.repeat([flow, 0.0], len(begins))
     order = np.argsort(changes)
     return Trajectory(
-        stamps_ns(times),
-        positions,
-        np.tile(LOOKING_ALONG_Y, (len(times), 1)),
-        trigger_stamps_ns=stamps_ns(changes[order]),
-        trigger_flow=flows[order],
-    )
+        stamps_ns(times), positions, np.tile(LOOKING_ALONG_Y, (len(times), 1)),
+        trigger_stamps_ns=stamps_ns(changes[order]), trigger_flow=flows[order],
+    )  # fmt: skip
 
 
 def path_of(trajectory: Trajectory) -> SprayPath:

@@ -1,7 +1,5 @@
 """Fixtures that every test may use: shared data, a DDS domain of its own, nodes that spin."""
 
-from __future__ import annotations
-
 import os
 import time
 from collections.abc import Callable, Iterator

@@ -9,13 +9,10 @@ from scipy.spatial.transform import Rotation
 
 # Joint: place of its axis at rest [m], direction of the axis.
 AXES = {
-    'shoulder_pan': ((0.0, 0.0, 0.40), (0, 0, 1)),
-    'shoulder_lift': ((0.15, 0.0, 0.40), (0, 1, 0)),
-    'elbow': ((0.15, 0.0, 1.10), (0, 1, 0)),
-    'forearm_roll': ((0.65, 0.0, 1.20), (1, 0, 0)),
-    'wrist_bend': ((0.95, 0.0, 1.20), (0, 1, 0)),
-    'wrist_roll': ((1.05, 0.0, 1.20), (1, 0, 0)),
-}
+    'shoulder_pan': ((0.0, 0.0, 0.40), (0, 0, 1)), 'shoulder_lift': ((0.15, 0.0, 0.40), (0, 1, 0)),
+    'elbow': ((0.15, 0.0, 1.10), (0, 1, 0)), 'forearm_roll': ((0.65, 0.0, 1.20), (1, 0, 0)),
+    'wrist_bend': ((0.95, 0.0, 1.20), (0, 1, 0)), 'wrist_roll': ((1.05, 0.0, 1.20), (1, 0, 0)),
+}  # fmt: skip
 JOINTS = tuple(AXES)
 # At rest the bell looks along +x: its z, by a quarter turn about y.
 TIP_M = np.array([1.20, 0.0, 1.20])
@@ -29,14 +26,12 @@ def urdf() -> str:
     for name, (place_m, axis) in AXES.items():
         xyz = ' '.join(f'{value:.9g}' for value in np.array(place_m) - at_m)
         lines += [
-            f'  <link name="{name}_link"/>',
-            f'  <joint name="{name}" type="revolute">',
+            f'  <link name="{name}_link"/>', f'  <joint name="{name}" type="revolute">',
             f'    <parent link="{parent}"/><child link="{name}_link"/>',
             f'    <origin xyz="{xyz}" rpy="0 0 0"/>',
             f'    <axis xyz="{" ".join(map(str, axis))}"/>',
-            '    <limit lower="-3" upper="3" effort="1" velocity="1"/>',
-            '  </joint>',
-        ]
+            '    <limit lower="-3" upper="3" effort="1" velocity="1"/>', '  </joint>',
+        ]  # fmt: skip
         parent, at_m = f'{name}_link', np.array(place_m)
     xyz = ' '.join(f'{value:.9g}' for value in TIP_M - at_m)
     rpy = f'0 {np.pi / 2:.15g} 0'

@@ -55,11 +55,9 @@ def lying_plane(half_m: float = 0.6, count: int = 41) -> SurfacePoints:
     positions = np.stack([x, y, np.zeros(len(x))], axis=1)
     spacing = line[1] - line[0]
     return SurfacePoints(
-        positions,
-        np.tile([0.0, 0.0, 1.0], (len(x), 1)),
-        area_m2=np.full(len(x), spacing**2),
+        positions, np.tile([0.0, 0.0, 1.0], (len(x), 1)), area_m2=np.full(len(x), spacing**2),
         down=(0.0, -1.0, 0.0),
-    )
+    )  # fmt: skip
 
 
 def rotation_matrix(quaternion=LOOKING_DOWN) -> np.ndarray:

@@ -1,7 +1,5 @@
 """The files in config/: examples that work as they stand, and views of what is published."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path
@@ -19,12 +17,10 @@ REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
 # What a display of RViz shows.
 SHOWN = {
-    'Marker': 'visualization_msgs/msg/Marker',
-    'MarkerArray': 'visualization_msgs/msg/MarkerArray',
-    'PointCloud2': 'sensor_msgs/msg/PointCloud2',
-    'Path': 'nav_msgs/msg/Path',
+    'Marker': 'visualization_msgs/msg/Marker', 'MarkerArray': 'visualization_msgs/msg/MarkerArray',
+    'PointCloud2': 'sensor_msgs/msg/PointCloud2', 'Path': 'nav_msgs/msg/Path',
     'Pose': 'geometry_msgs/msg/PoseStamped',
-}
+}  # fmt: skip
 
 
 REPOSITORY = Path(__file__).resolve().parent.parent

@@ -1,7 +1,5 @@
 """No arrow points back: rooms import only from those below them."""
 
-from __future__ import annotations
-
 from importlinter.cli import lint_imports
 
 

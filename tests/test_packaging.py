@@ -1,7 +1,5 @@
 """What a build promises: manifests that agree, executables that exist, known parameters."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.metadata
 import importlib.util

@@ -106,6 +106,8 @@ def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch):
     # The sample is diagnosed where the command is tried out.
     added = partial(pd.refit, added='incidence_attraction')
     monkeypatch.setattr(pd, 'diagnose', added, raising=False)
+    coarse = partial(lambda read, path, **_: read(path, max_edge_length_m=0.06), pd.read_mesh)
+    monkeypatch.setattr(pd, 'read_mesh', coarse, raising=False)
     example = repository / 'docs' / 'python_example.py'
     names = runpy.run_path(str(example))
     assert isinstance(names['film'], pd.Film)

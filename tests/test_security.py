@@ -1,13 +1,8 @@
 """The policies of the nodes allow what the nodes do, and name nothing that is not there."""
 
-from __future__ import annotations
-
 from xml.etree import ElementTree
 
 import pytest
-
-pytest.importorskip('rclpy')
-
 from rclpy.action import get_action_server_names_and_types_by_node
 
 from booth import SAMPLES

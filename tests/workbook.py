@@ -1,7 +1,5 @@
 """Workbooks written by hand, as little of them as spreadsheets need."""
 
-from __future__ import annotations
-
 import zipfile
 from collections.abc import Mapping, Sequence
 from io import BytesIO

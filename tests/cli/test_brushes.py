@@ -54,17 +54,6 @@ def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
     assert told['provenance']['models']['model']['brushes'][1]['number'] == 2
 
 
-def test_an_unknown_brush_is_refused_and_those_there_are_are_named(model, panel, tmp_path):
-    run = bag(tmp_path, (0.5, 1.0, 1), (1.5, 1.0, 9), (2.5, 0.0, 0))
-    given = ('simulate', '--mesh', panel, '--trajectory', run, '--state-topic', '/atomizer/state')
-    out = ('-o', tmp_path / 'film')
-    done = paint(*given, '--model', model, *out)
-    assert_refused(done, f'{run}: brush 9 is not in the model; its brushes: 1, 2, 3')
-    # Without the trigger nothing says which of them sprays.
-    done = paint(*given[:-2], '--model', model, *out)
-    assert_refused(done, 'no brush is named; its brushes: 1, 2, 3')
-
-
 @pytest.mark.slow
 def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
     given = ('--mesh', panel, '--model', model, '--speed', 0.4, '--max-edge-length-m', 0.05)

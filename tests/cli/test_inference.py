@@ -45,9 +45,6 @@ def table(path) -> list[dict[str, str]]:
         return list(csv.DictReader(file))
 
 
-# --- diagnose
-
-
 @pytest.mark.slow
 def test_diagnose_names_the_hidden_effect(diagnosed):
     done, folder = diagnosed
@@ -106,9 +103,6 @@ def test_a_diagnosed_model_predicts_readings_never_seen(diagnosed, tmp_path):
     assert errors['model'] < 0.85 * errors['model_before']
 
 
-# --- compare
-
-
 @pytest.mark.slow
 def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     done = paint('compare', door_alone, '-o', tmp_path)
@@ -164,9 +158,6 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
         assert [row['point'] for row in residuals] == labels
         assert [row['used'] == '1' for row in residuals] == [k != slip for k in range(len(rows))]
         assert residuals[slip]['predicted_um'] == ''
-
-
-# --- refit
 
 
 @pytest.mark.slow
@@ -239,9 +230,6 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(tmp_path)
     again = paint('refit', CAMPAIGN, '--add', 'learned:incidence_deg', '--as-effect', file,
                   '-o', output)  # fmt: skip
     assert_refused(again, 'my_incidence.py is there already', 'give another name')
-
-
-# --- bad input
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,6 @@ import sys
 import click
 import pytest
 
-import paint_deposition
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.main import COMMANDS
@@ -45,12 +44,6 @@ def test_every_command_explains_itself(command):
     assert done.returncode == 0
     assert done.stdout.startswith(f'Usage: paint {command} [OPTIONS]')
     assert '  -h, --help ' in done.stdout
-
-
-def test_version():
-    done = paint('--version')
-    assert done.returncode == 0
-    assert done.stdout.split()[:2] == ['paint', paint_deposition.__version__]
 
 
 def test_a_command_that_is_none_is_refused_with_the_nearest():

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from PIL import Image
 
-import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.results_folder import MARKER
@@ -38,9 +37,6 @@ def calibrated(tmp_path_factory):
 def is_picture(path) -> bool:
     with Image.open(path) as image:
         return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
-
-
-# --- recommend
 
 
 @pytest.mark.slow
@@ -91,9 +87,6 @@ def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-# --- calibrate
-
-
 @pytest.mark.slow
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
@@ -114,36 +107,6 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 
 
 @pytest.mark.slow
-def test_calibrated_model_predicts_the_other_panels(calibrated):
-    _, folder = calibrated
-    model = pd.read_model(folder / 'model.yaml')
-    found = pd.compare(pd.read_campaign(STUDY / 'unseen.yaml'), model).misfits
-    panels = [one for one in found if one.kind == 'experiment']
-    assert [panel.experiment for panel in panels] == ['panel_525', 'panel_625']
-    for panel in panels:
-        assert abs(panel.residuals.bias_um) < 0.2
-        assert panel.residuals.rmse_um < 0.85
-
-
-def test_readings_in_mixed_units_are_refused(tmp_path):
-    for name in ('panel.stl', 'campaign.yaml'):
-        (tmp_path / name).write_bytes((STUDY / name).read_bytes())
-    (tmp_path / 'panel_577').symlink_to(STUDY / 'panel_577')
-    lines = (STUDY / 'panel_577.csv').read_text().splitlines()
-    for row in range(20, 26):
-        values = lines[row].split(',')
-        values[3] = f'{float(values[3]) / 25.4:.3f}'
-        lines[row] = ','.join(values)
-    (tmp_path / 'panel_577.csv').write_text('\n'.join(lines) + '\n')
-    done = paint('calibrate', tmp_path / 'campaign.yaml', '-o', tmp_path / 'out')
-    assert_refused(done, 'panel_577.csv', 'look like mils, multiply them by 25.4')
-    assert not (tmp_path / 'out').exists()
-
-
-# --- plan
-
-
-@pytest.mark.slow
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20)
@@ -161,18 +124,6 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     assert read_program(tmp_path / 'plan' / 'passes.mod').moves
     assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000
     assert is_picture(tmp_path / 'plan' / 'film.png')
-
-
-@pytest.mark.slow
-def test_plan_in_words_and_replaces_an_older_one(tmp_path):
-    given = ('--mesh', SAMPLES / 'panel.stl', '--max-edge-length-m', 0.05, '--speed', 0.3)
-    arguments = ('plan', *given, '-o', tmp_path)
-    done = paint(*arguments, '--direction', 'vertical', '--index', 0.3)
-    assert done.returncode == 0, done.stderr
-    assert 'vertical passes at 300 mm' in done.stdout
-    assert 'on a plane: sigma_n' in done.stdout
-    assert paint(*arguments, '--one-way').returncode == 0
-    assert json.loads((tmp_path / 'plan.json').read_text())['travel'] == 'one_way'
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import yaml
 
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, film_in, paint
+from cli.command import assert_refused, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -111,21 +111,6 @@ def test_one_bag_with_both_guns(bags, tmp_path):
     laid_cm3 = first['painted_volume_cm3'] + second['painted_volume_cm3']
     assert laid_cm3 == pytest.approx(figures['painted_volume_cm3'])
     assert set(figures['provenance']['models']) == {'robot_1', 'robot_2'}
-
-
-def test_a_file_and_a_model_for_each_gun(bags, surface, tmp_path):
-    bell = _model(tmp_path / 'bell.yaml', DepositionModel())
-    done = paint(
-        'simulate', '--mesh', PANEL, '--trajectory', bags['upper'], '--trajectory', bags['lower'],
-        '--model', bell, '--model', bags['thin'], '-o', tmp_path / 'out',
-        '--max-edge-length-m', 0.05,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    expected = pd.simulate(surface, [UPPER, LOWER], [DepositionModel(), THIN]).film_um
-    assert film_in(tmp_path / 'out') == pytest.approx(expected, rel=1e-7)
-    assert f'model: upper: {bell}' in done.stdout
-    assert f'lower: {bags["thin"]}' in done.stdout
-    assert '% of the paint' in done.stdout
 
 
 @pytest.mark.parametrize(

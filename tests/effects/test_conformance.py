@@ -40,10 +40,18 @@ UNIT_SUFFIXES = {
     'm': '_m', 's': '_s', 'rad': '_rad', 'um': '_um', '1/pass': '_per_pass',
     '1/(m/s)': '_per_m_per_s', '1': '',
 }  # fmt: skip
-EFFECT = pytest.mark.parametrize('effect', ALL, ids=lambda effect: effect.id)
-AMPLITUDE = pytest.mark.parametrize(
-    ('effect', 'name'), AMPLITUDES, ids=[f'{effect.id}-{name}' for effect, name in AMPLITUDES]
-)
+# What has a kernel of its own takes seconds to compile.
+COMPILED = [*WITH_LAW, EFFECTS['occlusion']]
+
+
+def case(effect: type[Effect], *more: str):
+    """The parameters of a test of this effect."""
+    marks = pytest.mark.slow if effect in COMPILED else ()
+    return pytest.param(effect, *more, id='-'.join([effect.id, *more]), marks=marks)
+
+
+EFFECT = pytest.mark.parametrize('effect', [case(effect) for effect in ALL])
+AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in AMPLITUDES])
 
 
 @pytest.fixture(scope='module')
@@ -143,7 +151,7 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
     assert np.linalg.norm(forward - other) <= 0.02 * scale + 1e-8
 
 
-@pytest.mark.parametrize('effect', WITH_LAW, ids=lambda effect: effect.id)
+@pytest.mark.parametrize('effect', [case(effect) for effect in WITH_LAW])
 def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = door().points().select(slice(None, None, 7))
     path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))

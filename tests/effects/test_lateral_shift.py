@@ -84,12 +84,9 @@ def test_misalignment_is_the_part_moved():
     fault = PartMisalignment(shift_down_m=0.03, shift_across_m=-0.02, yaw_rad=0.09)
     seen_by_gun = Rotation.from_rotvec([0.0, -0.09, 0.0])  # about the outward normal, -y
     hung = Surface(
-        seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.0, -0.03]),
-        drawn.faces,
-        seen_by_gun.apply(drawn.normals),
-        drawn.vertex_areas_m2,
-        drawn.down,
-    )
+        seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.0, -0.03]), drawn.faces,
+        seen_by_gun.apply(drawn.normals), drawn.vertex_areas_m2, drawn.down,
+    )  # fmt: skip
     motion = serpentine((0.1, -0.1))
     expected = painted(hung, motion).raw_um
     film = painted(drawn, motion, fault).raw_um

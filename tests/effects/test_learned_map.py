@@ -90,8 +90,3 @@ def test_each_part_follows_its_own_map():
     (_, first), (_, second) = both.values_by_part()
     assert np.array_equal(first, GRID)
     assert second.tolist() == [[0.1, 0.2], [0.3, 0.4]]
-
-
-def test_values_that_do_not_fill_the_maps_are_refused():
-    with pytest.raises(ValueError, match='learned has 5 values; its maps have 6 knots'):
-        on_part(learned=GRID.ravel()[:5])

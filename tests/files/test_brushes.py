@@ -1,13 +1,12 @@
 """Brushes in files: models, tables, robot programs and bags name them alike."""
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 
-from brushes import SET_POINTS, switched, two_brushes
+from brushes import SET_POINTS, two_brushes
 from files.recorded import START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError, RecordingError
@@ -16,7 +15,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.files.rapid.writer import module_text
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.motion.programmed import Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
@@ -135,14 +134,6 @@ def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
     path.write_text(path.read_text().replace('SetBrush 3', 'SetBrush 2.5'))
     with pytest.raises(RecordingError, match=r'line 5: setbrush takes the number of a brush, not'):
         read_program(path)
-
-
-def test_a_bag_keeps_brushes(tmp_path: Path):
-    motion = straight_pass(20)
-    stamps = START_NS + np.array([0, 4, 9]) * 1_000_000
-    motion = replace(motion, **switched(stamps, (1.0, 2), (1.0, 3), (0.0, 0)))
-    read = read_trajectory(write_pose_bag(tmp_path / 'bag', motion), None, '/atomizer/state')
-    assert read.triggers == motion.triggers
 
 
 def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: Path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.gauge_readings import read_readings, write_predictions
+from paint_deposition.files.gauge_readings import read_readings
 
 HEADER = 'x_m,y_m,z_m,thickness_um'
 
@@ -103,13 +103,3 @@ def test_a_file_that_is_no_table_is_refused(tmp_path):
         path.write_bytes(content)
         with pytest.raises(ReadingsError, match=f'cannot be read as {kind}'):
             read_readings(path)
-
-
-def test_predictions_keep_the_readings_own_columns(table, tmp_path):
-    path = table(f'{HEADER},remark,predicted_um', '0,0,1,20,"thin, I think",7', '0,0,2,21,,8')
-    write_predictions(tmp_path / 'out.csv', read_readings(path), [20.5, 21.25])
-    assert (tmp_path / 'out.csv').read_text().splitlines() == [
-        f'{HEADER},remark,predicted_um',
-        '0,0,1,20,"thin, I think",20.5000',
-        '0,0,2,21,,21.2500',
-    ]

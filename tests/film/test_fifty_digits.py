@@ -93,13 +93,10 @@ def _random_path(rng) -> SprayPath:
     tilt = Rotation.from_rotvec(rng.normal(scale=0.5, size=(POSES, 3)))
     rotation = (Rotation.from_quat([1.0, 0.0, 0.0, 0.0]) * tilt).as_matrix()
     return SprayPath.of(
-        np.arange(POSES),
-        rng.uniform(0.001, 0.02, POSES),
-        rng.uniform(0.5, 1.5, POSES),
-        rng.uniform([-0.4, -0.4, 0.15], [0.4, 0.4, 0.4], size=(POSES, 3)),
-        rotation,
+        np.arange(POSES), rng.uniform(0.001, 0.02, POSES), rng.uniform(0.5, 1.5, POSES),
+        rng.uniform([-0.4, -0.4, 0.15], [0.4, 0.4, 0.4], size=(POSES, 3)), rotation,
         np.zeros((POSES, 3)),
-    )
+    )  # fmt: skip
 
 
 @pytest.mark.slow

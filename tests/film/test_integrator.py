@@ -32,13 +32,9 @@ def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
     """1 um m^2 is 1 cm^3: the film summed over the plane is K1 times the time sprayed."""
     turned = Rotation.from_quat(LOOKING_DOWN) * Rotation.from_euler('y', tilt_rad)
     trajectory = straight_pass(
-        np.arange(0.0, 2.0, 0.02),
-        (-0.3, 0.0, 0.25),
-        (0.3, 0.0, 0.3),
-        turned.as_quat(),
-        trigger_stamps_ns=stamps_ns([0.3337, 1.5]),
-        trigger_flow=np.array([0.8, 0.0]),
-    )
+        np.arange(0.0, 2.0, 0.02), (-0.3, 0.0, 0.25), (0.3, 0.0, 0.3), turned.as_quat(),
+        trigger_stamps_ns=stamps_ns([0.3337, 1.5]), trigger_flow=np.array([0.8, 0.0]),
+    )  # fmt: skip
     points = lying_plane(1.0, 201)
     film = painted(points, trajectory, NARROW)
     emitted = 1.3 * 0.8 * (1.5 - 0.3337)
@@ -150,21 +146,3 @@ def test_moving_part_and_gun_together_changes_nothing():
     assert largest_error(painted(moved, moved_log).film_um, still) < 1e-9
     single = painted(moved, moved_log, precision='single').film_um
     assert largest_error(single, still) < 2e-6
-
-
-def test_the_gun_is_off_in_a_gap():
-    """Nothing is known of the way in a gap: the film is that of both ends apart."""
-    times = np.concatenate([np.arange(0.0, 1.0, 0.02), np.arange(1.5, 2.5, 0.02)])
-    whole = straight_pass(times)
-    points = lying_plane(0.6, 25)
-    film = painted(points, whole, NARROW).film_um
-    halves = [np.flatnonzero(times < 1.2), np.flatnonzero(times > 1.2)]
-    apart = sum(
-        painted(
-            points,
-            Trajectory(whole.stamps_ns[h], whole.positions_m[h], whole.quaternions_xyzw[h]),
-            NARROW,
-        ).film_um
-        for h in halves
-    )
-    assert np.allclose(film, apart, rtol=1e-12)

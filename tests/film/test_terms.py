@@ -51,12 +51,10 @@ def moved(p: PlanarPattern, parameter: int, step: float) -> PlanarPattern:
     if parameter in (2, 3):
         lopsided[parameter - 2] += step
     factors = {
-        0: ('K1_cm3_per_s', p.K1_cm3_per_s * math.exp(step)),
-        1: ('K2', p.K2 + step),
-        4: ('r_m', p.r_m + step),
-        5: ('sigma1_m', p.sigma1_m * math.exp(step)),
+        0: ('K1_cm3_per_s', p.K1_cm3_per_s * math.exp(step)), 1: ('K2', p.K2 + step),
+        4: ('r_m', p.r_m + step), 5: ('sigma1_m', p.sigma1_m * math.exp(step)),
         6: ('sigma2_m', p.sigma2_m * math.exp(step)),
-    }
+    }  # fmt: skip
     change = dict([factors[parameter]]) if parameter in factors else {}
     asymmetry = {'K3': math.hypot(*lopsided), 'phi_rad': math.atan2(*lopsided[::-1])}
     return p.model_copy(update={**asymmetry, **change})

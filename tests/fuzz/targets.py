@@ -1,7 +1,5 @@
 """The readers of the project, each with small files to begin from."""
 
-from __future__ import annotations
-
 import tempfile
 import zipfile
 from collections.abc import Callable

@@ -12,15 +12,10 @@ from scipy.integrate import quad
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
 PATTERNS = st.builds(
-    PlanarPattern,
-    K1_cm3_per_s=st.floats(0.01, 100.0),
-    K2=st.floats(0.0, 1.0),
-    K3=st.floats(0.0, 1.0),
-    phi_rad=st.floats(-6.28, 6.28),
-    r_m=st.floats(0.0, 1.0),
-    sigma1_m=st.floats(0.005, 1.0),
-    sigma2_m=st.floats(0.005, 1.0),
-)
+    PlanarPattern, K1_cm3_per_s=st.floats(0.01, 100.0), K2=st.floats(0.0, 1.0),
+    K3=st.floats(0.0, 1.0), phi_rad=st.floats(-6.28, 6.28), r_m=st.floats(0.0, 1.0),
+    sigma1_m=st.floats(0.005, 1.0), sigma2_m=st.floats(0.005, 1.0),
+)  # fmt: skip
 
 
 def test_gamma_by_hand():

@@ -118,13 +118,9 @@ def test_no_negative_or_infinite_flux_from_anywhere(position, seed, offset, K3):
     orientation = Rotation.random(2, rng=seed)
     normal = orientation[0].apply([0.0, 0.0, 1.0])
     got = flux(
-        position,
-        normal,
-        [0.0, 0.0, 0.0],
-        orientation[1].as_matrix(),
-        PlanarPattern(K3=K3),
+        position, normal, [0.0, 0.0, 0.0], orientation[1].as_matrix(), PlanarPattern(K3=K3),
         Projection(emission_offset_m=offset),
-    )
+    )  # fmt: skip
     assert np.isfinite(got).all()
     assert got[0] >= 0.0
 

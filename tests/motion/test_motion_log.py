@@ -50,14 +50,6 @@ def test_who_has_followed_a_part_gets_the_rest():
     assert _in_words(log.events(follower.poses, follower.changes)) == [10_000, 10_001, 10_002]
 
 
-def test_a_full_log_closes_and_forgets():
-    log = _log(*(_poses(first, 5) for first in range(0, 20, 5)), pose_memory=10)
-    log.add(TriggerChange(0, 1.0))
-    assert not log.complete
-    assert list(log.events()) == []
-    assert log.first_poses(5) is None
-
-
 def test_the_first_poses_are_found_between_changes():
     log = MotionLog()
     for first in range(0, 20, 5):

@@ -25,30 +25,12 @@ def intervals_of(stamps, batch=50) -> Intervals:
     return intervals
 
 
-@pytest.mark.parametrize('batch', [1, 1000])
-@pytest.mark.parametrize('lost', [[], [1], [10, 20, 30], [999]])
-def test_each_lost_pose_of_an_even_stream_is_noticed(lost, batch):
-    found = intervals_of(np.delete(PERIOD_NS * np.arange(1001), lost), batch)
-    # Without an interval before it, the first cannot be told from the rhythm.
-    assert found.long == len([row for row in lost if row > 1])
-    assert found.longest_ns == (2 if lost else 1) * PERIOD_NS
-
-
 def test_steps_back_and_repeats_are_no_intervals_and_another_rhythm_is_learnt():
     found = intervals_of([0, 10, 20, 20, 5, 15, 25])
     assert (found.long, found.longest_ns) == (0, 10)
     found = intervals_of(np.concatenate([np.arange(0, 1000, 10), np.arange(1000, 30_000, 20)]))
     assert found.typical_ns == 20
     assert 1 <= found.long <= 250
-
-
-def test_two_guns_on_one_topic_jump_at_every_pose():
-    jumps = Jumps()
-    two = PASS_M + np.where(np.arange(500) % 2, 1.0, 0.0)[:, None] * [0.0, 1.0, 0.0]
-    for rows in (slice(0, 30), slice(30, 100)):  # also between two batches
-        jumps.add(STAMPS_NS[rows], two[rows])
-    assert jumps.count == 99
-    assert jumps.fastest_m_per_s == pytest.approx(250.0, rel=0.01)
 
 
 def test_what_robots_do_is_no_jump():

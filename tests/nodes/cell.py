@@ -1,7 +1,5 @@
 """A small paint cell for tests: a panel, a motion over it, the robot and those who look on."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Nodes of a small paint cell, spinning."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,12 +12,10 @@ def simulator(ros_context, spin, tmp_path):
 
     def simulator(**values) -> DepositionSimulator:
         chosen = {
-            'mesh_file': str(write_panel(tmp_path / 'panel.stl')),
-            'max_edge_length_m': 0.05,
-            'publish_rate_hz': 10.0,
-            'pose_queue_depth': 1000,
+            'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.05,
+            'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
             'output_directory': str(tmp_path / 'films'),
-        } | values
+        } | values  # fmt: skip
         node = DepositionSimulator(context=ros_context, parameter_overrides=parameters(**chosen))
         spin(node)
         return node

@@ -6,8 +6,6 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip('rclpy')
-
 
 @pytest.mark.slow
 def test_a_folder_that_is_no_demo_is_left_alone(repository: Path, tmp_path):

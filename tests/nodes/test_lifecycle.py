@@ -1,16 +1,11 @@
 """The managed nodes under a lifecycle manager, over real DDS."""
 
-from __future__ import annotations
-
 import os
 import threading
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from geometry_msgs.msg import PoseStamped
 from lifecycle_msgs.msg import TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
@@ -122,11 +117,9 @@ def test_poses_received_while_inactive_are_counted_and_not_painted(
     film = painted(node, 300)
     # The states count that came before.
     second_pass = replace(
-        MOTION,
-        stamps_ns=MOTION.stamps_ns[300:],
-        positions_m=MOTION.positions_m[300:],
+        MOTION, stamps_ns=MOTION.stamps_ns[300:], positions_m=MOTION.positions_m[300:],
         quaternions_xyzw=MOTION.quaternions_xyzw[300:],
-    )
+    )  # fmt: skip
     assert np.array_equal(film, offline_um(node, second_pass))
     wait_until(lambda: viewer.reports(POSES, 'painting', b'\x00'))
     assert viewer.value(POSES, 'poses not painted while inactive') == '300'

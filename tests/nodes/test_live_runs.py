@@ -1,14 +1,9 @@
 """The nodes as processes: a bag is replayed, painted and saved, as in a cell."""
 
-from __future__ import annotations
-
 from functools import partial
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
 from rcl_interfaces.srv import SetParameters

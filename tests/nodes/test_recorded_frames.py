@@ -1,15 +1,10 @@
 """A run whose poses are not in the part's frame: recorded, used without the nodes, replayed."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters

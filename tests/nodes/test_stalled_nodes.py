@@ -1,12 +1,6 @@
 """What a cell has to bear: a node that stalls."""
 
-from __future__ import annotations
-
 import numpy as np
-import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ThicknessStats
 
 from nodes.cell import Robot, two_passes, write_panel

@@ -5,14 +5,12 @@ import sys
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 
 
@@ -62,23 +60,3 @@ def test_the_script_draws_the_door_again(samples, tmp_path):
                        (samples, tmp_path))  # fmt: skip
         assert len(kept) == len(drawn)
         assert np.mean(kept == drawn) > 0.99
-
-
-@pytest.mark.parametrize(
-    ('name', 'mesh', 'passes', 'mean_um'),
-    [
-        ('door_horizontal', 'door.stl', 3, (15.0, 25.0)),
-        ('door_vertical', 'door.stl', 5, (15.0, 25.0)),
-        ('panel_577', 'panel.stl', 3, (15.0, 25.0)),
-    ],
-)
-def test_the_motions_paint_the_front(samples, name, mesh, passes, mean_um):
-    surface, trajectory = read_mesh(samples / mesh), motion(samples, name)
-    axes = Rotation.from_quat(trajectory.quaternions_xyzw).as_matrix()
-    seen = facing(surface, trajectory.positions_m, axes[:, :, 2])
-    assert seen.back == 0
-    assert seen.front > 100
-    assert np.sum(trajectory.trigger_flow) == passes
-    film = film_um(surface.points(), trajectory)
-    share = surface.vertex_areas_m2 / surface.area_m2
-    assert mean_um[0] < film @ share < mean_um[1]

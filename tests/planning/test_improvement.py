@@ -62,9 +62,6 @@ def speeds_of(trajectory):
     return speed[on], change[both], places[on]
 
 
-# --- the film
-
-
 @pytest.mark.slow
 def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     """The film is linear in dwell: faster to the right as the effect lays more there."""
@@ -119,9 +116,6 @@ def test_flow_that_lags_behind_the_trigger_is_followed(panel, even):
     better = pd.improve(panel, even.trajectory, lagging)
     assert better.after.sigma_n < better.before.sigma_n
     assert better.after.sigma_n < 1.1 * better.sigma_n_of_path + 0.003
-
-
-# --- limits
 
 
 @pytest.mark.slow
@@ -179,9 +173,6 @@ def test_impossible_limits_are_named(panel, even, wanted, words):
         pd.improve(panel, even.trajectory, NARROW, **wanted)
 
 
-# --- files and models
-
-
 def _known(**widths):
     """What is known of the bell: these standard deviations, next to none else."""
     p = SKEWED.planar
@@ -201,8 +192,6 @@ def test_a_level_that_is_not_known_costs_no_evenness(panel, even, levelled):
     assert unsure.after.sigma_n == pytest.approx(levelled.after.sigma_n, rel=0.02)
     assert unsure.after.mean_um == pytest.approx(levelled.after.mean_um, rel=2e-3)
 
-
-# --- what a programme is made of
 
 # 0.3 m/s along x from -0.6 m: brush 1, then 2 without closing, off, and 2 at another flow.
 CHANGES = switched(stamps_ns([0.5, 1.5, 2.0, 3.0, 3.5]), (1, 1), (1, 2), (0, 0), (0.5, 2), (0, 0))

@@ -7,7 +7,6 @@ import pytest
 
 from folded_parts import bumper, hood
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.clearance import contacts
@@ -15,7 +14,6 @@ from paint_deposition.planning.faces import FacePasses, join_motions, order_face
 from paint_deposition.planning.part_plan import plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
 from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.report.writers.passes import write_plan
 from scenes import painted
 from surfaces import solid
 
@@ -56,21 +54,6 @@ def test_the_motion_has_no_jump_and_keeps_clear(planned):
     step = np.linalg.norm(np.diff(motion.positions_m, axis=0), axis=1)
     assert np.all(step <= 1.3 * 1e-9 * np.diff(motion.stamps_ns))
     assert planned.contacts == contacts(planned.surface, motion, planned.envelope) == ()
-
-
-@pytest.mark.slow
-def test_files_read_back_to_the_same_film(planned, tmp_path):
-    write_plan(tmp_path, planned)
-    bag = painted(
-        planned.surface.points(), read_recording(tmp_path / 'trajectory'), NARROW
-    ).film_um
-    program = painted(
-        planned.surface.points(), read_recording(tmp_path / 'passes.mod'), NARROW
-    ).film_um
-    peak = planned.film_um.max()
-    assert np.abs(bag - planned.film_um).max() < 1e-3 * peak
-    # Zones and acceleration are left out of a program; its moves are straight.
-    assert np.abs(program - planned.film_um).max() < 5e-3 * peak
 
 
 @pytest.mark.slow

@@ -1,13 +1,10 @@
 """Passes planned on parts, and their files."""
 
-import json
-
 import numpy as np
 import pytest
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.films import evenness
 from paint_deposition.planning.placement import place_passes
@@ -91,22 +88,6 @@ def test_impossible_plans_say_why(bowed, what, words):
     with pytest.raises(PlanError, match=words) as refusal:
         plan(bowed, NARROW, PlanRequest(**({'speed_m_per_s': 0.3} | what)))
     assert '\n' not in str(refusal.value)
-
-
-def test_files_say_the_same_as_the_plan(bowed, planned, tmp_path):
-    files = write_plan(tmp_path, planned, {'mesh': 'sheet'})
-    assert all(path.exists() for path in files)
-    recorded = read_trajectory(tmp_path / 'trajectory', state_topic='atomizer/state')
-    np.testing.assert_array_equal(recorded.stamps_ns, planned.trajectory.stamps_ns)
-    np.testing.assert_allclose(recorded.positions_m, planned.trajectory.positions_m)
-    film = painted(bowed.points(), recorded, NARROW).film_um
-    np.testing.assert_allclose(film, planned.film_um, rtol=1e-5)
-    content = json.loads((tmp_path / 'plan.json').read_text())
-    assert content['passes'] == len(planned.passes)
-    assert content['plane']['sigma_n_on_part'] == planned.plane_on_part.sigma_n
-    rows = np.genfromtxt(tmp_path / 'passes.csv', delimiter=',', names=True)
-    assert rows['pass'].max() == len(planned.passes)
-    assert len(list(tmp_path.glob('.*'))) == 0
 
 
 def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):

@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from brushes import two_brushes
 from inference.fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, PlanError
+from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -65,13 +64,6 @@ def test_drift_limits_are_where_the_tolerance_breaks():
         there = sigma_n(SYMMETRIC, answer.index_m, standoff_m=0.25 + change)
         assert there == pytest.approx(0.05, abs=1e-5)
     assert answer.standoff_drift_m[0] < 0.0 < answer.standoff_drift_m[1]
-
-
-def test_mean_film_and_speed_for_a_target():
-    answer = recommend(SYMMETRIC, IndexRequest(target_um=20.0))
-    assert answer.mean_um == pytest.approx(20.0, rel=1e-9)
-    solids = SYMMETRIC.planar.K1_cm3_per_s
-    assert answer.speed_m_per_s == pytest.approx(solids / (20.0 * answer.index_m), rel=1e-9)
 
 
 def test_passes_cover_the_width_to_its_edges():
@@ -176,12 +168,3 @@ def test_impossible_requests_say_why(what, words):
     with pytest.raises(PlanError, match=words) as refusal:
         recommended(**what)
     assert '\n' not in str(refusal.value)
-
-
-def test_an_index_is_for_one_brush():
-    model, request = two_brushes(), IndexRequest(speed_m_per_s=0.3)
-    with pytest.raises(ModelError, match='an index is for one brush and the model has 1, 2'):
-        recommend(model, request)
-    of_one = recommend(model.with_brush(1), request)
-    unoptimised = recommend(model.with_brush(1).model_copy(update={'brushes': ()}), request)
-    assert of_one.index_m == unoptimised.index_m

@@ -57,17 +57,45 @@ def proposals(diagnosis):
 
 
 @pytest.fixture(scope='module')
-def report(tmp_path_factory, diagnosis, comparisons, proposals):
-    path = tmp_path_factory.mktemp('report') / 'report.html'
-    tell(path, diagnosis, comparisons, proposals)
-    return path
+def tell(tmp_path_factory, diagnosis, comparisons):
+    """`tell(diagnosis)`: the report of one whose comparisons and proposals are known already.
+
+    The films on its parts are those of the same models, and painted once.
+    """
+    painted = ReportData(comparisons).painted
+
+    def tell(told, beside=comparisons, proposals=((), ()), older=()) -> Path:
+        told = replace(told)
+        vars(told).update(comparisons=beside, proposals=proposals)
+        data = ReportData.of(told, older)
+        vars(data).update(painted=[films[: len(beside)] for films in painted])
+        return write_report(tmp_path_factory.mktemp('report') / 'report.html', data)
+
+    return tell
 
 
-def tell(path, diagnosis, comparisons, proposals=((), ()), older=()):
-    """Write the report of a diagnosis whose comparisons and proposals are known already."""
-    diagnosis = replace(diagnosis)
-    vars(diagnosis).update(comparisons=comparisons, proposals=proposals)
-    write_report(path, ReportData.of(diagnosis, older))
+@pytest.fixture(scope='module')
+def report(tell, diagnosis, proposals):
+    return tell(diagnosis, proposals=proposals)
+
+
+@pytest.fixture(scope='module')
+def particular(tell, diagnosis, comparisons):
+    """Of a part with a head and a target, a history and a slip: the page, and its comparisons."""
+    told = {
+        'head': {'part': 'door <left>', 'batch': '4711'}, 'name': 'door.yaml',
+        'target_um': float(np.median(diagnosis.study.measured_um)), 'tolerance_um': 2.0,
+    }  # fmt: skip
+    older = [
+        {'added': 'pattern', 'rmse_um': 7.77, 'holdout_rmse_um': 8.88, 'noise_floor_um': 0.66,
+         'campaign': 'panel.yaml'},
+        {'added': 'tcp_tilt', 'rmse_um': 6.66, 'campaign': 'panel.yaml'},
+    ]  # fmt: skip
+    campaign = replace(diagnosis.study.campaign, **told)
+    slip = Outlier('door: P007', 312.0, 30.9, 1.2)
+    study = replace(diagnosis.study, campaign=campaign, outliers=(slip,))
+    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
+    return page_of(tell(replace(diagnosis, study=study), beside, older=older)), beside
 
 
 class Page(HTMLParser):
@@ -167,15 +195,10 @@ def test_the_cost_is_what_the_pattern_cannot_imitate(report, diagnosis, comparis
     assert rms < np.sqrt(np.mean((with_it - alone) ** 2))
 
 
-def test_part_batch_and_target_of_the_campaign_lead_the_page(tmp_path, diagnosis, comparisons):
-    measured = diagnosis.study.measured_um
-    target = float(np.median(measured))
-    told = {'head': {'part': 'door <left>', 'batch': '4711'}, 'target_um': target,
-            'tolerance_um': 2.0}  # fmt: skip
-    study = replace(diagnosis.study, campaign=replace(diagnosis.study.campaign, **told))
-    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
-    tell(tmp_path / 'report.html', replace(diagnosis, study=study), beside)
-    page = page_of(tmp_path / 'report.html')
+def test_part_batch_and_target_of_the_campaign_lead_the_page(particular):
+    page, beside = particular
+    study = beside[0].study
+    measured, target = study.measured_um, study.campaign.target_um
     assert page.clashes == page.open == []
     assert 'Part door <left> Batch 4711 An effect is missing' in page.text
     rows = point_rows(ReportData(beside))
@@ -210,10 +233,9 @@ def other_verdicts(diagnosis):
 
 
 @pytest.mark.parametrize('which', range(5))
-def test_every_verdict_has_its_report(tmp_path, diagnosis, comparisons, which):
+def test_every_verdict_has_its_report(tell, diagnosis, comparisons, which):
     words, other = list(other_verdicts(diagnosis))[which]
-    tell(tmp_path / 'report.html', other, comparisons[: len(other.history)])
-    page = page_of(tmp_path / 'report.html')
+    page = page_of(tell(other, comparisons[: len(other.history)]))
     assert words in page.text
     assert page.open == page.clashes == []
     assert ('Air drift was added with' in page.text) == ('air_drift' in other.accepted)
@@ -228,36 +250,32 @@ def test_every_verdict_has_its_report(tmp_path, diagnosis, comparisons, which):
     ],
 )
 def test_an_effect_added_as_asked_is_told_whatever_the_verdict(
-    tmp_path, diagnosis, comparisons, verdict, probability, title
+    tell, diagnosis, verdict, probability, title
 ):
     asked = replace(diagnosis.classes[0], probability=probability)
     told = replace(diagnosis, verdict=verdict, classes=(asked,), p_value=0.001)
-    tell(tmp_path / 'report.html', told, comparisons)
-    text = page_of(tmp_path / 'report.html').text
+    text = page_of(tell(told)).text
     assert 'run the diagnosis to find the cause' in text
     assert title in text
     assert 'Air drift was added with' in text
     assert 'no effect was added' not in text
 
 
-def test_the_whole_history_is_told_each_step_with_its_campaign(tmp_path, diagnosis, comparisons):
-    older = [
-        {'added': 'pattern', 'rmse_um': 7.77, 'holdout_rmse_um': 8.88, 'noise_floor_um': 0.66,
-         'campaign': 'panel.yaml'},
-        {'added': 'tcp_tilt', 'rmse_um': 6.66, 'campaign': 'panel.yaml'},
-    ]  # fmt: skip
-    campaign = replace(diagnosis.study.campaign, name='door.yaml')
-    study = replace(diagnosis.study, campaign=campaign)
-    done = replace(diagnosis, study=study)
-    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
-    tell(tmp_path / 'report.html', done, beside, older=older)
-    errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in done.history]
-    floor = f'{done.noise_floor_um:.2f}'
+def test_the_whole_history_is_told_each_step_with_its_campaign(particular, diagnosis):
+    errors = [f'{step.rmse_um:.2f} {step.holdout_rmse_um:.2f}' for step in diagnosis.history]
+    floor = f'{diagnosis.noise_floor_um:.2f}'
     assert (
         'pattern of eq. (1) alone panel.yaml 7.77 8.88 0.66 + TCP tilt panel.yaml 6.66 '
         f'model as given, refitted door.yaml {errors[0]} {floor} '
         f'+ air drift door.yaml {errors[1]} {floor}'
-    ) in page_of(tmp_path / 'report.html').text
+    ) in particular[0].text
+
+
+def test_readings_left_out_and_levels_of_parts_are_shown(particular, diagnosis):
+    text = particular[0].text
+    assert '312.00 µm at door P007, where 30.90 µm is expected (was it 31.20 µm?)' in text
+    for amount in diagnosis.random_effects:
+        assert f'{amount.kind} of {amount.of}' in text
 
 
 # A visitor: sorts the first table, then holds the page on a telephone.
@@ -329,15 +347,3 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
     assert learned_range(law) in page.text
     assert f'goes from {done.history[0].holdout_rmse_um:.2f} µm' in page.text
     assert page.open == page.clashes == []
-
-
-def test_readings_left_out_and_levels_of_parts_are_shown(tmp_path, diagnosis, comparisons):
-    slip = Outlier('door: P007', 312.0, 30.9, 1.2)
-    study = replace(diagnosis.study, outliers=(slip,))
-    told = replace(diagnosis, study=study)
-    beside = tuple(replace(comparison, study=study) for comparison in comparisons)
-    tell(tmp_path / 'report.html', told, beside)
-    text = page_of(tmp_path / 'report.html').text
-    assert '312.00 µm at door P007, where 30.90 µm is expected (was it 31.20 µm?)' in text
-    for amount in diagnosis.random_effects:
-        assert f'{amount.kind} of {amount.of}' in text

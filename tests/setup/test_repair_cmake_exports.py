@@ -1,7 +1,5 @@
 """The repair of the wheels' CMake exports: right paths, once, and never through a hard link."""
 
-from __future__ import annotations
-
 import importlib.util
 import sysconfig
 from pathlib import Path

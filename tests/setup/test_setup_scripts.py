@@ -1,7 +1,5 @@
 """The set-up's scripts as a user meets them: what is missing is named, what is done stays done."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,16 +1,10 @@
 """What is written can be read back by others' tools, and gives nothing away."""
 
-from __future__ import annotations
-
-import csv
 import json
 
 import numpy as np
 import pytest
-import trimesh
 import yaml
-from rosbags.highlevel import AnyReader
-from rosbags.typesys import Stores, get_typestore
 
 from .files import write
 from .gauge import layout
@@ -39,40 +33,6 @@ def test_campaign_file_names_what_exists_and_hides_the_truth(campaign, folder):
     assert json.loads((folder / 'truth' / 'truth.json').read_text())['id'] == 'edge_build'
     with pytest.raises(FileExistsError, match='not empty'):
         write(campaign, folder)
-
-
-def test_bag_holds_the_log(campaign, folder):
-    log = campaign.experiments[1].log
-    poses, triggers = [], []
-    types = get_typestore(Stores.ROS2_JAZZY)
-    with AnyReader([folder / 'door'], default_typestore=types) as bag:
-        for connection, stamp, data in bag.messages():
-            message = bag.deserialize(data, connection.msgtype)
-            if connection.topic == '/atomizer/pose':
-                p, q, t = message.pose.position, message.pose.orientation, message.header.stamp
-                poses.append([t.sec * 10**9 + t.nanosec, p.x, p.y, p.z, q.x, q.y, q.z, q.w])
-            else:
-                triggers.append((stamp, message.data))
-    poses = np.array(poses, dtype=object)
-    assert np.array_equal(poses[:, 0].astype(np.int64), log.stamps_ns)
-    assert np.allclose(poses[:, 1:4].astype(float), log.positions_m)
-    assert np.allclose(poses[:, 4:].astype(float), log.quaternions_xyzw)
-    assert np.array_equal([t[0] for t in triggers], log.trigger_stamps_ns)
-    assert np.array_equal([t[1] for t in triggers], log.trigger_on)
-
-
-def test_readings_and_mesh_read_back(campaign, folder):
-    with (folder / 'door.csv').open() as file:
-        rows = list(csv.DictReader(file))
-    table = campaign.experiments[1].readings
-    assert len(rows) == len(table) == 100
-    assert [float(r['thickness_um']) for r in rows] == table.thickness_um.tolist()
-    assert len({r['point'] for r in rows}) == 75
-    mesh = trimesh.load(folder / 'door.stl')
-    spots = np.array([[float(r[c]) for c in ('x_m', 'y_m', 'z_m')] for r in rows])
-    _, distance, face = trimesh.proximity.closest_point(mesh, spots)
-    assert distance.max() < 5e-4
-    assert np.min(np.sum(mesh.face_normals[face] * table.normals, axis=1)) > 0.97
 
 
 @pytest.mark.parametrize('style', ['columns', 'rows', 'random'])

@@ -1,7 +1,5 @@
 """Other forms of the laws keep what their effect is: sign, reference, limits, conservation."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -130,7 +128,7 @@ def test_droplets_of_mean_size_are_carried_alike_by_every_form(effect):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(('form', 'power'), [('', 1.5), ('~square', 2.0), ('~carried', 1.0)])
+@pytest.mark.parametrize(('form', 'power'), [('~square', 2.0), ('~carried', 1.0)])
 def test_a_draught_displaces_by_a_power_of_the_way(form, power):
     """Half the way to the model plane: 125 mm of 250."""
     clean, film = change(

@@ -1,9 +1,5 @@
 """The plume is eq. (1), solids are kept, and the noise of counting parcels is small."""
 
-from __future__ import annotations
-
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -72,18 +68,3 @@ def test_clean_film_on_a_door_is_equation_2():
     assert abs(np.mean(film - theory)) < 0.05
     assert np.std(film - theory) / theory.mean() < 0.01
     assert np.std(film - theory) < 0.3
-
-
-def test_curvature_is_that_of_the_height_function():
-    door = draw_door(np.random.default_rng(4))
-    x, z = scatter(door, 50, np.random.default_rng(1), 0.02)
-    h = 1e-4
-    y_zz = (door.height(x, z + h) - 2 * door.height(x, z) + door.height(x, z - h)) / h**2
-    y_xx = (door.height(x + h, z) - 2 * door.height(x, z) + door.height(x - h, z)) / h**2
-    low, high = door.curvature(x, z)
-    y_x, y_z = door.slope(x, z)
-    w2 = 1 + y_x**2 + y_z**2
-    twice_mean = ((1 + y_z**2) * y_xx - 2 * y_x * y_z * door.twist + (1 + y_x**2) * y_zz) / w2**1.5
-    assert np.allclose(low + high, twice_mean, rtol=1e-3, atol=1e-3)
-    ball = replace(door, bends=(), twist=0.0, crown_x_m=2.0, crown_z_m=2.0)
-    assert np.allclose(ball.curvature(np.zeros(1), np.full(1, 0.5 * ball.height_m)), -0.5)

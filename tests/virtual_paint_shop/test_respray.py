@@ -1,7 +1,5 @@
 """Another part of the same hidden world: what is changed changes, the rest stays."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np
@@ -11,8 +9,8 @@ import yaml
 from .conner import film_um
 from .files import write
 from .gauge import GaugeNoise
-from .jobs import drive, hold
-from .respray import PLANS, respray, sprayed_again
+from .jobs import hold
+from .respray import respray, sprayed_again
 from .shop import generate
 from .truths import library
 
@@ -70,25 +68,6 @@ def test_what_needs_voltage_is_gone_without_it(painted):
     assert np.ptp(film(painted, truths=[shielding]) / film(painted)) > 0.05
     off = film(painted, ['voltage_off'], [shielding])
     assert off == pytest.approx(film(painted, ['voltage_off']), rel=1e-9)
-
-
-def test_order_and_way_are_those_of_the_plan(painted):
-    (experiment,) = painted.experiments
-
-    def passes(*changes):
-        plan = experiment.plan
-        for change in changes:
-            plan = PLANS[change](plan, experiment.part)
-        motion = drive(experiment.part, plan, np.random.default_rng(1))
-        ends = [motion.tcp_m[motion.pass_number == n][[0, -1]] for n in range(plan.passes)]
-        axis = 2 if plan.direction == 'horizontal' else 0
-        return [(e[:, axis].mean(), np.sign(e[1] - e[0])[2 - axis]) for e in ends]
-
-    usual, order, way = passes(), passes('reverse_order'), passes('other_way')
-    assert [w for _, w in order] == [w for _, w in usual][::-1]
-    assert np.allclose([p for p, _ in order], [p for p, _ in usual][::-1], atol=0.03)
-    assert [w for _, w in way] == [-w for _, w in usual]
-    assert np.allclose([p for p, _ in way], [p for p, _ in usual], atol=0.03)
 
 
 @pytest.mark.slow

@@ -40,10 +40,6 @@ def test_the_patterns_of_two_brushes_are_shared_by_all_parts():
                                         abs=4.0 * cause.sd)  # fmt: skip
 
 
-def test_nothing_is_pooled_where_there_is_nothing():
-    assert all(pooled(parts(60, seed)).causes == () for seed in range(2))
-
-
 def test_a_misfit_that_all_parts_share_is_no_effect():
     found = pooled(parts(100, seed=2, misfit=0.03))
     assert found.causes == ()

@@ -36,20 +36,19 @@ def sweep_file(tmp_path):
     return path
 
 
-def film_by_itself(k1: float, speed: float) -> pd.Film:
-    """The same as one run."""
+@pytest.fixture(scope='module')
+def by_itself():
+    """`by_itself(model, speed)`: the same film as one run."""
     surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
     motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
-    model = pd.DepositionModel()
-    planar = model.planar.model_copy(update={'K1_cm3_per_s': k1})
-    return pd.simulate(
-        surface, varied_motion(motion, speed), model.model_copy(update={'planar': planar}),
-        readings=pd.read_readings(DOOR / 'door.csv', surface=surface),
-    )  # fmt: skip
+    readings = pd.read_readings(DOOR / 'door.csv', surface=surface)
+    return lambda model, speed: pd.simulate(
+        surface, varied_motion(motion, speed), model, readings=readings
+    )
 
 
 @pytest.mark.slow
-def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
+def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path, by_itself):
     job = Job.of(SweepFile.model_validate(TOLD), DOOR)
     finished = ResultCache(tmp_path / 'finished')
     killed = []
@@ -66,7 +65,9 @@ def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path):
         assert killed[0] not in client.run(os.getpid).values()
     table = finished.table(case.digest for case in job.cases).to_pylist()
     for values, row in zip(job.values, table, strict=True):
-        alone = film_by_itself(values['planar.K1_cm3_per_s'], values['speed_factor'])
+        planar = pd.DepositionModel().planar
+        planar = planar.model_copy(update={'K1_cm3_per_s': values['planar.K1_cm3_per_s']})
+        alone = by_itself(pd.DepositionModel(planar=planar), values['speed_factor'])
         assert row['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
         assert row['mean_um'] == alone.statistics.mean_um
         assert row['predicted_um'] == alone.predicted_um.tolist()
@@ -142,14 +143,13 @@ class Own(Effect):
     family = 'incidence'
     gain: float = parameter(0.0, low=-1.0, high=1.0, typical=0.1, unit='1', description='gain')
 
-    @staticmethod
-    def flux_factor(ray, gain):
-        return 1.0 + gain * ray.cos_incidence
+    def on_film(self, film_um, points):
+        return (1.0 + self.gain * points.height_fraction) * film_um
 """
 
 
 @pytest.mark.slow
-def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, worker):
+def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, worker, by_itself):
     """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
     file.write_text(OWN)
@@ -158,14 +158,12 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, 
     told = TOLD | {'grid': varied}
     sweep = SweepFile.model_validate(told)
     job = Job.of(sweep, DOOR)
-    surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
-    motion = pd.read_recording(DOOR / 'door', state_topic='/atomizer/state')
-    alone = pd.simulate(surface, varied_motion(motion, SPEEDS[0]), pd.read_model(model_file))
+    alone = by_itself(pd.read_model(model_file), SPEEDS[0])
     file.unlink()
     finished = ResultCache(tmp_path / 'finished')
     run(worker, computed, job.cases, job.inputs, finished, lambda what, share: None)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']
-    file.write_text(OWN.replace('1.0 + gain', '1.5 + gain'))
+    file.write_text(OWN.replace('1.0 + ', '1.5 + '))
     assert Job.of(sweep, DOOR).cases[0].digest != job.cases[0].digest

@@ -37,13 +37,6 @@ def refusal(*arguments) -> str:
     return text
 
 
-def test_a_written_trajectory_comes_back_exactly(tmp_path):
-    written = straight_pass()
-    folder = write_pose_bag(tmp_path / 'pass', written)
-    assert same(read_trajectory(folder, '/atomizer/pose', '/atomizer/state'), written)
-    assert same(read_trajectory(folder / 'pass_0.mcap', None, 'atomizer/state'), written)
-
-
 @pytest.mark.parametrize('storage', ['ros1', 'sqlite3', 'mcap'])
 def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
     written = straight_pass(triggers=False)

@@ -31,8 +31,7 @@ def topics(path):
 
 
 @pytest.mark.parametrize(
-    'name',
-    ['rosbag2_split', 'rosbag2_cdr_test_0.mcap', 'rosbag2_topics_and_services.mcap'],
+    'name', ['rosbag2_split', 'rosbag2_cdr_test_0.mcap', 'rosbag2_topics_and_services.mcap']
 )
 def test_whole_recordings_of_others_come_back_whole(tmp_path, shared_data, name):
     source = shared_data / 'bags' / name

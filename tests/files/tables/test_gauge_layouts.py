@@ -4,8 +4,6 @@ The layouts follow what the makers' manuals and programs show: lines about the b
 units in its headings or in a column of its own, and the statistics of the batch below it.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -197,8 +195,7 @@ def test_readings_in_order_belong_to_points_numbered_from_one(file):
 
 
 @pytest.mark.parametrize(
-    'text',
-    ['DFT\n20,5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n'],
+    'text', ['DFT\n20,5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n']
 )
 def test_a_missing_reading_keeps_its_number(file, text):
     listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0.5,0,0\n')

@@ -6,7 +6,6 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.motion.programmed import PROGRAMMED
 
 # A gun that sways while it goes, and is on in the middle.
 TIMES_S = np.array([0.0, 0.02, 0.041, 0.06, 0.0805])
@@ -145,19 +144,6 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
     (tmp_path / 'poses.csv').write_text(text.replace('base\n1', 'world\n1'))
     with pytest.raises(RecordingError, match=r'poses\.csv: poses in frames base, world'):
         read_recording(tmp_path / 'poses.csv')
-
-
-def test_programmed_passes_take_their_speeds(tmp_path):
-    """Half a metre at 0.5 m/s with the gun on takes a second; the approach is gun off."""
-    (tmp_path / 'passes.csv').write_text(
-        'pass,x_m,y_m,z_m,qx,qy,qz,qw,speed_m_per_s,spraying\n'
-        '1,0,0,0,1,0,0,0,1,0\n1,0.1,0,0,1,0,0,0,0.5,0\n1,0.6,0,0,1,0,0,0,0.5,1\n'
-    )
-    read = read_recording(tmp_path / 'passes.csv')
-    assert read.duration_s == pytest.approx(1.2)
-    assert read.trigger_flow.tolist() == [0.0, 1.0]
-    assert read.trigger_stamps_ns.tolist() == [0, 200_000_000]
-    assert read.notes[0] == PROGRAMMED
 
 
 @pytest.mark.parametrize(

@@ -60,13 +60,10 @@ def passes(
         triggers += [clock, clock + duration]
         clock += duration + 1.0
     return Trajectory(
-        np.round(np.concatenate(stamps) * 1e9).astype(np.int64),
-        np.concatenate(positions),
-        np.concatenate(quaternions),
-        'part',
-        np.round(np.array(triggers) * 1e9).astype(np.int64),
+        np.round(np.concatenate(stamps) * 1e9).astype(np.int64), np.concatenate(positions),
+        np.concatenate(quaternions), 'part', np.round(np.array(triggers) * 1e9).astype(np.int64),
         np.tile([1.0, 0.0], len(heights_m)),
-    )
+    )  # fmt: skip
 
 
 def readings_at(positions_m, film_um, noise_um=0.3, repeats=2, seed=0) -> Readings:

@@ -178,8 +178,6 @@ def test_models_without_the_brushes_of_a_campaign_are_refused(campaign):
         diagnose(campaign, two_brushes())
 
 
-# --- what is known of one job, for the next
-
 THREE = PatternVector((1, 4, 7))
 
 

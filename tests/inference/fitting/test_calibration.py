@@ -1,6 +1,5 @@
 """The pattern found back from readings of panels."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +8,6 @@ import pytest
 from inference.fitting.panels import campaign_of, column, painted_by, passes, readings_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate
 from paint_deposition.inference.fitting.panel_fit import fit_collapse
@@ -17,7 +15,6 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.report.writers.write import write
 from virtual_paint_shop.shop import panel_study
 
 pytestmark = pytest.mark.slow
@@ -111,33 +108,6 @@ def test_papers_study_fit_at_577_predict_525_and_625():
         residuals = other.residuals(other.forward.predict_um(fitted.model))
         assert residuals.predicted_um.mean() == pytest.approx(other.measured_um.mean(), rel=0.015)
         assert residuals.sd_um < 1.2 * noise
-
-
-def test_files_hold_the_model_and_its_uncertainty(calibrated, tmp_path):
-    files = write(calibrated, tmp_path)
-    written = read_model_file(files[0])
-    for name, value in calibrated.model.planar:
-        assert getattr(written.model.planar, name) == pytest.approx(value, rel=1e-7), name
-    assert written.model.projection == calibrated.model.projection
-    assert written.uncertainty['planar'].keys() == {v.name for v in calibrated.parameters}
-    content = json.loads(files[1].read_text())
-    assert content.keys() == {*calibrated.to_dict(), 'provenance'}
-    assert content['parameters']['phi_rad']['determined'] is False
-    (step,) = written.history
-    assert step['added'] == 'pattern'
-    assert step['noise_floor_um'] == pytest.approx(calibrated.study.noise_floor_um, abs=1e-4)
-
-
-def test_a_calibration_carries_on_what_it_started_from(calibrated, tmp_path):
-    older = [{'added': 'pattern', 'rmse_um': 3.0, 'campaign': 'another.yaml'}]
-    start = ModelFile(calibrated.model, 'bell 7', {}, older)
-    written = read_model_file(write(calibrated, tmp_path, start=start)[0])
-    assert written.name == 'bell 7'
-    assert written.history[:1] == older
-    assert [step['added'] for step in written.history] == ['pattern', 'refit']
-
-
-# --- readings that cannot be what they are said to be
 
 
 def with_film(panel, film_um, points=None, repeats=1) -> Campaign:

@@ -124,9 +124,6 @@ def test_the_texture_is_estimated_beside_a_missing_effect(texture):
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 
-# --- through the real interface
-
-
 @pytest.fixture(scope='module')
 def campaign(tmp_path_factory):
     """A door with edge build, 97 readings, of which one is a typing error."""

@@ -1,7 +1,5 @@
 """Panels too small for the pattern: noticed, and the uncertainty made honest."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.stats import norm

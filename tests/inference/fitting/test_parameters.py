@@ -13,15 +13,10 @@ from paint_deposition.model.coordinates import PATTERN
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
 PATTERNS = st.builds(
-    PlanarPattern,
-    K1_cm3_per_s=st.floats(0.05, 20.0),
-    K2=st.floats(0.0, 1.0),
-    K3=st.floats(0.01, 0.98),
-    phi_rad=st.floats(-3.1, 3.1),
-    r_m=st.floats(0.0, 0.6),
-    sigma1_m=st.floats(0.01, 0.5),
-    sigma2_m=st.floats(0.01, 0.5),
-)
+    PlanarPattern, K1_cm3_per_s=st.floats(0.05, 20.0), K2=st.floats(0.0, 1.0),
+    K3=st.floats(0.01, 0.98), phi_rad=st.floats(-3.1, 3.1), r_m=st.floats(0.0, 0.6),
+    sigma1_m=st.floats(0.01, 0.5), sigma2_m=st.floats(0.01, 0.5),
+)  # fmt: skip
 
 
 @given(PATTERNS, st.floats(-0.1, 0.1), st.floats(0.0, 2.0))

@@ -17,7 +17,6 @@ from paint_deposition.inference.fitting.panel_fit import CollapseFit, fit_collap
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
-from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.part.points import SurfacePoints
 from scenes import painted, straight_pass
 
@@ -67,9 +66,6 @@ def share_on_the_axis(angle_deg: np.ndarray) -> np.ndarray:
     return film.film_um / film.film_um.max()
 
 
-# --- everywhere, on the shipped figures
-
-
 def test_eq3_comes_back_from_the_profile_that_it_draws():
     depth = COLLAPSE.thickness_um(STATIONS_FT)
     found = fitted_transect(STATIONS_FT, depth)
@@ -77,14 +73,6 @@ def test_eq3_comes_back_from_the_profile_that_it_draws():
     fine = np.linspace(-150.0, 150.0, 301)
     off = found.collapse.thickness_um(fine) - COLLAPSE.thickness_um(fine)
     assert np.sqrt(np.mean(off**2)) < 0.03 * depth.max()
-
-
-def test_eq5_is_the_unevenness_of_overlapped_lanes():
-    x = np.arange(-112.0, 112.0, 1.0)
-    total = np.sum([COLLAPSE.thickness_um(x + LANE_SPACING_FT * k) for k in range(-2, 3)], axis=0)
-    predicted = ParallelPasses.one_way(COLLAPSE).sigma_n(LANE_SPACING_FT)
-    assert predicted == pytest.approx(total.std() / total.mean(), rel=1e-3)
-    assert 0.10 < predicted < 0.13
 
 
 def test_eq1_comes_back_from_the_profile_that_it_draws():
@@ -99,9 +87,6 @@ def test_eq2_on_the_axis_is_the_cosine_that_the_coating_follows():
     np.testing.assert_allclose(share_on_the_axis(angle), np.sin(np.radians(angle)), rtol=1e-12)
     shipped = SHIPPED['eq2']
     assert shipped['cosine_exponent'] == pytest.approx(1.0, abs=shipped['cosine_error'])
-
-
-# --- where the measurements are
 
 
 def test_eq3_follows_a_moving_sprinkler(shared_data):

@@ -1,14 +1,11 @@
 """Repeats: the noise they show, and gross outliers among them, which are found and named."""
 
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.gauge_noise import (
     ASSUMED_FREEDOM,
     gauge_noise,
@@ -47,11 +44,9 @@ def at_points(points: str, thickness_um, sigma_um=np.nan) -> Readings:
     """Readings at points of one letter each."""
     count = len(thickness_um)
     return Readings.of(
-        np.zeros((count, 3)),
-        thickness_um,
-        point=np.array(list(points)),
+        np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
         sigma_um=np.broadcast_to(sigma_um, count).astype(float),
-    )
+    )  # fmt: skip
 
 
 def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[float]]:
@@ -59,9 +54,6 @@ def honest_pairs(count: int = 10, sigma_um: float = 0.7) -> tuple[str, list[floa
     offset = sigma_um * np.abs(np.random.default_rng(5).normal(size=count)) / np.sqrt(2.0)
     thickness = np.column_stack([26.0 - offset, 26.0 + offset]).ravel()
     return ''.join(2 * chr(ord('A') + k) for k in range(count)), thickness.tolist()
-
-
-# --- honest readings stay
 
 
 @pytest.mark.parametrize('layout', LAYOUTS)
@@ -81,9 +73,6 @@ def test_a_display_in_whole_micrometres_makes_no_outliers():
     """Nine pairs in ten without any scatter are no reason to doubt the tenth."""
     labels, _ = honest_pairs()
     assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
-
-
-# --- slips are found
 
 
 def test_one_slip_does_not_raise_the_noise():
@@ -125,9 +114,6 @@ def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
     assert not gross_outliers(at_points('', [])).any()
 
 
-# --- and are named
-
-
 def test_what_is_left_out_is_named():
     taken = at_points('abab' + 'b', [15.5, 20.0, 26.25, 4.0, 20.5])
     lines = left_out_lines(taken, np.array([False, True, False, False, True]))
@@ -136,32 +122,6 @@ def test_what_is_left_out_is_named():
         'again',
         "point 'b': 4 µm beside 20, 20.5; left out of the fit, measure it again",
     ]
-
-
-def test_a_study_goes_without_slips_and_says_so(sample):
-    door = sample.experiments[1]
-    # At a point with one reading only, nothing would contradict a slip.
-    point = int(np.flatnonzero(door.means.repeats == 3)[0])
-    slip, *others = np.flatnonzero(door.means.owner == point)
-    thickness = door.readings.thickness_um.copy()
-    thickness[slip] -= 11.0
-    slipped = door.with_readings(replace(door.readings, thickness_um=thickness))
-    study, clean = Study.of(Campaign((slipped,))), Study.of(Campaign((door,)))
-    beside = ', '.join(f'{value:.4g}' for value in thickness[others])
-    assert study.notes == (
-        f"door: point '{door.readings.point[slip]}': {thickness[slip]:.4g} µm beside {beside}; "
-        'left out of the fit, measure it again',
-    )
-    assert clean.notes == ()
-    kept = study.campaign.experiments[0]
-    assert np.flatnonzero(~kept.used).tolist() == [slip]
-    without = Study.of(Campaign((door.without(~kept.used),)))
-    assert study.measured_um == pytest.approx(without.measured_um)
-    assert study.sigma_um == pytest.approx(without.sigma_um)
-    assert study.noise.degrees_of_freedom == clean.noise.degrees_of_freedom - 1
-
-
-# --- means, and noise pooled
 
 
 def test_repeats_are_averaged_in_order_of_first_appearance():
@@ -198,12 +158,6 @@ def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
     assert noise.source == 'assumed'
     assert noise.degrees_of_freedom == ASSUMED_FREEDOM
     assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
-
-
-def test_stated_noise_wins():
-    noise = gauge_noise(at_points('aaaaaaaa', np.arange(8.0), 0.5))
-    assert (noise.source, noise.degrees_of_freedom) == ('stated', np.inf)
-    assert noise.typical_um == 0.5
 
 
 def test_repeats_of_stated_readings_say_nothing_of_the_others():

@@ -1,12 +1,7 @@
 """The live comparison with gauge readings over real DDS."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ComparisonStats
 from std_srvs.srv import Trigger
 from visualization_msgs.msg import Marker, MarkerArray
@@ -56,12 +51,9 @@ def comparison(ros_context, spin, readings, tmp_path):
 
     def comparison(**values) -> ModelComparison:
         chosen = {
-            'mesh_file': str(tmp_path / 'panel.stl'),
-            'max_edge_length_m': 0.05,
-            'measurements_file': str(readings),
-            'publish_rate_hz': 10.0,
-            'pose_queue_depth': 1000,
-        } | values
+            'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
+            'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
+        } | values  # fmt: skip
         node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
         spin(node)
         return node

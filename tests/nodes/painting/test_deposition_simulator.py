@@ -1,29 +1,21 @@
 """The live film over real DDS."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
-import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
-
-pytest.importorskip('rclpy')
-
 from visualization_msgs.msg import Marker
 
-from nodes.cell import offline_um, parameters, two_passes, write_panel
+from nodes.cell import two_passes
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 from paint_deposition.part.facing import toward_the_gun
@@ -35,16 +27,6 @@ def centroid_m(node, film_um):
     """(3,) where the paint is [m]."""
     volume = film_um * node.surface.vertex_areas_m2
     return volume @ node.surface.vertices_m / volume.sum()
-
-
-def test_the_film_is_that_of_the_offline_run(simulator, robot, painted):
-    node = simulator()
-    robot(node).send(MOTION)
-    film = painted(node)
-    exact = offline_um(node, MOTION, precision='double')
-    assert exact.max() > 5.0
-    assert np.abs(film - exact).max() < 1e-6 * exact.max()
-    assert np.array_equal(film, offline_um(node, MOTION))
 
 
 def test_the_gun_decides_which_side_of_a_solid_is_outward(simulator, robot, painted, tmp_path):
@@ -94,21 +76,3 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     )
     assert len({header_stamp_ns(mesh) for mesh in meshes}) > 3
     assert min(map(len, meshes)) > 120 * 100_000
-
-
-def test_bad_input_is_one_line(ros_context, tmp_path):
-    panel = {'mesh_file': str(write_panel(tmp_path / 'panel.stl'))}
-    for values, words in (
-        ({'mesh_file': ''}, 'mesh_file is empty'),
-        ({'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
-        ({'model_file': 'nowhere.yaml'}, 'nowhere.yaml: no such file'),
-        ({'color_min_um': 5.0, 'color_max_um': 5.0}, 'color_min_um 5 is not below'),
-        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'part_parent_frame'),
-        ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5]}, 'unit quaternion'),
-        ({'down': [0.0, 0.0, 0.0]}, 'not all zero'),
-        ({'mesh_fil': 'x'}, "did you mean 'mesh_file'?"),
-    ):
-        overrides = parameters(**panel | values)
-        with pytest.raises(PaintError, match=words) as caught:
-            DepositionSimulator(context=ros_context, parameter_overrides=overrides)
-        assert '\n' not in str(caught.value)

@@ -1,14 +1,8 @@
 """Large messages go to those who listen, as they can take them."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
-import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ThicknessField
 
 from nodes.cell import two_passes

@@ -1,7 +1,5 @@
 """Another part comes into the cell: a new film, a new run, and nothing of the old one lost."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from dataclasses import replace
@@ -10,9 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 

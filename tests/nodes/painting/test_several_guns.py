@@ -1,16 +1,11 @@
 """Several guns on one part: one film, whoever's poses come first."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ThicknessField, ThicknessStats
+from scipy.spatial.transform import Rotation
 
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.effects.deposition_model import DepositionModel

@@ -1,13 +1,9 @@
 """Brushes named by the states of a running cell."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
 
 from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes

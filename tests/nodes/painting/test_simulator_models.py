@@ -1,11 +1,7 @@
 """Another model while the part is painted."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
 
 from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class

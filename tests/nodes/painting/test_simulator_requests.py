@@ -1,16 +1,10 @@
 """Services and parameters of the simulator."""
 
-from __future__ import annotations
-
 import json
 import math
 
 import numpy as np
-import pytest
 import trimesh
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from paint_msgs.srv import SaveFilm
 from std_srvs.srv import Trigger

@@ -1,14 +1,9 @@
 """What the simulator publishes, and what it says of what comes in."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import PoseProgress, ThicknessField, ThicknessStats
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray

@@ -1,11 +1,5 @@
 """A simulator that is started while the robot paints."""
 
-from __future__ import annotations
-
-import pytest
-
-pytest.importorskip('rclpy')
-
 from nodes.processes import NodeProcess
 
 STREAM = """

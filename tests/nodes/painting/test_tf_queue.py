@@ -1,9 +1,5 @@
 """Poses that wait for their transform: in order, for a while, each counted once."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 

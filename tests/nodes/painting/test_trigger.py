@@ -1,12 +1,6 @@
 """What the gun's states do to the film while it is painted."""
 
-from __future__ import annotations
-
 import numpy as np
-import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy

@@ -1,15 +1,10 @@
 """The index planner over real DDS."""
 
-from __future__ import annotations
-
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Path
 from paint_msgs.srv import RecommendIndex

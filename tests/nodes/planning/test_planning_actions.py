@@ -1,11 +1,6 @@
 """Passes as an action over real DDS: feedback, result, refusal and cancel."""
 
-from __future__ import annotations
-
 import pytest
-
-pytest.importorskip('rclpy')
-
 from action_msgs.msg import GoalStatus
 from nav_msgs.msg import Path
 from paint_msgs.action import PlanPasses

@@ -1,7 +1,5 @@
 """A recorder, and who publishes to it."""
 
-from __future__ import annotations
-
 import pytest
 
 

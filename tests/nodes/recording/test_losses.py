@@ -1,9 +1,5 @@
 """What was lost on the way to a recorder is counted, or it says that it cannot be."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile

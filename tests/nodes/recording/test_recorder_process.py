@@ -1,15 +1,12 @@
 """A recorder as a process: killed, told to end, its folder taken away, its disk full."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 import contextlib
 import itertools
 import shutil
 import subprocess
 
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from rosbags.rosbag2 import Reader

@@ -1,10 +1,7 @@
 """Recording over real DDS: byte for byte, what was asked for, and with what."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import ThicknessStats
 from rclpy.qos import QoSProfile, ReliabilityPolicy

@@ -1,7 +1,5 @@
 """A player, and who listens to it."""
 
-from __future__ import annotations
-
 import time
 
 import pytest

@@ -1,11 +1,7 @@
 """Replay over real DDS: the recorded bytes in the recorded order, whatever the speed."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
-
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseStamped
 from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger

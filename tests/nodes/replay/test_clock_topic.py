@@ -1,12 +1,9 @@
 """The time of a replay on /clock."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from rclpy.node import Node
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock

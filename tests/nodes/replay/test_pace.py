@@ -1,10 +1,5 @@
 """A replay is as fast as those who listen take it."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
-
 from nodes.replay.listener import recorded
 
 

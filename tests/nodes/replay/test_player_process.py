@@ -1,9 +1,5 @@
 """A player as a process: what it says at its end, and with which exit code."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from files.recorded import straight_pass
 from nodes.processes import NodeProcess
 from paint_deposition.files.recordings.bags import write_pose_bag

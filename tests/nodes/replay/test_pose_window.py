@@ -1,9 +1,5 @@
 """Flow control of a replay: who has taken what, and who is not waited for."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_deposition.nodes.replay.flow_control import (
     LOST_TIMEOUT_S,
     NO_REPORT_TIMEOUT_S,

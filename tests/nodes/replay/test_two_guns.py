@@ -1,13 +1,9 @@
 """Two guns recorded in one run, and replayed into a simulator of two guns."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
 
 from nodes.cell import Robot, offline_um, parameters, two_passes
 from paint_deposition.api.simulation import simulate

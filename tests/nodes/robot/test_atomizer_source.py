@@ -1,14 +1,9 @@
 """Poses from joints and states from signals, over real DDS, as a robot's driver sends them."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node

@@ -1,14 +1,9 @@
 """Poses from transforms over real DDS, as robot_state_publisher and a rail's driver send them."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np
 import pytest
-
-pytest.importorskip('rclpy')
-
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile

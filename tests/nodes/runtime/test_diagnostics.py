@@ -1,9 +1,5 @@
 """Diagnostics over real DDS."""
 
-import pytest
-
-pytest.importorskip('rclpy')
-
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 
 

@@ -3,9 +3,6 @@
 import math
 
 import pytest
-
-pytest.importorskip('rclpy')
-
 from rcl_interfaces.msg import ParameterType
 from rclpy.node import Node
 

@@ -2,8 +2,6 @@
 
 import pytest
 
-pytest.importorskip('rclpy')
-
 from nodes.cell import write_panel
 from nodes.processes import NodeProcess
 

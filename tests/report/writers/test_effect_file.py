@@ -10,6 +10,7 @@ from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
+from paint_deposition.kernel.laws import Ray
 from paint_deposition.report.writers.effect_file import effect_entry, write_effect_file
 from small_campaign import small_campaign
 
@@ -26,6 +27,8 @@ SHAPES = {
     'stepping': lambda u: 0.8 + 0.4 / (1.0 + np.exp((0.5 - u) / 0.08)),
     'falling as a power': lambda u: (1.0 + u) ** -0.7,
 }
+# Laws over the ray that are compiled: the second takes the exponential and the logarithm.
+IN_KERNEL = {('incidence_deg', 'rising'), ('standoff_ratio', 'falling as a power')}
 
 
 def learned(covariate: str, shape: str = 'rising', kind: str = 'factor'):
@@ -52,6 +55,15 @@ def film_um(experiment, model: DepositionModel) -> np.ndarray:
     return painted.gauge_um
 
 
+def factor_at(effect, x: np.ndarray) -> np.ndarray:
+    """What a law over the ray makes of the flux where incidence or distance are these."""
+    cosine, ratio = (x, x) if effect.family == 'standoff' else (np.cos(np.radians(x)), 1.0 + 0 * x)
+    rays = zip(ratio, cosine, strict=True)
+    return np.array(
+        [effect.flux_factor(Ray(0.1, 0.2, *ray, 0.3), *effect.values()) for ray in rays]
+    )
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ('covariate', 'shape', 'kind'),
@@ -64,11 +76,11 @@ def film_um(experiment, model: DepositionModel) -> np.ndarray:
 def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
     covariate, shape, kind, door, tmp_path
 ):
+    """Laws over the ray as functions, each form; the first of some through a kernel as well."""
     law = learned(covariate, shape, kind)
     forms = forms_of(law)
     assert forms
     plain = film_um(door, DepositionModel())
-    wanted = film_um(door, DepositionModel(effects=(law,)))
     for number, form in enumerate(forms):
         file = write_effect_file(tmp_path / f'my_law_{number}.py', law, form)
         effect = load_effect_file(file)
@@ -78,9 +90,14 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
         (tmp_path / 'model.yaml').write_text(f'effects: [{{{entry}}}]\n')
         assert entry in file.read_text().replace('"', '')
         model = read_model(tmp_path / 'model.yaml')
-        band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
-        # Rays beyond the range of the readings are few: there the law itself fades to neutral.
-        assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
+        if law.flux_factor is not None:
+            x = np.linspace(law.low, law.high, 200)
+            assert np.abs(factor_at(*model.effects, x) - law.factor(x)).max() < 2.0 * SD
+        if law.flux_factor is None or (number == 0 and (covariate, shape) in IN_KERNEL):
+            wanted = film_um(door, DepositionModel(effects=(law,)))
+            band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
+            # Rays beyond the range of the readings are few: there the law itself fades to neutral.
+            assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95
 
 
 def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):
