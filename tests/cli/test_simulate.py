@@ -1,19 +1,22 @@
 """`paint simulate` over real files, as a user runs it."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
 import paint_deposition as pd
-from booth import SAMPLES
+from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint
+from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
+from paint_deposition.errors import RecordingError
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -116,11 +119,48 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
     assert np.array_equal(read.film_um, plain.film_um)
 
 
+def test_a_trigger_that_is_not_named_is_noted(panel, tmp_path):
+    log = level_pass(trigger_stamps_ns=level_pass().stamps_ns[:1], trigger_flow=np.array([1.0]))
+    bag = write_pose_bag(tmp_path / 'pass', log)
+    done = paint(
+        'simulate', '--mesh', panel, '--trajectory', bag, *COARSE, '--json',
+        '-o', tmp_path / 'out',
+    )  # fmt: skip
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f'note: recording {bag}: /atomizer/state (std_msgs/msg/Bool) is not')
+    assert '--state-topic' in line
+    assert line == f'note: {json.loads(done.stdout)["notes"][0]}'
+
+
 def refused(tmp_path, *arguments):
     """What `paint simulate` says; nothing may have been written."""
     done = paint('simulate', *arguments, '-o', tmp_path / 'out')
     assert not (tmp_path / 'out').exists()
     return done
+
+
+def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
+    inputs = ('--mesh', panel, '--trajectory', DOOR_BAG)
+    done = refused(tmp_path, *inputs, '--pose-topic', '/robot/tcp')
+    assert_refused(done, '/robot/tcp', '/atomizer/pose')
+    done = refused(tmp_path, *inputs, '--state-topic', '/gun')
+    assert_refused(done, '/gun', '/atomizer/state')
+
+
+def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
+    entries = pose_entries(level_pass())
+    messages = Messages()
+    for row in (10, 60, 110):
+        topic, stamp, _ = entries[row]
+        nowhere = messages.pose(stamp + 1_000_000, [np.nan, 0, 0], LOOKING_ALONG_Y, '')
+        entries.insert(row + 1, (topic, stamp + 1_000_000, nowhere))
+    surface = pd.read_mesh(panel, max_edge_length_m=0.1)
+    film = pd.simulate(surface, pd.read_recording(write_bag(tmp_path / 'some', entries)))
+    assert film.counts.not_finite == 3
+    assert np.array_equal(film.film_um, pd.simulate(surface, level_pass()).film_um)
+    positions = np.full_like(level_pass().positions_m, np.nan)
+    with pytest.raises(RecordingError, match='150 not finite'):
+        pd.simulate(surface, replace(level_pass(), positions_m=positions))
 
 
 @pytest.mark.parametrize(
@@ -142,6 +182,15 @@ def test_bad_input_is_refused(option, value, words, panel, one_pass, tmp_path):
     options[option] = value if isinstance(value, tuple) else (value,)
     arguments = [part for name, values in options.items() for part in (name, *values)]
     assert_refused(refused(tmp_path, *arguments), *words)
+
+
+def test_readings_off_the_part_are_refused_before_anything_is_written(panel, one_pass, tmp_path):
+    (tmp_path / 'readings.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,9\n0,0.5,0,9\n')
+    done = refused(
+        tmp_path, '--mesh', panel, '--trajectory', one_pass, *COARSE,
+        '--at', tmp_path / 'readings.csv',
+    )  # fmt: skip
+    assert_refused(done, 'readings.csv', "off the part's surface", '0.5')
 
 
 def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):

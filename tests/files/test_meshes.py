@@ -6,7 +6,7 @@ import trimesh
 from trimesh.creation import box, icosphere
 
 from paint_deposition.errors import MeshError
-from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.meshes import read_mesh, write_mesh_ply
 from surfaces import triangulated
 
 
@@ -136,3 +136,19 @@ def test_absurd_sizes_are_refused_with_the_remedy(tmp_path, size_m, options, say
     path = saved(sheet(size_m), tmp_path / 'part.stl')
     with pytest.raises(MeshError, match=says):
         read_mesh(path, **options)
+
+
+def test_the_painted_mesh_carries_the_film(tmp_path):
+    surface = read_mesh(saved(sheet(), tmp_path / 'part.stl'), max_edge_length_m=0.05)
+    film = np.linspace(0.0, 25.0, len(surface.vertices_m))
+    colours = np.full((len(film), 3), [10, 200, 30], dtype=np.uint8)
+    painted = tmp_path / 'film.ply'
+    write_mesh_ply(painted, surface, colours, thickness_um=film)
+    again = trimesh.load(painted, process=False)
+    np.testing.assert_allclose(again.vertices, surface.vertices_m, atol=1e-7)
+    np.testing.assert_array_equal(again.faces, surface.faces)
+    columns = again.metadata['_ply_raw']['vertex']['data']
+    np.testing.assert_allclose(columns['thickness_um'].ravel(), film, rtol=1e-6)
+    np.testing.assert_array_equal(again.visual.vertex_colors[:, :3], colours)
+    assert b'property float thickness_um' in painted.read_bytes()[:1000]
+    assert sorted(p.name for p in tmp_path.iterdir()) == ['film.ply', 'part.stl']

@@ -124,9 +124,12 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
     rest = PoseBatch.joined([event for event in coming[half:] if isinstance(event, PoseBatch)])
     second = Trajectory(
-        rest.stamps_ns, rest.positions_m, rest.quaternions_xyzw,
-        trigger_stamps_ns=stamps_ns([2.2]), trigger_flow=np.array([0.8]),
-    )  # fmt: skip
+        rest.stamps_ns,
+        rest.positions_m,
+        rest.quaternions_xyzw,
+        trigger_stamps_ns=stamps_ns([2.2]),
+        trigger_flow=np.array([0.8]),
+    )
     assert np.allclose(
         film.snapshot().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
     )
@@ -141,6 +144,34 @@ def test_a_motion_that_begins_again_paints_a_second_coat():
     assert np.allclose(film.snapshot().film_um, 2 * once, rtol=0, atol=1e-5 * once.max())
     assert film.counts.restarts == 1
     assert film.counts.late_triggers == 0
+
+
+def test_the_log_paints_the_motion_again_with_another_model():
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = followed(events(motion, 10, delay_s=0.05))
+    again = LiveFilm(lying_plane(), LAGGING)
+    again.replay(film.log.events())
+    assert np.array_equal(
+        again.snapshot().film_um, painted(lying_plane(), motion, LAGGING).film_um
+    )
+    assert again.counts == film.counts
+
+
+def test_another_model_from_here_on_leaves_the_film_so_far():
+    motion = straight_pass(TIMES_S)
+    doubled = MODEL.model_copy(
+        update={'planar': MODEL.planar.model_copy(update={'K1_cm3_per_s': 3.8})}
+    )
+    film = LiveFilm(lying_plane(), MODEL, trigger_latency_s=0.0)
+    film.add_poses(poses(motion, slice(0, 501)))
+    before = film.snapshot().film_um
+    film.switch_model(doubled)
+    assert np.allclose(film.snapshot().film_um, before, rtol=0, atol=1e-6)
+    film.add_poses(poses(motion, slice(501, None)))
+    whole = painted(lying_plane(), motion).film_um
+    assert np.allclose(
+        film.snapshot().film_um, before + 2 * (whole - before), rtol=0, atol=1e-4 * whole.max()
+    )
 
 
 def test_memory_is_bounded_and_says_so():

@@ -1,10 +1,13 @@
 """One integrator for streams and recordings: the same sub-steps however the poses came."""
 
+from dataclasses import fields
+
 import numpy as np
 import pytest
 
 import scenes
 from paint_deposition.errors import RecordingError
+from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -20,6 +23,24 @@ def add_rows(builder, trajectory, rows):
     builder.add_poses(*(column[rows] for column in columns))
 
 
+def streamed(trajectory, sizes, whole_strokes=False, lag_ns=100_000_000):
+    """The path of poses that come in batches of these sizes, in turns, with their triggers."""
+    builder = PathBuilder(whole_strokes=whole_strokes)
+    triggers = list(zip(trajectory.trigger_stamps_ns, trajectory.trigger_flow, strict=True))
+    pieces = []
+    start, turn = 0, 0
+    while start < len(trajectory):
+        rows = slice(start, start + sizes[turn % len(sizes)])
+        start, turn = rows.stop, turn + 1
+        add_rows(builder, trajectory, rows)
+        newest = trajectory.stamps_ns[rows][-1]
+        while triggers and triggers[0][0] <= newest:
+            builder.add_trigger(*triggers.pop(0))
+        pieces.append(builder.take(newest - lag_ns))
+    pieces.append(builder.take(finish=True))
+    return SprayPath.joined(pieces), builder.counts
+
+
 def to_and_fro(times_s=TIMES_S):
     """Two passes there and back with the gun off at the turn."""
     t = times_s[:, np.newaxis]
@@ -28,6 +49,17 @@ def to_and_fro(times_s=TIMES_S):
     return Trajectory(
         scenes.stamps_ns(times_s), positions, np.tile(scenes.LOOKING_DOWN, (len(t), 1)), **TRIGGER
     )
+
+
+@pytest.mark.parametrize('sizes', [[1], [7], [60, 2, 33], [1, 1, 50]])
+@pytest.mark.parametrize('whole_strokes', [False, True])
+def test_batches_do_not_matter_to_the_last_bit(sizes, whole_strokes):
+    trajectory = to_and_fro(TIMES_S[(TIMES_S < 1.0) | (TIMES_S > 1.4)])
+    expected, counts = spray_path(trajectory, whole_strokes=whole_strokes)
+    path, streamed_counts = streamed(trajectory, sizes, whole_strokes)
+    for column in fields(SprayPath):
+        assert np.array_equal(getattr(path, column.name), getattr(expected, column.name))
+    assert streamed_counts == counts
 
 
 def test_the_trigger_cuts_within_a_segment():
@@ -60,6 +92,23 @@ def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
     for name in ('stamp_ns', 'dwell_s', 'flow', 'position_m'):
         column = getattr(single, name)
         assert np.array_equal(getattr(path, name), np.concatenate([column, column]))
+
+
+def test_a_live_stream_that_begins_again_follows_its_new_triggers():
+    once = to_and_fro()
+    builder = PathBuilder()
+    pieces = []
+    for _ in range(2):
+        for stamp, flow in zip(TRIGGER['trigger_stamps_ns'], TRIGGER['trigger_flow'], strict=True):
+            builder.add_trigger(stamp, flow)
+        for row in range(0, len(once), 10):
+            add_rows(builder, once, slice(row, row + 10))
+            if row:  # the first poses of a stream that begins again are only waiting yet
+                pieces.append(builder.take())
+    pieces.append(builder.take(finish=True))
+    sprayed = SprayPath.joined(pieces).spraying_time_s
+    assert sprayed == pytest.approx(2.0 * spray_path(once)[0].spraying_time_s, rel=1e-12)
+    assert builder.counts.restarts == 1
 
 
 def test_a_late_trigger_is_counted_and_holds_from_there_on():

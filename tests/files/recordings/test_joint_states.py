@@ -52,6 +52,16 @@ def test_any_joints_agree_with_the_product_of_exponentials(arm):
     assert apart.max() < 1e-8
 
 
+def test_joint_states_become_poses(arm, tmp_path):
+    bag = joint_bag(tmp_path / 'run.bag', rows_of(), 'ros1')
+    read = read_recording(bag, urdf=str(arm), frame_id='base_link')
+    assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
+    assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
+    assert read.frame_id == 'base_link'
+    (note,) = read.notes
+    assert "pose of 'tool0' in 'base_link' by arm.urdf" in note
+
+
 def test_joints_in_any_order_and_in_messages_of_their_own(arm, tmp_path):
     """The pan comes at half the rate from another controller; a gripper's joint is left out."""
     joints, rows = sweep(), []

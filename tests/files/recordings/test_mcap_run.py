@@ -1,5 +1,7 @@
 """The layout of a run on disk, and what a killed process or a full disk leaves of it."""
 
+import os
+import signal
 import subprocess
 import sys
 
@@ -79,6 +81,45 @@ def test_records_in_the_file(run):
         assert [(time, data) for _, time, data in reader.messages()] == [
             (2_000, TRUE_CDR), (5_000, FALSE_CDR)
         ]  # fmt: skip
+
+
+WRITE_UNTIL_KILLED = """
+import sys, time
+from pathlib import Path
+from paint_deposition.files.recordings.mcap_run import RunWriter
+sys.path.insert(0, sys.argv[2])
+from files.recordings.test_mcap_run import TRUE_CDR, gun_topic
+
+writer = RunWriter(sys.argv[1])
+writer.add_topic(gun_topic())
+start_s = time.monotonic()
+number = 0
+while True:
+    number += 1
+    written_ns = time.monotonic_ns()
+    writer.write('/gun', TRUE_CDR, number, written_ns)
+    print(written_ns, flush=True)
+    while time.monotonic() < start_s + number / 250:
+        time.sleep(0.0005)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_process_loses_less_than_a_second(tmp_path, repository):
+    run, tests = tmp_path / 'run', repository / 'tests'
+    process = subprocess.Popen(
+        [sys.executable, '-c', WRITE_UNTIL_KILLED, run, tests], stdout=subprocess.PIPE
+    )
+    written_ns = [int(process.stdout.readline()) for _ in range(400)]
+    os.kill(process.pid, signal.SIGKILL)
+    written_ns += map(int, process.stdout.read().split())
+    process.wait()
+    recovery = recover(run, tmp_path / 'recovered')
+    lost_ns = written_ns[recovery.message_count :]
+    # By the writer's own clock: a busy machine may keep it waiting between two messages.
+    assert not lost_ns or lost_ns[-1] - lost_ns[0] < 1_000_000_000
+    with Reader(tmp_path / 'recovered') as reader:
+        assert [t for _, t, _ in reader.messages()] == list(range(1, recovery.message_count + 1))
 
 
 WRITE_UNTIL_REFUSED = """
