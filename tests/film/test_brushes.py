@@ -9,15 +9,17 @@ from brushes import NARROW, WIDE, switched, two_brushes
 from paint_deposition.api.simulation import require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
+from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
-from scenes import lying_plane, painted, stamps_ns, straight_pass, weaving
+from scenes import events, lying_plane, painted, stamps_ns, straight_pass, weaving
 
 MODEL = two_brushes()
 TIMES_S = np.arange(0.0, 4.0, 0.004)
@@ -67,6 +69,20 @@ def test_one_brush_is_its_pattern_to_the_last_bit(number):
     assert np.array_equal(painted(lying_plane(), motion, DepositionModel()).film_um, plain.film_um)
 
 
+@pytest.mark.parametrize(
+    ('batch', 'effect'), [(3, None), (10, TriggerLag(rise_s=0.05, fall_s=0.08))]
+)
+def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
+    model = MODEL.with_effect(effect) if effect else MODEL
+    motion = replace(weaving(TIMES_S), **CHANGES)
+    film, expected = LiveFilm(lying_plane(), model), painted(lying_plane(), motion, model)
+    for event in events(motion, batch):
+        film.replay([event])
+    assert np.array_equal(film.snapshot().film_um, expected.film_um)
+    assert film.snapshot().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
+    assert (film.flow, film.brush) == (1.2, 1)
+
+
 @pytest.mark.parametrize('lag_s', [0.03, -0.03])
 def test_a_lag_takes_the_brush_along(lag_s):
     motion = replace(
@@ -77,6 +93,15 @@ def test_a_lag_takes_the_brush_along(lag_s):
     path, _ = spray_path(motion, 0.25, model.max_step_m, model.needs_whole_strokes)
     sprayed, _ = FilmIntegrator(lying_plane(), model).sprayed(path)
     assert seconds_by_pattern(model, sprayed) == pytest.approx([0.5, 1.0], rel=1e-9)
+
+
+def test_terms_are_kept_apart_by_brush():
+    path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
+    film = FilmIntegrator(lying_plane(), MODEL, 'double')
+    terms = film.terms(film.steps(path))
+    weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
+    film.add(path)
+    assert np.abs(weights @ terms - film.film_um).max() < 1e-9 * film.film_um.max()
 
 
 def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
@@ -94,9 +119,19 @@ def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
     assert [event.brush for event in film.log.events()] == [2, 3]
 
 
+def test_one_pattern_does_not_stand_for_several_brushes():
+    motion = replace(weaving(TIMES_S), **CHANGES, source='run')
+    with pytest.raises(ModelError, match='brushes 1, 2 are used and the model has the pattern of'):
+        require_brushes(motion, DepositionModel())
+    film = LiveFilm(lying_plane(), DepositionModel())
+    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 1))
+    with pytest.raises(ModelError, match='brushes 1, 2 are used'):
+        film.add_trigger(TriggerChange(int(stamps_ns(0.2)), 1.0, 2))
+
+
 def test_brushes_are_in_the_order_of_their_numbers_each_once():
     one, two = MODEL.brushes
     assert DepositionModel(brushes=(two, one)) == MODEL
     assert MODEL.planar == NARROW
-    with pytest.raises(ValueError, match='there twice'):
+    with pytest.raises(ValueError, match='the same number'):
         DepositionModel(brushes=(one, one))

@@ -45,7 +45,7 @@ class DepositionModel(BaseModel):
         brushes = [Brush.model_validate(brush) for brush in values['brushes']]
         by_number = {brush.number: brush for brush in brushes}
         if len(by_number) < len(brushes):
-            raise ValueError('two brushes have one number; keep one')
+            raise ValueError('two brushes have the same number; keep one')
         ordered = tuple(by_number[number] for number in sorted(by_number))
         return {**values, 'planar': ordered[0].planar, 'brushes': ordered}
 
