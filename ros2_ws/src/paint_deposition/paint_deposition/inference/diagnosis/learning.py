@@ -25,7 +25,7 @@ class Nulls:
     # For a footprint: pattern, nuisance, what the accepted laws may be off by, and what nature
     # leaves over of parts and settings.
     footprint: NullModel
-    # For a correction of an accepted law: the same with the footprint, without what that law may
+    # For a correction of an accepted law: the same with the footprint, without what the laws may
     # be off by.
     correction: NullModel
     any_form: NullModel  # for all others: all of it

@@ -133,6 +133,7 @@ class Run:
         model: DepositionModel | None = None,
         remainder: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
+        starts: int = 1,
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
@@ -142,6 +143,7 @@ class Run:
             model: to start from; default the newest.
             remainder: (P, P) covariance of what nature leaves over, if that is allowed for.
             others: models whose patterns are starts, too.
+            starts: how many, as in the first fit.
         """
         model = model or self.fit.model
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
@@ -149,14 +151,7 @@ class Run:
         nuisance = self.study.nuisance
         if free is not None:
             nuisance = np.hstack([nuisance, free])
-        return self.study.fit(
-            self._free(start), nuisance=nuisance, remainder=remainder, others=others
-        )
-
-    def fitted_from_many_starts(self, effects: Sequence[Effect]) -> Fit:
-        """The start model with these effects, its pattern searched as in the first fit."""
-        start = self.start.model_copy(update={'effects': (*self.start.effects, *effects)})
-        return self.study.fit(self._free(start), STARTS, self.seed, self.study.nuisance)
+        return self.study.fit(self._free(start), starts, self.seed, nuisance, remainder, others)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""

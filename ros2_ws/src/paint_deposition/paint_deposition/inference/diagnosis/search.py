@@ -20,7 +20,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     SURE,
     inclusion_of,
 )
-from paint_deposition.inference.diagnosis.run import Run
+from paint_deposition.inference.diagnosis.run import STARTS, Run
 from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.trial import Trial
 
@@ -128,7 +128,9 @@ class Search:
         best = max(tried, key=lambda one: one.log_weight_alone, default=nothing)
         if best.log_evidence_alone <= nothing.log_evidence_alone + MISLEADS:
             return nothing
-        others = self.run.fitted_from_many_starts([*best.effects.values()])
+        others = self.run.fitted_with(
+            [*best.effects.values()], model=self.run.start, starts=STARTS
+        )
         anew = [Trial.around(self.run, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence_alone)
         self._trials, self._tried = {best.names: best}, set()
@@ -152,9 +154,12 @@ class Search:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
         for name in trial.proposed:
             self.with_effect(trial, name)
-        larger = [t for t in self._trials.values() if len(t.names - trial.names) == 1]
-        larger = [t for t in larger if t.names > trial.names]
-        weights = {name: t.log_weight for t in larger for name in t.names - trial.names}
+        weights = {
+            name: larger.log_weight
+            for names, larger in self._trials.items()
+            if names > trial.names and len(names) == len(trial.names) + 1
+            for name in names - trial.names
+        }
         shares = softmax(np.array([trial.log_weight, *weights.values()]) / COARSENED)[1:]
         found = dict(zip(weights, (1.0 - PRIOR_UNKNOWN) * shares, strict=True))
         return dict(sorted(found.items(), key=lambda item: -item[1]))

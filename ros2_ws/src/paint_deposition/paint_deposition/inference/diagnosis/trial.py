@@ -36,7 +36,7 @@ class Trial:
     run: Run
     names: frozenset[str]  # of the effects
     fit: Fit  # of the model with them, what nature leaves over being allowed for
-    usual: Remainder  # what nature leaves over beside the model that the run began with
+    usual: Remainder  # what nature leaves over, around the one fit that all compared sets share
     sizes: Sequence[Sizes]  # of the remainder that matter
 
     @staticmethod
