@@ -126,7 +126,10 @@ def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     """Draw triangles (F, 3, 2) with colours (F, 3, 4) from 0 to 1 at their corners, in order."""
     x, y = corners_m.reshape(-1, 2).T
     triangles = Triangulation(x, y, np.arange(len(x)).reshape(-1, 3))
-    axes.add_collection(TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True))
+    # Corners of pictures are set by ``dress``: to look for them takes longer than to draw.
+    axes.add_collection(
+        TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True), autolim=False
+    )
 
 
 def _borders(faces: np.ndarray) -> np.ndarray:
