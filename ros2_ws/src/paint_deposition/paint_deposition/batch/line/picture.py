@@ -95,12 +95,4 @@ def _date_parts(axes: Axes, times_s: np.ndarray) -> None:
     if len(days) < len(times_s) // 2:
         for other in axes.figure.axes:
             gaps = other.get_xaxis_transform()
-            other.vlines(
-                days + 0.5,
-                0.0,
-                1.0,
-                BEFORE,
-                lw=0.8,
-                zorder=0,
-                transform=other.get_xaxis_transform(),
-            )
+            other.vlines(days + 0.5, 0.0, 1.0, BEFORE, lw=0.8, zorder=0, transform=gaps)
