@@ -22,6 +22,7 @@ from tests.virtual_paint_shop.shop import generate
 from tests.virtual_paint_shop.truths import choose
 
 from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.report.words import effect_name, joined
 
 SEED, HIDDEN, SCALE = 640001, 'standoff_efficiency~power+air_drift~by_height', 2.5
 PARCELS = 2_000_000
@@ -76,7 +77,9 @@ def level(folder: Path, paint: Paint, say: Callable[[str], None]) -> Path:
     again = painted('next door', better / 'trajectory')
 
     say('For the sceptic: the true films of both doors')
-    print(f'hidden          {HIDDEN.replace("+", " and ")}')
+    hidden = joined([effect_name(name.partition('~')[0]) for name in HIDDEN.split('+')])
+    print(f'hidden          {hidden}, each by another law than that of the library')
+    print(f'wanted          mean {TARGET_UM} µm')
     for name, one in (('first door', door), ('next door', again)):
         print(f'{name:<15} {_in_words(one.film_um(*judged))}')
     return better

@@ -15,13 +15,25 @@ fail() {
     exit 1
 }
 
+# still_at WORK STARTED: a line every 10 s with the time and how much is compiled, while this shell runs.
+still_at() {
+    while sleep 10 >/dev/null && kill -0 $$ 2>/dev/null; do
+        say "  $1: $((SECONDS - $2)) s" \
+            "$(sed -n '/^== /h; /^\[ *[0-9]*%\]/h; ${x; s/^\(\[.*%\]\).*/\1/p}' "$log")"
+    done
+}
+
 # logged WHAT COMMAND...: runs the command into the log; when it fails, shows the end and names the log.
 logged() {
-    local what=$1 started=$SECONDS
+    local what=$1 started=$SECONDS status=0
     shift
     say "$what ..."
     printf '\n== %s: %s\n' "$what" "$*" >>"$log"
-    if ! "$@" >>"$log" 2>&1 </dev/null; then
+    still_at "${what%%[ ,]*}" "$started" &
+    "$@" >>"$log" 2>&1 </dev/null || status=$?
+    kill %% 2>/dev/null || true
+    wait %% 2>/dev/null || true
+    if ((status)); then
         tail -n 15 "$log" >&2
         fail "'$what' failed after $((SECONDS - started)) s. The whole log: $log"
     fi

@@ -19,7 +19,7 @@ linked=$(sources_fingerprint linked)
 copied=$(sources_fingerprint copied)
 
 PAINT_UNDERLAY_ONLY=1 source "$root/setup/environment.sh"
-logged 'Building messages, nodes and command line' \
+logged 'Compiling the ROS messages in C and C++, which takes longest, and linking nodes and command line' \
     python -c 'from colcon_core.command import main; raise SystemExit(main())' \
     --log-base "$workspace/log" build \
     --base-paths "$workspace/src" --build-base "$build" --install-base "$install" \

@@ -282,7 +282,7 @@ def test_the_wheel_brings_command_and_library_without_ros(run, tmp_path):
     assert done.returncode == 0, done.stderr
     assert {'film.csv', 'film.ply', 'film.png', 'stats.json'} <= set(os.listdir(tmp_path))
     # What it does not bring is asked for in a line: an extra, and ROS for a node.
-    words = 'paint sweep needs distributed and pyarrow and ruptures, which is not installed; run:'
+    words = 'paint sweep needs distributed, pyarrow and ruptures, which are not installed; run:'
     for command, told in (
         (('paint', 'sweep', 'a', '-o', tmp_path / 'out'), f'paint: {words} pip install '),
         (('bag_player',), 'bag_player: needs rclpy; source a ROS 2 installation'),

@@ -173,6 +173,7 @@ def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
         ('--mesh-scale', '-1', ['--mesh-scale', '-1']),
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
         ('--tolerance-um', '3', ['--target-um']),
+        ('--tolerance-um', ('60', '--target-um', '45'), ['bare metal would be within it']),
         ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
         ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],

@@ -100,6 +100,10 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'top': {'models': 'm.yaml'}}, "campaign: unknown key 'models'; .* 'model'"),
         ({'top': {'experiments': []}}, r'experiments is \[\]; expected a list of at least one'),
         ({'top': {'target_um': 20}}, 'target_um and tolerance_um belong together'),
+        (
+            {'top': {'target_um': 45, 'tolerance_um': 60}},
+            'tolerance_um 60 is not less than target',
+        ),
         ({'top': {'target_um': -1, 'tolerance_um': 1}}, 'target_um is -1; expected the film want'),
     ],
 )
@@ -121,6 +125,7 @@ def test_two_experiments_need_two_names(campaign):
     ('text', 'message'),
     [
         (None, 'no such file; give a campaign YAML'),
+        (b'PK\x03\x04\x9c\xff', 'is no text, such as a workbook or a bag; give a campaign YAML'),
         ('experiments: [', 'cannot be read as YAML .*line'),
         ('experiments: []\nexperiments: []', 'line 2: found duplicate key "experiments"'),
         ('just words', "campaign is 'just words'; expected the keys experiments, model"),
@@ -129,7 +134,7 @@ def test_two_experiments_need_two_names(campaign):
 def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
     path = tmp_path / 'campaign.yaml'
     if text is not None:
-        path.write_text(text)
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
     with pytest.raises(PaintError, match=message) as refused:
         read_campaign(path)
     assert '\n' not in str(refused.value)

@@ -18,6 +18,7 @@ from paint_deposition.effects.catalogue import EFFECTS, learned_law
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
@@ -155,12 +156,16 @@ def test_nothing_is_loaded_from_anywhere(report):
 
 
 def test_every_part_and_all_profiles_are_shown_as_pictures(report, diagnosis):
+    """Each by itself and as wide as a phone, so that no lettering is larger than another."""
     pictures = [a['src'] for tag, a in page_of(report).elements if tag == 'img']
-    assert len(pictures) == len(diagnosis.study.campaign.experiments) + 1
+    profiles = profiles_of(diagnosis.study, [DepositionModel()])
+    assert len(pictures) == 3 * len(diagnosis.study.campaign.experiments) + len(profiles)
     for picture in pictures:
         content = BytesIO(b64decode(picture.removeprefix('data:image/png;base64,')))
         rgb = np.asarray(Image.open(content).convert('RGB'), dtype=int)
-        assert np.mean(np.ptp(rgb, axis=2) > 40) > 0.01
+        assert rgb.shape[1] == 570
+        assert rgb.shape[0] < 900
+        assert np.mean(np.ptp(rgb, axis=2) > 40) > 0.005
 
 
 def test_the_verdict_comes_in_words_and_figures(report, diagnosis):
@@ -291,6 +296,13 @@ VISITOR = """<script>
   root.dataset.sorted = JSON.stringify(
     [...table.tBodies[0].rows].map(row => Number(row.cells[column].dataset.sort)));
 
+  const fold = document.getElementById('model').closest('.fold');
+  fold.open = false;
+  location.hash = '#model';
+  await rest(200);
+  root.dataset.unfolded = fold.open;
+  scrollTo(0, 0);
+
   document.body.style.width = '390px';
   window.dispatchEvent(new Event('resize'));
   await rest(1500);
@@ -325,6 +337,7 @@ def test_a_browser_draws_every_chart_without_errors(report, comparisons, tmp_pat
     deviations = json.loads(root['data-sorted'])
     assert deviations == sorted(comparisons[-1].points.residual_um)
     assert root['data-wide'] == ''
+    assert root['data-unfolded'] == 'true'
     assert 'Uncaught' not in done.stderr
     assert 'Content Security Policy' not in done.stderr
     assert colourful_share(picture) > 0.02

@@ -41,6 +41,7 @@ def test_a_line_of_twelve_parts_with_a_step(tmp_path, at_worker):
     assert parts[1]['time'].timestamp() == FIRST.timestamp() + 60.0 * MINUTES
     assert parts[2]['film_mean_um'] == pytest.approx(parts[1]['film_mean_um'])
     assert change['sentence'].startswith('the film level (K1, or the gain of the gauge) fell by')
+    assert {'level'} <= {name for alarm in told['alarms'] for name in alarm['series']}
     assert (output / 'line.png').stat().st_size > 10_000
     # A new day: only the new run is computed.
     (folder / f'{names[3]}.csv').unlink()

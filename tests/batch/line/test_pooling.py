@@ -92,6 +92,18 @@ def test_one_bad_part_is_an_alarm_and_no_change():
     assert changes_of([series], FIRST_S + HOUR_S * np.arange(100)) == []
 
 
+def test_one_bad_part_does_not_make_the_others_look_too_good():
+    """It raises the noise of all parts together, which is not that of the ordinary ones."""
+    made = parts(24, seed=9)
+    bad = made[20].residual_um + 12.0 * np.random.default_rng(3).normal(size=12)
+    made[20] = replace(made[20], residual_um=bad)
+    misfit = next(one for one in series_of(made, pooled(made)) if one.name == 'misfit')
+    assert misfit.charts.alarms['shewhart'].tolist() == [20]
+    ordinary = np.delete(misfit.values, 20)
+    assert abs(np.median(ordinary)) < 0.5
+    assert ordinary.min() > -3.0
+
+
 def test_the_scales_are_those_beside_the_effects_that_were_found():
     """Of two programmes in turn the marks are opposite: unexplained, they look like noise."""
     made = parts(100, seed=8, drift=0.0, points=24)

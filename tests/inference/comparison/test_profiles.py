@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.inference.comparison.profiles import profiles_of
 from paint_deposition.inference.fitting.study import Study
 from small_campaign import small_campaign
@@ -40,6 +42,29 @@ def test_lines_pass_through_what_is_predicted_at_the_readings(study, profiles):
             here = np.searchsorted(profile.line_m, profile.position_m)
             line = profile.lines_um[k][here]
             assert line == pytest.approx(predicted[profile.rows], rel=1e-6, abs=1e-6)
+
+
+def test_lines_go_on_beyond_the_outermost_readings_and_end_with_the_part(study, profiles):
+    parts = {e.name: e.surface for e in study.campaign.experiments}
+    for profile in profiles:
+        assert profile.line_m[0] < profile.position_m[0]
+        assert profile.position_m[-1] < profile.line_m[-1]
+        heights_m = parts[profile.experiment].vertices_m[:, 2]
+        assert np.ptp(profile.line_m) < np.ptp(heights_m) + 0.01
+
+
+def test_on_a_part_that_lies_profiles_run_along_it(tmp_path):
+    """A panel on its back has no height over which its columns could be drawn."""
+    small_campaign(tmp_path, experiments=('panel',))
+    file = tmp_path / 'campaign.yaml'
+    told = yaml.safe_load(file.read_text())
+    told['experiments'][0]['down'] = [0.0, 1.0, 0.0]
+    file.write_text(yaml.safe_dump(told))
+    profiles = profiles_of(Study.of(read_campaign(file)), [DepositionModel()])
+    assert len(profiles) > 1
+    for profile in profiles:
+        assert 'height' not in profile.axis
+        assert np.all(np.diff(profile.position_m) > 0.01)
 
 
 def test_single_passes_add_up_to_the_film(profiles):

@@ -19,8 +19,9 @@ from paint_deposition.cli.progress import Progress
 @options.part_options(0.01)
 @click.option(
     '--trajectory', 'trajectories', required=True, multiple=True, type=options.FILE,
-    help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; '
-    'or a RAPID module, .mod or .prg, taken as programmed. Give one for each of several guns.',
+    help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; a '
+    'table of poses; or a RAPID module, .mod or .prg, taken as programmed. Give one for each of '
+    'several guns.',
 )  # fmt: skip
 @click.option(
     '--atomizer', 'atomizers', multiple=True, metavar='NAME',
@@ -68,6 +69,11 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
+    if wanted['target_um'] and wanted['tolerance_um'] >= wanted['target_um']:
+        raise click.UsageError(
+            f'--tolerance-um {wanted["tolerance_um"]:g} is not less than --target-um '
+            f'{wanted["target_um"]:g}: bare metal would be within it; give a smaller one'
+        )
     with Progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions

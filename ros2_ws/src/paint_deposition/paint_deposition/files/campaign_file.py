@@ -61,6 +61,11 @@ class _File(BaseModel, extra='forbid'):
     def _band(self) -> '_File':
         if (self.target_um is None) != (self.tolerance_um is None):
             raise ValueError('target_um and tolerance_um belong together; give both or none')
+        if self.target_um and self.tolerance_um and self.tolerance_um >= self.target_um:
+            raise ValueError(
+                f'tolerance_um {self.tolerance_um:g} is not less than target_um '
+                f'{self.target_um:g}: bare metal would be within it; give a smaller one'
+            )
         return self
 
 

@@ -21,8 +21,10 @@ def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> Non
     """Refuse to begin what needs libraries of the extra, naming those that are missing."""
     missing = [name for name in libraries if find_spec(name) is None]
     if missing:
+        *others, last = missing
+        named = f'{", ".join(others)} and {last}, which are' if others else f'{last}, which is'
         raise ManyError(
-            f'{what} needs {" and ".join(missing)}, which is not installed; run: pip install '
+            f'{what} needs {named} not installed; run: pip install '
             f'{" ".join(missing)}, or install paint_deposition[many]'
         )
 

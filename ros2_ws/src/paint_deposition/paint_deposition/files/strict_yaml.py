@@ -22,7 +22,11 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
         raise refusal(f'{path}: cannot be read ({error.strerror})') from None
     except RecursionError:
         raise refusal(f'{path}: its values are nested too deeply; give a {kind} YAML') from None
-    except (UnicodeDecodeError, YAMLError) as error:
+    except UnicodeDecodeError:
+        raise refusal(
+            f'{path}: is no text, such as a workbook or a bag; give a {kind} YAML in UTF-8'
+        ) from None
+    except YAMLError as error:
         raise refusal(f'{path}: cannot be read as YAML ({_problem(error)})') from None
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import LEARNED
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
@@ -68,6 +68,13 @@ def effect_name(effect_id: str) -> str:
         return f'learned law over {LEARNED[covariate].over}'
     name = effect_id.replace('tcp_', 'TCP ').replace('faraday', 'Faraday')
     return name.replace('_', ' ')
+
+
+def amplitude_name(name: str) -> str:
+    """'air_drift.shift_down_m' as 'air drift, shift down'."""
+    effect, _, parameter = name.partition('.')
+    unit = EFFECTS[effect].parameters()[parameter]['unit']
+    return f'{effect_name(effect)}, {parameter_words(parameter, unit)}'
 
 
 def competing_explanations(spray: Spray) -> str:
@@ -217,11 +224,15 @@ def capital(text: str) -> str:
     return text[:1].upper() + text[1:]
 
 
+def fixed(value: float, digits: int = 2, signed: bool = False) -> str:
+    """With so many decimals; with a sign if wanted, but none where all decimals are zeros."""
+    text = f'{value:{"+" if signed else ""}.{digits}f}'
+    return minus(text if float(text) else text.lstrip('+-'))
+
+
 def micrometres(value: float, signed: bool = False) -> str:
     """'2.31 µm'; with a sign if wanted."""
-    text = f'{value:+.2f}' if signed and abs(value) >= 0.005 else f'{value:.2f}'
-    text = '0' if float(text) == 0.0 else text
-    return f'{minus(text)} µm'
+    return f'{fixed(value, signed=signed)} µm'
 
 
 def in_unit(unit: str, *values: float) -> tuple[str, ...]:

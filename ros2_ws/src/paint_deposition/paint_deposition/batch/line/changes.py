@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 from paint_deposition.batch.line.control_charts import Charts, charts, robust_deviation
 from paint_deposition.batch.line.pooling import Measured, Pooled, amplitudes, places
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.report.words import unit_words
+from paint_deposition.report.words import amplitude_name, joined, unit_words
 
 # Fewer parts make no chart.
 FEWEST = 8
@@ -52,6 +52,12 @@ class Series:
     baseline: int  # number of first parts that give the centre
     run_length: float  # of each of its charts
 
+    @property
+    def words(self) -> str:
+        """What it is called."""
+        known = {'level': 'film level', 'misfit': 'misfit of the film'}
+        return known.get(self.name) or amplitude_name(self.name)
+
     @cached_property
     def centre(self) -> float:
         """Mean over the baseline, each part by its weight."""
@@ -77,12 +83,15 @@ class Series:
 
 def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
     """The level, the misfit, then every amplitude that one part determines; oldest part first."""
-    noise = pooled.posterior.scales.noise
     rows = [
-        _part_estimates(part, part.residual_um - pooled.shared_um(part, place_of), noise)
+        _part_estimates(part, part.residual_um - pooled.shared_um(part, place_of))
         for part, place_of in zip(parts, places(parts)[1], strict=True)
     ]
-    level, level_sd, misfit, amounts, amounts_sd = map(np.array, zip(*rows, strict=True))
+    level, level_sd, square, freedom, amounts, amounts_sd = map(np.array, zip(*rows, strict=True))
+    # The noise of the parts in the middle: one bad part would make all others look too good.
+    noise = np.sqrt(np.median(square / chi2.median(freedom)))
+    level_sd, amounts_sd = noise * level_sd, noise * amounts_sd
+    misfit = _quantile(square / noise**2, freedom)
     names = amplitudes()
     # An accepted effect is charted as a whole.
     amounts[:, list(pooled.chosen)] += pooled.amplitude_means
@@ -110,27 +119,28 @@ def series_of(parts: Sequence[Measured], pooled: Pooled) -> list[Series]:
     return found
 
 
-def _part_estimates(part: Measured, left_um: np.ndarray, noise: float) -> tuple:
-    """Level and its deviation; misfit; amplitudes and theirs, the level fitted with each."""
-    sigma = noise * part.sigma_um
-    film, left = part.predicted_um / sigma, left_um / sigma
-    marks = part.by_effect / sigma[:, np.newaxis]
+def _part_estimates(part: Measured, left_um: np.ndarray) -> tuple:
+    """Level and its deviation; chi-square of the rest and its freedom; amplitudes and theirs.
+
+    The level is fitted with each amplitude; all deviations are with the stated noise.
+    """
+    film, left = part.predicted_um / part.sigma_um, left_um / part.sigma_um
+    marks = part.by_effect / part.sigma_um[:, np.newaxis]
     square = film @ film
     level = film @ left / square
     rest = left - level * film
-    freedom = max(len(part) - 1, 1)
-    # The smaller tail is taken, so that neither end is rounded to 0.
-    above, below = chi2.logsf(rest @ rest, freedom), chi2.logcdf(rest @ rest, freedom)
-    misfit = _quantile(above, below)
     own = marks - np.outer(film, film @ marks / square)
     squares = np.einsum('pa,pa->a', own, own)
     with np.errstate(divide='ignore', invalid='ignore'):
-        return level, square**-0.5, misfit, own.T @ rest / squares, squares**-0.5
+        amounts = own.T @ rest / squares, squares**-0.5
+    return level, square**-0.5, rest @ rest, max(len(part) - 1, 1), *amounts
 
 
-def _quantile(log_above: float, log_below: float) -> float:
-    value = norm.isf(np.exp(log_above)) if log_above < log_below else norm.ppf(np.exp(log_below))
-    return float(np.clip(value, -MOST_SIGMAS, MOST_SIGMAS))
+def _quantile(square: np.ndarray, freedom: np.ndarray) -> np.ndarray:
+    """(n,) standard normal quantiles of chi-squares; of the smaller tail, so that none is 0."""
+    above, below = chi2.logsf(square, freedom), chi2.logcdf(square, freedom)
+    value = np.where(above < below, norm.isf(np.exp(above)), norm.ppf(np.exp(below)))
+    return np.clip(value, -MOST_SIGMAS, MOST_SIGMAS)
 
 
 def _grouped(known: Sequence[int], standard: np.ndarray, first: Sequence[int]) -> list[list[int]]:
@@ -177,18 +187,19 @@ class Change:
         elif self.series == 'misfit':
             what = 'the misfit of the film'
         else:
-            others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
-            what = f'{self.series}{others}'
+            names = list(map(amplitude_name, self.members))
+            what = names[0] + (f' (or {joined(names[1:], "or")})' if names[1:] else '')
         way = 'rose' if self.after > self.before else 'fell'
         moved = abs(self.after - self.before)
         size = f'{moved:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
-        ends = date(self.earliest_s), date(self.latest_s)
-        within = f' (between {ends[0]} and {ends[1]})' if ends[0] != ends[1] else ''
+        first, last, likely = map(date, (self.earliest_s, self.latest_s, self.time_s))
+        when = f'with the part of {likely}'
+        if first != last:
+            when = f'between {first} and {last}, most likely {when}'
         charts = 'another chart' if len(self.also) == 1 else f'{len(self.also)} other charts'
         others = f'; {charts} changed with it' if self.also else ''
-        if self.kind == 'drift':
-            return f'{what} {way} since {date(self.time_s)} by {size} in all{within}{others}'
-        return f'{what} {way} by {size} on {date(self.time_s)}{within}{others}'
+        began = ' in all, beginning' if self.kind == 'drift' else ''
+        return f'{what} {way} by {size}{began} {when}{others}'
 
     def to_dict(self) -> dict[str, Any]:
         """All figures by name, with dates."""

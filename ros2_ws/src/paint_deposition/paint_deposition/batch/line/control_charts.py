@@ -32,6 +32,13 @@ class Charts:
     ewma_limit: np.ndarray
 
     @property
+    def in_alarm(self) -> np.ndarray:
+        """(n,) whether a part is beyond the limits of either chart."""
+        beyond = np.zeros(len(self.values), dtype=bool)
+        beyond[np.concatenate(list(self.alarms.values()))] = True
+        return beyond
+
+    @property
     def alarms(self) -> dict[str, np.ndarray]:
         """Rows beyond the limits, by chart."""
         return {
@@ -41,11 +48,16 @@ class Charts:
 
 
 def charts(values: np.ndarray, run_length: float) -> Charts:
-    """Draw up the charts of values in standard deviations; each has this run length."""
-    ewma = lfilter([WEIGHT], [1.0, WEIGHT - 1.0], values)
+    """Draw up the charts of values in standard deviations; each has this run length.
+
+    A value beyond Shewhart's limits counts in the EWMA as one at the limit: a single bad part does
+    not put the parts after it in alarm.
+    """
+    limit = shewhart_limit(run_length)
+    ewma = lfilter([WEIGHT], [1.0, WEIGHT - 1.0], np.clip(values, -limit, limit))
     parts = np.arange(1, len(values) + 1)
     spread = np.sqrt(WEIGHT / (2.0 - WEIGHT) * (1.0 - (1.0 - WEIGHT) ** (2.0 * parts)))
-    return Charts(values, ewma, shewhart_limit(run_length), ewma_limit(run_length) * spread)
+    return Charts(values, ewma, limit, ewma_limit(run_length) * spread)
 
 
 def robust_deviation(values: np.ndarray) -> float:

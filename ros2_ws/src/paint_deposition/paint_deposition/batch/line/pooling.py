@@ -27,7 +27,7 @@ from scipy.special import logsumexp
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.report.words import unit_words
+from paint_deposition.report.words import effect_name, joined, parameter_words, unit_words
 
 # Readings within a cell of this size are at one place of the part.
 PLACE_SIZE_M = 0.05
@@ -266,10 +266,11 @@ class Cause:
     @property
     def sentence(self) -> str:
         """The cause in a line."""
-        others = f' (or {", ".join(self.members[1:])})' if len(self.members) > 1 else ''
+        names = list(map(effect_name, self.members))
+        others = f' (or {joined(names[1:], "or")})' if names[1:] else ''
         size = f'{self.value:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
         return (
-            f'{self.effect}{others}: {self.parameter} {size}; '
+            f'{names[0]}{others}: {parameter_words(self.parameter, self.unit)} {size}; '
             f'{self.all_parts:.1f} standard deviations over all parts'
         )
 

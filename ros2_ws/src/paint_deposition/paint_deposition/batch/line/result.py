@@ -9,13 +9,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
+from paint_deposition.batch.line.alarms import Alarm, alarms_of
 from paint_deposition.batch.line.changes import (
     FEWEST,
     RUN_LENGTH,
-    SECONDS_A_DAY,
     Change,
     Series,
     changes_of,
@@ -23,15 +21,14 @@ from paint_deposition.batch.line.changes import (
     series_of,
 )
 from paint_deposition.batch.line.part import FIGURES
+from paint_deposition.batch.line.picture import line_figure
 from paint_deposition.batch.line.pooling import Measured, Pooled, measured_parts, pooled
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.report.pictures.chart import legend, new_figure, quiet, save_picture
-from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK
-from paint_deposition.report.words import unit_words
+from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.writers.write import written
 
 if TYPE_CHECKING:
@@ -39,7 +36,8 @@ if TYPE_CHECKING:
 
 # For pooling only.
 DERIVATIVES = ('by_pattern', 'by_effect')
-MOST_SHOWN = 6
+# So many of the newest alarms are printed.
+MOST_ALARMS = 5
 
 
 @dataclass(frozen=True)
@@ -84,6 +82,11 @@ class Line:
         return changes_of(self.series, self.times_s) if self.series else []
 
     @cached_property
+    def alarms(self) -> list[Alarm]:
+        """Oldest first."""
+        return alarms_of(self.series, [part.name for part in self.parts])
+
+    @cached_property
     def runs(self) -> list[dict[str, Any]]:
         """The first row of each part without its point, oldest first."""
         wanted = ('part', 'time_s', 'remark', *(f'film_{name}' for name in FIGURES))
@@ -113,12 +116,21 @@ class Line:
         if self.runs:
             text += f' from {date(self.runs[0]["time_s"])} to {date(self.runs[-1]["time_s"])}'
         text += f', {count} of them measured at {readings} points'
-        return f'{text}; {len(self.errors)} runs could not be used' if self.errors else text
+        text += f'; {len(self.errors)} runs could not be used' if self.errors else ''
+        alarmed = [name for alarm in self.alarms for name in alarm.parts]
+        if len(alarmed) == 1:
+            text += f'; {alarmed[0]} is in alarm'
+        elif alarmed:
+            text += f'; {len(alarmed)} parts are in alarm, the newest {alarmed[-1]}'
+        return text
 
     @property
     def lines(self) -> Iterator[str]:
         """The result in lines."""
         yield self.sentence
+        if len(self.alarms) > MOST_ALARMS:
+            yield f'alarms: {len(self.alarms)}, all in line.json; the newest:'
+        yield from (f'alarm: {alarm.sentence}' for alarm in self.alarms[-MOST_ALARMS:])
         if self.pooled is None:
             yield 'nothing is pooled: fewer than two parts were measured'
             return
@@ -155,6 +167,7 @@ class Line:
                 'causes': [cause.to_dict() for cause in found.causes] if found else [],
             },
             'charts': [self._chart(one) for one in self.series],
+            'alarms': [alarm.to_dict() for alarm in self.alarms],
             'false_alarms': {'one_in_parts': RUN_LENGTH},
             'changes': [change.to_dict() for change in self.changes],
             'errors': [{'run': name, 'error': error} for name, error in self.errors],
@@ -191,7 +204,10 @@ def _write(line: Line, folder: Path, pictures: str = 'png') -> list[Path]:
     ]
     write_json(files[-1], line.to_dict())
     if line.series:
-        files.append(_write_picture(folder / f'line.{pictures}', line))
+        causes = line.pooled.causes if line.pooled else ()
+        news = {f'{cause.effect}.{cause.parameter}' for cause in causes}
+        figure = line_figure(line.sentence, line.series, line.changes, line.times_s, news)
+        files.append(save_picture(figure, folder / f'line.{pictures}'))
     return files
 
 
@@ -215,44 +231,3 @@ def _with_time(table: pa.Table) -> pa.Table:
 
     microseconds = [None if s is None else round(1e6 * s) for s in table['time_s'].to_pylist()]
     return table.append_column('time', pa.array(microseconds, pa.timestamp('us', 'UTC')))
-
-
-def _write_picture(path: Path, line: Line) -> Path:
-    """Draw the charts of values, beside each its EWMA; line has at least one series."""
-    causes = line.pooled.causes if line.pooled else ()
-    names = {f'{cause.effect}.{cause.parameter}' for cause in causes}
-    names |= {'level', 'misfit'} | {change.series for change in line.changes}
-    shown = [one for one in line.series if one.name in names][:MOST_SHOWN]
-    figure = new_figure(13.0, 2.4 * len(shown) + 0.4)
-    rows = figure.subplots(len(shown), 2, squeeze=False, sharex=True, width_ratios=(2, 1))
-    for (axes, beside), series in zip(rows, shown, strict=True):
-        unit = unit_words(series.unit)
-        quiet(axes, '', series.name.replace('.', '\n') + (f' [{unit}]' if unit else ''), size=9.0)
-        _draw_series(axes, line, series)
-        quiet(beside, '', 'EWMA [σ]', size=9.0)
-        times, charts = line.times_s / SECONDS_A_DAY, series.charts
-        beside.plot(times, charts.ewma, color=ACCENT, linewidth=1.2)
-        for side in (-1.0, 1.0):
-            beside.plot(times, side * charts.ewma_limit, color=BEFORE, linestyle=':')
-    legend(rows[0, 0], loc='upper left', bbox_to_anchor=(0.0, 1.16), ncols=4)
-    figure.suptitle(line.sentence, x=0.01, ha='left', fontsize=10, color=INK)
-    return save_picture(figure, path)
-
-
-def _draw_series(axes: Axes, line: Line, series: Series) -> None:
-    times = line.times_s / SECONDS_A_DAY  # as matplotlib counts dates
-    axes.xaxis.set_major_locator(dates := AutoDateLocator())
-    axes.xaxis.set_major_formatter(ConciseDateFormatter(dates, show_offset=False))
-    limit = series.charts.shewhart_limit * series.deviation
-    axes.fill_between(
-        times, series.centre - limit, series.centre + limit, color=BEFORE, alpha=0.2, linewidth=0,
-        label="Shewhart's limits",
-    )  # fmt: skip
-    axes.axhline(series.centre, color=BEFORE, linewidth=1.0, label='centre')
-    axes.plot(times, series.values, '.', color=ACCENT, markersize=4, label='part', zorder=3)
-    for change in (one for one in line.changes if one.series == series.name):
-        begin = change.time_s / SECONDS_A_DAY
-        first = change.before if change.kind == 'drift' else change.after
-        axes.plot([begin, times[-1]], [first, change.after], color=COMPONENTS[0], linewidth=2.0,
-                  label='change')  # fmt: skip
-        axes.axvline(begin, color=COMPONENTS[0], linewidth=1.0, linestyle=':')

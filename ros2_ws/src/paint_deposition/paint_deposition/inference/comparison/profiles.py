@@ -15,10 +15,14 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import STENCIL_M, Experiment
 from paint_deposition.inference.readings.placement import FEWEST_ON_A_LINE, passes_are_level
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.orientation import across_axis
+from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
+from paint_deposition.part.surface import Surface
 
 # Model lines are drawn through points this close along the surface [m].
 LINE_STEP_M = 0.01
+# Beyond the first and last reading lines go on for as far as readings are apart, but not off the
+# surface by more [m].
+OFF_SURFACE_M = 0.003
 # Readings without rows or columns are shown in strips of the part, about this many to a strip.
 READINGS_A_STRIP = 20
 MOST_STRIPS = 6
@@ -57,16 +61,42 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     return found
 
 
-def _axes(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
-    """(P,) height over the part's lowest point and distance to the right of its centre [m]."""
-    surface, positions = experiment.surface, experiment.measured_points.positions_m
-    height = -positions @ surface.down - (-surface.vertices_m @ surface.down).min()
-    return height, (positions - surface.centre_m) @ across_axis(surface.outward, surface.down)
+@dataclass(frozen=True)
+class Axis:
+    """A direction in which the readings of a line follow each other."""
+
+    words: str
+    direction: np.ndarray  # (3,) unit vector
+    origin_m: float  # what counts as 0 along it [m]
+
+    def of(self, positions_m: np.ndarray) -> np.ndarray:
+        """(n,) coordinates of positions (n, 3) along it [m]."""
+        return positions_m @ self.direction - self.origin_m
+
+
+def _axes(surface: Surface) -> tuple[Axis, Axis]:
+    """Up the part and across it; a part that lies has no height, but a far end."""
+    right = across_axis(surface.outward, surface.down)
+    across = Axis('across, to the right from the gun', right, float(surface.centre_m @ right))
+    words, up = 'height above the lowest point', -surface.down
+    if abs(surface.outward @ surface.down) > STANDING_COSINE:
+        words, up = (
+            'along the part, from its near end',
+            -downhill_axis(surface.outward, surface.down),
+        )
+    return Axis(words, up, float((surface.vertices_m @ up).min())), across
+
+
+def _coordinates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
+    """(P,) of the points up the part and across it [m]."""
+    up, across = _axes(experiment.surface)
+    positions_m = experiment.measured_points.positions_m
+    return up.of(positions_m), across.of(positions_m)
 
 
 def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
     """Label and members of each group, and whether it is longer upright than across."""
-    height_m, across_m = _axes(experiment)
+    height_m, across_m = _coordinates(experiment)
     for label in sorted({str(g) for g in experiment.groups if g}, key=_natural):
         members = np.flatnonzero(experiment.groups == label)
         yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False
@@ -81,7 +111,7 @@ def _natural(label: str) -> tuple:
 def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
     """Strips that cross the passes, each with about as many readings."""
     upright = passes_are_level(experiment.path, experiment.surface.down)
-    height_m, across_m = _axes(experiment)
+    height_m, across_m = _coordinates(experiment)
     aside, what = (across_m, 'across') if upright else (height_m, 'height')
     count = int(np.clip(round(len(aside) / READINGS_A_STRIP), 1, MOST_STRIPS))
     for part in np.array_split(np.argsort(aside, kind='stable'), count):
@@ -95,31 +125,41 @@ def _profile(
     upright: bool, is_strip: bool,
 ) -> Profile:  # fmt: skip
     """Of some of an experiment's points, in order upright or across."""
-    surface, along = experiment.surface, _axes(experiment)[0 if upright else 1][members]
+    up, across = _axes(experiment.surface)
+    axis, other = (up, across) if upright else (across, up)
+    along = axis.of(experiment.measured_points.positions_m[members])
     order = np.argsort(along, kind='stable')
     members, position = members[order], along[order]
-    axis = 'height above the lowest point' if upright else 'across, to the right from the gun'
     film = np.empty(0), np.empty((len(models), 0)), np.empty((0, 0))
     if len(members) >= FEWEST_ON_A_LINE:
         measured = experiment.measured_points.select(members)
         places = measured.positions_m
         if is_strip:
-            aside = across_axis(surface.outward, surface.down) if upright else -surface.down
-            away = places @ aside
-            places = places - np.outer(away - np.median(away), aside)
-        film = _film_along(experiment, models, position, np.hstack([places, measured.normals]))
-    return Profile(experiment.name, label, axis, members, position, *film)
+            away = other.of(places)
+            places = places - np.outer(away - np.median(away), other.direction)
+        film = _film_along(experiment, models, axis, position, places, measured.normals)
+    return Profile(experiment.name, label, axis.words, members, position, *film)
 
 
 def _film_along(
-    experiment: Experiment, models: Sequence[DepositionModel], position_m: np.ndarray,
-    places: np.ndarray,
+    experiment: Experiment, models: Sequence[DepositionModel], axis: Axis, position_m: np.ndarray,
+    places: np.ndarray, normals: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
-    """Positions, films of the models and of each pass alone, through places and normals (n, 6)."""
+    """Positions, films of the models and of each pass alone, through places and normals (n, 3)."""
     low, high = position_m[[0, -1]]
-    steps = max(2, int(np.ceil((high - low) / LINE_STEP_M)) + 1)
-    at = np.unique(np.concatenate([np.linspace(low, high, steps), position_m]))
-    line = np.column_stack([np.interp(at, position_m, column) for column in places.T])
+    beyond = (high - low) / (len(position_m) - 1)
+    steps = max(2, int(np.ceil((high - low + 2.0 * beyond) / LINE_STEP_M)) + 1)
+    at = np.unique(np.concatenate([np.linspace(low - beyond, high + beyond, steps), position_m]))
+    line = np.column_stack([
+        np.interp(at, position_m, column) for column in np.hstack([places, normals]).T
+    ])  # fmt: skip
+    for end, outside in ((0, at < low), (-1, at > high)):
+        way = axis.direction - (axis.direction @ normals[end]) * normals[end]
+        way /= way @ axis.direction
+        line[outside, :3] += np.outer(at[outside] - position_m[end], way)
+    off_m = experiment.surface.locate(line[:, :3], line[:, 3:]).distance_m
+    on = ((low <= at) & (at <= high)) | (off_m < OFF_SURFACE_M)
+    at, line = at[on], line[on]
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)
 

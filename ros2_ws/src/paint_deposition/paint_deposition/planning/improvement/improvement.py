@@ -211,8 +211,8 @@ class Improvement:
             found.append(
                 f'the film of the robot program differs from that of the bag by '
                 f'{100 * self.program_difference:.2f} % of the peak: its moves are too long for '
-                'the changes of speed; allow shorter ones (move_min_m, settings_per_s) or more '
-                'smoothness'
+                'the changes of speed; allow shorter moves (--move-min, --settings-per-s) or give '
+                'more --smoothness'
             )
         return tuple(found)
 

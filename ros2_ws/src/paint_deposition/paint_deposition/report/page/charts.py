@@ -8,7 +8,7 @@ import numpy as np
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page import layout
 from paint_deposition.report.style import ACCENT, BEFORE, MUTED, TWO_SIDED_95
-from paint_deposition.report.words import covariate_label, minus, p_words
+from paint_deposition.report.words import covariate_label, fixed, p_words
 
 MOST_COVARIATES = 8
 BINS = 6
@@ -83,11 +83,11 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
             xaxis=layout.axis(covariate_label(name), nticks=5),
             yaxis=layout.zero_axis('residual [µm]', range=[-reach, reach]),
         )
-        text = f'ρ {dependence.correlation:+.2f}'
+        text = f'ρ {fixed(dependence.correlation, signed=True)}'
         if data.improved and name in later:
-            text += f' → {later[name]:+.2f}'
+            text += f' → {fixed(later[name], signed=True)}'
         text += f', {p_words(dependence.p_value)}'
-        charts.append(layout.chart(minus(text), traces, arranged, 220))
+        charts.append(layout.chart(text, traces, arranged, 220))
     return layout.figure('covariates', charts, _legend(data))
 
 

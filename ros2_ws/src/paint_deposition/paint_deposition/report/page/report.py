@@ -29,7 +29,11 @@ from paint_deposition.report.page.learned import (
 )
 from paint_deposition.report.page.tables import film_rows, point_rows, shares_in_words
 from paint_deposition.report.pictures.chart import DOTS_PER_INCH
-from paint_deposition.report.pictures.comparison import comparison_figure, part_figure
+from paint_deposition.report.pictures.comparison import (
+    part_figures,
+    profile_figures,
+    profile_legend,
+)
 
 TEMPLATES = Path(__file__).parent / 'templates'
 SPRAYS_SHOWN = 5
@@ -51,16 +55,16 @@ def report_html(data: ReportData) -> str:
         trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     filters: dict[str, Callable[..., str]] = {
-        'um': lambda value: words.minus(f'{value:.2f}'),
-        'signed': lambda value: words.micrometres(value, signed=True).removesuffix(' µm'),
-        'whole': lambda value: words.minus(f'{value:.0f}'),
+        'um': words.fixed,
+        'signed': lambda value: words.fixed(value, signed=True),
+        'whole': lambda value: words.fixed(value, 0),
         'p': words.p_words,
         'percent': percent,
         'probability': words.probability_words,
         'in_print': words.in_print,
         'effect': words.effect_name,
         'capital': words.capital,
-        'film': lambda value: '' if np.isnan(value) else words.minus(f'{value:.1f}'),
+        'film': lambda value: '' if np.isnan(value) else words.fixed(value, 1),
         'step': words.step_words,
         'shares': shares_in_words,
     }
@@ -102,8 +106,9 @@ def report_html(data: ReportData) -> str:
         lined=all(len(p.line_m) for p in data.profiles),
         figures=[figure['name'] for figure in figures],
         content=_as_json(figures),
-        parts=[_embedded(part_figure(data, k)) for k in range(len(data.experiments))],
-        profiles=_embedded(comparison_figure(data)),
+        parts=[list(map(_embedded, part_figures(data, k))) for k in range(len(data.experiments))],
+        profiles=list(map(_embedded, profile_figures(data))),
+        profile_legend=profile_legend(data),
         style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),

@@ -16,56 +16,68 @@ from paint_deposition.report.pictures.chart import MM, colour_bar, new_figure, q
 from paint_deposition.report.pictures.part import HALO, PartPicture, draw_tool_path
 from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
-TEXT_PT = 8.0
+# Pictures of the page are as wide as a phone or half a sheet of paper [in], so that their
+# lettering is that of the page.
+PAGE_IN, TEXT_PT = 3.8, 8.0
 # As many letters of a title fit over a chart; one that is longer is written smaller.
 TITLE_LETTERS = 48
 # A profile's charts, and the room around all of them and between [in].
 CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
 LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
-# A part is drawn into so much room [in]; few readings beyond the end of the colours do not take
+# A part is drawn no higher than this [in]; few readings beyond the end of the colours do not take
 # the contrast from all others.
-PART_IN, SHOWN_SHARE = 4.6, 0.98
+HIGHEST_IN, SHOWN_SHARE = 4.2, 0.98
+# Room above and below the charts of a picture of the page [in].
+AROUND_IN = 1.3
 
 
-def part_figure(data: ReportData, index: int) -> Figure:
-    """A part with the residuals of each model, and with the film that the last one predicts.
+def part_figures(data: ReportData, index: int) -> list[Figure]:
+    """A part with the residuals of each model, and one with the film that the last one predicts.
 
-    Readings are dots; the film has the numbered places to measure next.
+    Readings are dots; the film has the passes and the numbered places to measure next.
     """
     experiment, rows = data.experiments[index], data.rows_of(index)
     surface, count = experiment.surface, len(experiment)
     points = experiment.points
     positions, normals = points.positions_m[:count], points.normals[:count]
     part = PartPicture.of(surface)
-    low, high = part.window(experiment.path)
-    width, height = PART_IN * (high - low) / (high - low).max()
-    names = [f'residual, {name}' for name in data.model_names]
-    figure = new_figure((len(names) + 1) * max(width + 0.7, 2.6), height + 1.9)
-    *residuals, film = figure.subplots(1, len(names) + 1, sharex=True, sharey=True)
+    room = 0.03 * (part.high_m - part.low_m).max()
     largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), SHOWN_SHARE))
     scale = residual_scale(np.array([largest]))
     places = part.view.flat(positions)
-    for axes, name, residual_um in zip(residuals, names, data.residuals_um, strict=True):
+    figures = []
+    for name, residual_um in zip(data.model_names, data.residuals_um, strict=True):
         field = interpolate_over_surface(surface, positions, normals, residual_um[rows])
-        part.dress(axes, low, high)
-        part.draw(axes, scale.rgba(field, np.isfinite(field)))
-        colours = scale.rgba(residual_um[rows], np.ones(count, dtype=bool)) / 255.0
+        figure, axes = _of_part(part, part.low_m - room, part.high_m + room, f'residual, {name}')
+        part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
+        shown_um = np.clip(residual_um[rows], -largest, largest)
+        colours = scale.rgba(shown_um, np.ones(count, dtype=bool)) / 255.0
         axes.scatter(*places.T, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
-        axes.set_title(name, loc='left', fontsize=10, color=INK)
+        colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
+        figures.append(figure)
     film_um = data.painted[index][-1].film_um
     films = film_scale(film_um)
-    part.dress(film, low, high)
-    part.draw(film, films.rgba(film_um, film_um > NO_PAINT_UM))
-    draw_tool_path(film, experiment.path, part.view, low, high)
+    low, high = part.window(experiment.path)
+    figure, axes = _of_part(part, low, high, f'film predicted, {data.model_names[-1]}')
+    part.draw(axes, films.rgba(film_um, film_um > NO_PAINT_UM))
+    draw_tool_path(axes, experiment.path, part.view, low, high)
     for number, place in enumerate(data.proposals[0], start=1):
         if place.experiment == experiment.name:
-            _draw_place(film, part, number, place)
-    film.set_title(f'film predicted, {data.model_names[-1]}', loc='left', fontsize=10, color=INK)
-    colour_bar(figure, residuals, 'measured minus predicted [µm]', scale)
-    colour_bar(figure, [film], 'film [µm]', films)
-    for axes in (*residuals[1:], film):
-        axes.set_ylabel('')
-    return figure
+            _draw_place(axes, part, number, place)
+    colour_bar(figure, [axes], 'film [µm]', films)
+    return [*figures, figure]
+
+
+def _of_part(
+    part: PartPicture, low: np.ndarray, high: np.ndarray, title: str
+) -> tuple[Figure, Axes]:
+    """A picture as wide as the page has room for, and its axes over a part to these corners."""
+    across, upward = high - low
+    figure = new_figure(PAGE_IN, min((PAGE_IN - 0.8) * upward / across, HIGHEST_IN) + AROUND_IN)
+    axes = figure.subplots()
+    part.dress(axes, low, high)
+    axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
+    return figure, axes
 
 
 def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:
@@ -110,6 +122,32 @@ def comparison_figure(data: ReportData) -> Figure:
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
     return figure
+
+
+def profile_figures(data: ReportData) -> list[Figure]:
+    """A picture of each column or row, all on one scale, without a legend."""
+    bars_um = TWO_SIDED_95 * data.study.sigma_um
+    tops_um = [(data.study.measured_um + bars_um).max()]
+    tops_um += [profile.lines_um.max() for profile in data.profiles if profile.lines_um.size]
+    reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
+    figures = []
+    for profile in data.profiles:
+        figure = new_figure(PAGE_IN, CHARTS_IN[1] + GAP_IN[1])
+        film, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
+        draw_profile(film, data, profile)
+        draw_residual(residual, data, profile)
+        film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
+        residual.set_ylim(-reach_um, reach_um)
+        figures.append(figure)
+    return figures
+
+
+def profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
+    """Words, colour and kind of mark of what the profiles show."""
+    kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
+    models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
+    measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
+    return [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
 def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:

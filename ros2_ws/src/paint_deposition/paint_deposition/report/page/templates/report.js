@@ -90,5 +90,16 @@
   });
 
   for (const figure of content) await drawGroup(figure);
+
+  // A telephone shows what the page is read for; the rest unfolds, also where a link leads to it.
+  const folds = [...document.querySelectorAll('.fold')];
+  const unfold = () => {
+    const goal = document.getElementById(location.hash.slice(1));
+    const fold = goal && goal.closest('.fold');
+    if (fold) fold.open = true;
+  };
+  if (matchMedia('(max-width: 600px)').matches) for (const fold of folds) fold.open = false;
+  addEventListener('hashchange', unfold);
+  unfold();
   root.dataset.ready = '';
 })();
