@@ -75,6 +75,18 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed and written blank: drawing them costs more than most commands.
+
+    For tests that do not look at them. Those of fixtures of a wider scope are drawn.
+    """
+    from matplotlib.figure import Figure
+
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
+
+
 @pytest.fixture(scope='session')
 def ros_domain() -> Iterator[int]:
     """A ROS domain no other test run on this machine uses; child processes inherit it."""
