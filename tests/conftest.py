@@ -19,7 +19,8 @@ os.environ['PAINT_CACHE_DIR'] = ''
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
-LONGEST = ('worlds', 'cli', 'inference', 'nodes', 'batch', 'test_public.py', 'test_packaging.py')
+# The wheel comes early: meanwhile the first worker compiles what all others find on the disk.
+LONGEST = ('worlds', 'test_packaging.py', 'cli', 'inference', 'nodes', 'batch', 'test_public.py')
 
 # Nodes need ROS and the messages of the built workspace; the rest of the tests does without.
 HAS_NODES = find_spec('rclpy') is not None and find_spec('paint_msgs') is not None

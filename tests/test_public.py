@@ -73,7 +73,7 @@ def test_a_film_has_arrays_and_figures(film, panel):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['film', 'comparison', 'recommendation'])
-def test_results_show_and_tell_themselves(name, request, tmp_path):
+def test_results_show_and_tell_themselves(name, request, tmp_path, undrawn):
     result = request.getfixturevalue(name)
     assert repr(result).startswith(f'{type(result).__name__}(')
     assert len(repr(result)) < 200
