@@ -111,7 +111,10 @@ def painted(
     """The surface after the motion, with these effects."""
     path = motion if isinstance(motion, SprayPath) else path_of(motion)
     model = model.model_copy(update={'effects': effects})
-    integrator = FilmIntegrator(surface.points(), model, precision, surface.occluder)
+    # By one thread, as readings are predicted: that is compiled once, in a third of the time.
+    integrator = FilmIntegrator(
+        surface.points(), model, precision, surface.occluder, parallel=False
+    )
     integrator.add(path)
     return integrator
 

@@ -19,7 +19,8 @@ os.environ['PAINT_CACHE_DIR'] = ''
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
-LONGEST = ('worlds', 'cli', 'inference', 'nodes', 'batch', 'test_public.py', 'test_packaging.py')
+# The wheel comes early: meanwhile the first worker compiles what all others find on the disk.
+LONGEST = ('worlds', 'test_packaging.py', 'cli', 'inference', 'nodes', 'batch', 'test_public.py')
 
 # Nodes need ROS and the messages of the built workspace; the rest of the tests does without.
 HAS_NODES = find_spec('rclpy') is not None and find_spec('paint_msgs') is not None
@@ -73,6 +74,18 @@ def shared_data() -> Path:
     if not SHARED_DATA.is_dir():
         pytest.skip(f'recordings and measurements kept beside the repository: no {SHARED_DATA}')
     return SHARED_DATA
+
+
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed and written blank: drawing them costs more than most commands.
+
+    For tests that do not look at them. Those of fixtures of a wider scope are drawn.
+    """
+    from matplotlib.figure import Figure
+
+    save = Figure.savefig
+    monkeypatch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
 
 
 @pytest.fixture(scope='session')

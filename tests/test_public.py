@@ -73,7 +73,7 @@ def test_a_film_has_arrays_and_figures(film, panel):
 
 @pytest.mark.slow
 @pytest.mark.parametrize('name', ['film', 'comparison', 'recommendation'])
-def test_results_show_and_tell_themselves(name, request, tmp_path):
+def test_results_show_and_tell_themselves(name, request, tmp_path, undrawn):
     result = request.getfixturevalue(name)
     assert repr(result).startswith(f'{type(result).__name__}(')
     assert len(repr(result)) < 200
@@ -100,7 +100,7 @@ def test_what_is_no_result_is_refused(tmp_path):
 
 @pytest.mark.slow
 @pytest.mark.timeout(600)
-def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch):
+def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch, undrawn):
     """docs/python_example.py, whose cells docs/python.md shows."""
     monkeypatch.chdir(tmp_path)
     # The sample is diagnosed where the command is tried out.

@@ -156,7 +156,7 @@ def test_the_kernel_computes_the_law(effect: type[Effect]):
     points = door().points().select(slice(None, None, 7))
     path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
     model = MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(points, model, 'double')
+    integrator = FilmIntegrator(points, model, 'double', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
     np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=2e-9 * expected.max())
@@ -180,7 +180,8 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
     trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
     model = MODEL.with_effect(effect.typical())
     whole = painted(panel(0.3, 0.05), trajectory, effect.typical())
-    live = FilmIntegrator(panel(0.3, 0.05).points(), model, 'double', panel(0.3, 0.05).occluder)
+    part = panel(0.3, 0.05)
+    live = FilmIntegrator(part.points(), model, 'double', part.occluder, parallel=False)
     for piece in in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
@@ -193,7 +194,8 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect],
     some = slice(11, None, 97)
     stencil_m = 0.01 if effect.needs_slope else None
     at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
-    integrator = FilmIntegrator(at, MODEL.with_effect(effect.typical()), 'double', door().occluder)
+    model = MODEL.with_effect(effect.typical())
+    integrator = FilmIntegrator(at, model, 'double', door().occluder, parallel=False)
     integrator.add(passes)
     readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.
@@ -207,7 +209,7 @@ def test_laws_multiply():
     path = path_of(spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
     model = MODEL.model_copy(update={'effects': tuple(chosen)})
-    integrator = FilmIntegrator(points, model, 'single')
+    integrator = FilmIntegrator(points, model, 'single', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
     np.testing.assert_allclose(integrator.raw_um, expected, rtol=0.0, atol=3e-6 * expected.max())

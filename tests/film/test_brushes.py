@@ -97,7 +97,7 @@ def test_a_lag_takes_the_brush_along(lag_s):
 
 def test_terms_are_kept_apart_by_brush():
     path, _ = spray_path(replace(weaving(TIMES_S), **CHANGES))
-    film = FilmIntegrator(lying_plane(), MODEL, 'double')
+    film = FilmIntegrator(lying_plane(), MODEL, 'double', parallel=False)
     terms = film.terms(film.steps(path))
     weights = np.concatenate([term_weights(planar)[0] for planar in MODEL.patterns])
     film.add(path)

@@ -32,13 +32,13 @@ def model_of(planar: PlanarPattern, effects: tuple[str, ...]) -> DepositionModel
 
 
 def film_um(model: DepositionModel) -> np.ndarray:
-    integrator = FilmIntegrator(lying_plane(count=13), model, 'double')
+    integrator = FilmIntegrator(lying_plane(count=13), model, 'double', parallel=False)
     integrator.add(PATH)
     return integrator.raw_um
 
 
 def terms_um(model: DepositionModel) -> np.ndarray:
-    integrator = FilmIntegrator(lying_plane(count=13), model, 'double')
+    integrator = FilmIntegrator(lying_plane(count=13), model, 'double', parallel=False)
     return integrator.terms(integrator.steps(PATH))
 
 

@@ -31,7 +31,7 @@ class Elements(HTMLParser):
 
 
 @pytest.mark.slow
-def test_a_name_with_script_tags_is_text_in_the_report(tmp_path):
+def test_a_name_with_script_tags_is_text_in_the_report(tmp_path, undrawn):
     """The name of a part, a batch and each point."""
 
     def page(name: str) -> str:

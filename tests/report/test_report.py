@@ -29,7 +29,7 @@ from paint_deposition.report.page.tables import point_rows
 from paint_deposition.report.words import learned_range
 from small_campaign import small_campaign
 
-pytestmark = pytest.mark.slow
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures('undrawn')]
 
 VOID = {'meta', 'link', 'br', 'img', 'input', 'hr'}
 CHROMIUM = shutil.which('chromium') or shutil.which('google-chrome')

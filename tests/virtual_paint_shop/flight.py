@@ -14,8 +14,15 @@ from .parcels import Parcels
 PROBE_RADIUS_M, BELL_RADIUS_M = 0.012, 0.025
 GRID_M = 0.004
 _NEWTON_STEPS = 8
-# a cached kernel remembers its module's name; pytest may import this folder under a shorter one
-_compiled = numba.njit(cache=__name__.startswith('tests.'))
+
+
+def _compiled(function):
+    """The function compiled, and kept under the name of its module, which it remembers.
+
+    The demo and the tests import this folder under different names.
+    """
+    function.__qualname__ = f'{__name__}.{function.__name__}'
+    return numba.njit(cache=True)(function)
 
 
 @dataclass(frozen=True)

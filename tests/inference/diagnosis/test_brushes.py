@@ -26,7 +26,7 @@ def painted(folder, truth, *parts):
     return write(made, folder), made.truth
 
 
-def test_the_hidden_effect_is_named_and_the_error_falls(tmp_path):
+def test_the_hidden_effect_is_named_and_the_error_falls(tmp_path, undrawn):
     """A door with more paint along its edges; nothing but the recording names the brushes."""
     campaign, truth = painted(tmp_path / 'door', 'edge_build', 'door')
     done = paint('diagnose', campaign, '-o', tmp_path / 'd')

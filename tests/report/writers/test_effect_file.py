@@ -50,7 +50,7 @@ def door(tmp_path_factory):
 
 def film_um(experiment, model: DepositionModel) -> np.ndarray:
     """What the gauge shows at the readings."""
-    painted = FilmIntegrator(experiment.measured_points, model, 'double')
+    painted = FilmIntegrator(experiment.measured_points, model, 'double', parallel=False)
     painted.add(experiment.path)
     return painted.gauge_um
 
