@@ -8,17 +8,6 @@ from cli.command import level_pass
 from paint_deposition.files.recordings.bags import write_pose_bag
 
 
-@pytest.fixture(autouse=True)
-def _blank_pictures(undrawn):
-    """Tests that look at a picture have it from a fixture of their module, or ask for `drawn`."""
-
-
-@pytest.fixture
-def drawn(monkeypatch):
-    """Pictures are drawn after all."""
-    monkeypatch.undo()
-
-
 @pytest.fixture(scope='session')
 def panel(tmp_path_factory):
     """A standing panel of 1.2 m by 0.8 m that looks to -y, as an STL."""

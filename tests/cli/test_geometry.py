@@ -158,7 +158,7 @@ def test_a_small_mesh_in_millimetres_is_refused(panel, tmp_path):
 
 
 @pytest.mark.slow
-def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path, drawn):
+def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
     door, run, picture = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal', tmp_path / 'door.png'
     done = paint('inspect', '--mesh', door, '--trajectory', run, *TRIGGER, '--out', picture)
     assert (done.returncode, done.stderr) == (0, '')

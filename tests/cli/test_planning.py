@@ -40,7 +40,7 @@ def is_picture(path) -> bool:
 
 
 @pytest.mark.slow
-def test_recommendation_is_printed_and_written(model_file, tmp_path, drawn):
+def test_recommendation_is_printed_and_written(model_file, tmp_path):
     arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
     done = paint('recommend', *arguments, '-o', tmp_path)
     assert done.returncode == 0, done.stderr
@@ -107,7 +107,7 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 
 
 @pytest.mark.slow
-def test_plan_writes_bag_table_program_and_film(model_file, tmp_path, drawn):
+def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20)
     done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json')
