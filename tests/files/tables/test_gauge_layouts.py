@@ -187,22 +187,43 @@ def test_measuring_robot(file):
     assert 'thickness in µm (no unit is given)' in readings.understood
 
 
-def test_readings_in_order_belong_to_points_numbered_from_one(file):
-    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0,0,0\n')
-    readings = read_readings(file('b.txt', 'DFT\n20.5\n21\n'), listed)
-    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.2], [0.3, 0.0, 0.4]]
-    assert '1 of them without a reading: 3' in readings.understood
+IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
 
 
 @pytest.mark.parametrize(
-    'text', ['DFT\n20,5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n']
-)
-def test_a_missing_reading_keeps_its_number(file, text):
-    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0.5,0,0\n')
-    readings = read_readings(file('b.csv', text), listed)
-    assert readings.positions_m[:, 0].tolist() == [0.1, 0.5]
-    assert 'without a reading: 2' in readings.understood
-    assert '1 row without a reading' in readings.understood
+    ('text', 'measured'),
+    [
+        ('DFT\n20,5\nn/a\n21\n22\nOL\n23', [1, 3, 4, 6]),
+        ('time,DFT\n8:00,20.5\n8:01,\n8:02,21\n8:03,22\n8:04,\n8:05,23\nend,\n', [1, 3, 4, 6]),
+        ('DFT\n20.5\n\n21\n22\n\n23\n\nMean,21\n', [1, 3, 4, 6]),
+        ('DFT\n\n20.5\n21\n22\n\n\n\n23\n24\n25\n', [1, 2, 3, 4, 5, 6]),
+        ('no,DFT\n1,20\n2,21\n4,22\n5,22\n', [1, 2, 4, 5]),
+        ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
+    ],
+)  # fmt: skip
+def test_a_missing_reading_keeps_its_number(file, text, measured):
+    readings = read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
+    assert readings.positions_m[:, 0].tolist() == [k / 10 for k in measured]
+    assert readings.point.tolist() == [str(k) for k in measured]
+
+
+@pytest.mark.parametrize(
+    'text', ['DFT\n20\n21\n22\n', 'DFT\n20\n\n21\n22\n', 'no,DFT\n1,20\n2,21\n3,22\n', 'DFT\n' + '20\n' * 7]
+)  # fmt: skip
+def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
+    with pytest.raises(ReadingsError, match='readings in order for the 6 points .*; write n/a in'):
+        read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
+
+
+def test_blank_cells_of_a_workbook_keep_their_numbers(tmp_path, file):
+    """72 readings in one column, the 6th not measured and the 34th not available."""
+    films = [[20.0 + k] for k in range(1, 73)]
+    films[5], films[33] = [None], ['n/a']
+    path = write_workbook(tmp_path / 'door.xlsx', {'Door': [['DFT [µm]'], *films]})
+    listed = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},{k},0,0\n' for k in range(1, 73))
+    readings = read_readings(path, file('points.csv', listed))
+    assert np.array_equal(readings.thickness_um, 20.0 + readings.positions_m[:, 0])
+    assert '(2 of them without a reading: 6, 34)' in readings.understood
 
 
 def test_points_that_are_not_listed_are_named_all_at_once(file):

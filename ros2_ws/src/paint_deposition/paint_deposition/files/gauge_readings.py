@@ -123,11 +123,7 @@ class MeasuringPoints:
 
         Rows that name no listed point are complained of in the table of readings.
         """
-        quantity = 'point' if readings.has('point') else 'number'
-        if readings.has(quantity):
-            wanted, by = readings.texts(quantity), f"by '{readings.heading(quantity)}'"
-        else:
-            wanted, by = [str(k) for k in readings.order], 'by the order of the readings'
+        wanted, by = self._wanted_by(readings)
         places = {label: row for row, label in enumerate(self.labels)}
         for row, label in enumerate(wanted):
             if label not in places:
@@ -141,6 +137,26 @@ class MeasuringPoints:
             words += f' ({len(unmeasured)} of them without a reading: {named}{more})'
         normals = None if self.normals is None else self.normals[rows]
         return self.positions_m[rows], normals, np.array(wanted), words
+
+
+    def _wanted_by(self, readings: ReadingTable) -> tuple[list[str], str]:
+        """Labels (N,) of the points that the rows belong to, and by what they are known.
+
+        A gauge's own count of its readings is their order: it knows nothing of a point left out.
+        """
+        quantity = 'point' if readings.has('point') else 'number'
+        labels = readings.texts(quantity)
+        orders = [([str(k) for k in order], count) for order, count in readings.orders]
+        if readings.has(quantity) and (quantity == 'point' or labels != orders[0][0]):
+            return labels, f"by '{readings.heading(quantity)}'"
+        for wanted, count in orders:
+            if count == len(self.labels):
+                return wanted, 'by the order of the readings'
+        raise readings.table.error(
+            f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
+            f'{self.path.name}: which is missing is not known; write n/a in its place, or give a '
+            "column 'point' with the labels of the points"
+        )
 
 
 def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:

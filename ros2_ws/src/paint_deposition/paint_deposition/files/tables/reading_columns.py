@@ -54,6 +54,7 @@ class Layout:
     unit: Mapping[Any, float] = field(default_factory=dict)
     decimal: str = ''  # '.' or ','
     sheet: str = ''  # name of a workbook's sheet
+    zero: str = ''  # 'missing' or 'film', what a reading of 0 is; '' where not known
 
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:

@@ -1,6 +1,7 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
 import re
+from bisect import bisect
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -31,7 +32,9 @@ class ReadingTable:
     # Columns of each quantity; several of the thickness where each row holds repeats.
     at: dict[str, list[int]]
     layout: Layout
-    order: list[int]  # number of each row from 1, those without a reading counted
+    # Number of each row from 1, those without a reading counted, and of all of them; then the same
+    # with blank rows counted, too.
+    orders: tuple[tuple[list[int], int], ...]
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
     left_out: str  # what was not taken for a row, for the user
@@ -68,13 +71,17 @@ class ReadingTable:
         table, doubt = table.with_decimal(numeric, layout.decimal)
         if doubt:
             raise table.error(doubt)
-        kept, order, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
+        if films and layout.zero == 'missing':
+            table = table.without_zeros(at['thickness'])
+        kept, missing, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
+        begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
+        orders = _orders(table.lines, kept, missing, begin)
         table = table.select(kept)
         return ReadingTable(
-            table, at, layout, order, _unit_beside(table, at, sheet, header or 0), left_out
+            table, at, layout, orders, _unit_beside(table, at, sheet, header or 0), left_out
         )
 
     def __len__(self) -> int:
@@ -171,14 +178,15 @@ def _unit_beside(
 def _rows_of_readings(
     table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
 ) -> tuple[list[int], list[int], str]:
-    """Rows that are readings or points, their numbers, and in words what else there is.
+    """Rows that are readings or points, rows without a reading, and in words what else there is.
 
     A row with a place is one, whatever its label. One without a place, or in a table without
     places, is a statistic if it begins with the name of one and not with the label of a listed
-    point. A missing reading keeps its number.
+    point.
     """
     kept: list[int] = []
-    order: list[int] = []
+    unread: list[int] = []
+    nowhere: list[int] = []  # the last rows, if they have neither place nor label
     count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
     width = len(table.headings)
     places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
@@ -197,12 +205,30 @@ def _rows_of_readings(
             # A remark has no reading either, but no other number and no n/a in its place.
             missing &= any(values) or any(map(is_value, cells))
             count['without a reading' if missing else 'of other text'] += 1
+            unread += [k] * missing
         elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
             table.complain(k, f'{len(row)} values under {width} column names')
         elif missing:
             count['without a reading'] += 1
+            unread.append(k)
         else:
             kept.append(k)
-            order.append(len(kept) + count['without a reading'])
+            homeless = not placed and (places or label >= 0) and cells[label] == ''
+            nowhere = [*nowhere, k] if homeless else []
+    # Apart from the table, a block of numbers without places or labels is its statistics.
+    if nowhere and nowhere[0] and table.lines[nowhere[0]] > table.lines[nowhere[0] - 1] + 1:
+        kept = kept[: -len(nowhere)]
+        count['of statistics'] += len(nowhere)
     parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
-    return kept, order, f'left out: {", ".join(parts)}' if parts else ''
+    return kept, unread, f'left out: {", ".join(parts)}' if parts else ''
+
+
+def _orders(
+    lines: list[int], kept: list[int], unread: list[int], begin: int
+) -> tuple[tuple[list[int], int], ...]:
+    """Numbers of the kept rows from 1 and the number of all, without and with blank rows."""
+    rows, end = sorted([*kept, *unread]), lines[max(kept)] + 1
+    blank = sorted({*range(begin, end)} - {*lines})
+    without = [bisect(rows, k) for k in kept]
+    with_blank = [n + bisect(blank, lines[k]) for n, k in zip(without, kept, strict=True)]
+    return (without, len(rows)), (with_blank, len(rows) + len(blank))

@@ -1,7 +1,7 @@
 """A table in a file: headings, the rows under them, and their numbers."""
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -20,7 +20,7 @@ NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:i
 # With one mark only, three digits behind it may be thousands.
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
-NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|none|null', re.IGNORECASE)
+NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE)
 Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
 
@@ -111,6 +111,14 @@ class Table:
         return replace(
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
+
+    def without_zeros(self: Kind, columns: Collection[int]) -> Kind:
+        """The table with a missing reading in place of each zero of these columns."""
+        rows = [
+            ['n/a' if k in columns and self._number(c) == 0.0 else c for k, c in enumerate(row)]
+            for row in self.rows
+        ]
+        return replace(self, rows=rows)
 
     def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
