@@ -63,11 +63,11 @@ def read_readings(
             table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
     table.refuse_errors()
     notes = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
-    groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
+    groups, sessions = (np.array(c)[row] for c in (read.groups, read.texts('session')))
     readings = Readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
-        f'{path.name}: {"; ".join(filter(None, notes))}',
+        f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -98,12 +98,11 @@ class MeasuringPoints:
         """Read a list: point label and x, y, z, or from_left, height."""
         read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         positions, normals, place_words = _places(read, surface)
-        quantity = 'point' if read.has('point') else 'number'
-        if not read.has(quantity):
+        labels = read.labels
+        if labels is None:
             raise read.table.error(
                 'the points have no labels; give a column point, with the labels of the readings'
             )
-        labels = read.texts(quantity)
         first: dict[str, int] = {}
         for row, label in enumerate(labels):
             other = first.setdefault(label, row)
@@ -138,17 +137,15 @@ class MeasuringPoints:
         normals = None if self.normals is None else self.normals[rows]
         return self.positions_m[rows], normals, np.array(wanted), words
 
-
     def _wanted_by(self, readings: ReadingTable) -> tuple[list[str], str]:
         """Labels (N,) of the points that the rows belong to, and by what they are known.
 
         A gauge's own count of its readings is their order: it knows nothing of a point left out.
         """
-        quantity = 'point' if readings.has('point') else 'number'
-        labels = readings.texts(quantity)
+        labels, by = readings.labels, readings.named_by
         orders = [([str(k) for k in order], count) for order, count in readings.orders]
-        if readings.has(quantity) and (quantity == 'point' or labels != orders[0][0]):
-            return labels, f"by '{readings.heading(quantity)}'"
+        if labels is not None and (by != ('number',) or labels != orders[0][0]):
+            return labels, f"by '{' '.join(map(readings.heading, by))}'"
         for wanted, count in orders:
             if count == len(self.labels):
                 return wanted, 'by the order of the readings'
@@ -184,12 +181,17 @@ def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:
 
 
 def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
-    lines = read.table.lines
-    if read.has('point'):
-        labels = zip(read.texts('point'), lines, strict=True)
-        return np.array([label or f'line {line}' for label, line in labels])
+    """What the file calls the points, else the line of the first reading at each place."""
+    names = [f'line {line}' for line in read.table.lines]
     _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
-    return np.array([f'line {lines[row]}' for row in first[place.ravel()]])
+    given = read.labels
+    if given is not None and read.named_by == ('number',):
+        # A gauge counts the readings at one place, a list of points does not.
+        one_each = len({*given}) == len(first) == len({*zip(given, place.ravel(), strict=True)})
+        given = given if one_each else None
+    if given is None:
+        return np.array(names)[first[place.ravel()]]
+    return np.array([label or name for label, name in zip(given, names, strict=True)])
 
 
 def _places(

@@ -74,7 +74,7 @@ def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> lis
             rows = list(_measured(experiment, model))
         except PaintError as error:
             unused = str(error).removeprefix(f'{folder}/')
-    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
+    remarks = [line.removeprefix(f'{run.path}: ') for line in seen.trajectory.warnings]
     remarks += [*seen.geometry.warnings, *([f'simulated only: {unused}'] if unused else [])]
     known = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks)}
     known |= _film(seen.surface, seen.path, model)

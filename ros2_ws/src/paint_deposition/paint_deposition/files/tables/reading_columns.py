@@ -37,6 +37,8 @@ ALIASES = {
         'messstelle', 'stelle',
     ),
     'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
+    'row': ('row', 'zeile', 'reihe'),
+    'column': ('column', 'col', 'spalte'),
     'group': ('group', 'gruppe'),
     'unit': ('unit', 'units', 'einheit'),
 }  # fmt: skip

@@ -59,13 +59,19 @@ class ReadingTable:
         headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
+        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
+        if rows and 'unit' not in known_columns.columns_of(headings, layout):
+            below = cells_of.with_units_below(headings, sheet.rows[rows[0]])
+            headings, rows = (below, rows[1:]) if below else (headings, rows)
         at = known_columns.columns_of(headings, layout)
         if header is None and not (numbered and known(headings)):
             raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')
-        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
         _refuse_rivals(table, at)
+        _refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
+        if numbered and layout.decimal != '.':
+            _refuse_cut_numbers(table)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
         table, doubt = table.with_decimal(numeric, layout.decimal)
@@ -98,6 +104,29 @@ class ReadingTable:
     def heading(self, quantity: str) -> str:
         """What stands over the column; the quantity's own name where there is none."""
         return self.table.headings[self.at[quantity][0]].text if self.has(quantity) else quantity
+
+    @property
+    def labels(self) -> list[str] | None:
+        """What the file calls the points of the rows, None where it names none."""
+        by = self.named_by
+        if len(by) < 2:
+            return self.texts(by[0]) if by else None
+        pairs = zip(*(self.texts(quantity) for quantity in by), strict=True)
+        names = [self.heading(quantity) for quantity in by]
+        return [' '.join(f'{n} {text}' for n, text in zip(names, p, strict=True)) for p in pairs]
+
+    @property
+    def named_by(self) -> tuple[str, ...]:
+        """The quantities that name a point."""
+        ways = (('point',), ('row', 'column'), ('number',))
+        return next((way for way in ways if self.has(*way)), ())
+
+    @property
+    def groups(self) -> list[str]:
+        """The group of each row, else its column where points are named by row and column."""
+        if self.has('group') or not self.has('row', 'column'):
+            return self.texts('group')
+        return [f'{self.heading("column")} {text}' for text in self.texts('column')]
 
     def numbers(self, quantity: str, may_be_empty: bool = False) -> np.ndarray:
         """A column (N,) of numbers as written."""
@@ -157,6 +186,34 @@ def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
             )
 
 
+def _refuse_merged(table: Table, films: list[int]) -> None:
+    """Refuse numbers without a heading right of the thickness's: it is merged over them."""
+    for column in range(max(films, default=len(table.headings)) + 1, len(table.headings)):
+        if table.headings[column].text:
+            return
+        for row, line in zip(table.rows, table.lines, strict=True):
+            if column < len(row) and is_value(row[column]):
+                raise table.error(
+                    f"'{table.headings[films[-1]].text}' stands over several columns or is a "
+                    f"title: '{text_of(row[column])}' beside it in line {line} has no heading; "
+                    'give each column one, or say columns: {thickness: ...} in the campaign'
+                )
+
+
+def _refuse_cut_numbers(table: Table) -> None:
+    """Refuse lines without headings that may be two numbers, or one with a decimal comma."""
+    cells = [text_of(cell) for row in table.rows for cell in row]
+    if (
+        table.form.startswith('commas')
+        and len(cells) == 2 * len(table)
+        and all(map(str.isdigit, cells))
+    ):
+        raise table.error(
+            f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
+            'decimal comma; say decimal: point if it is two, else put a heading over the column'
+        )
+
+
 def _unit_beside(
     table: Table, at: dict[str, list[int]], sheet: Sheet, header: int
 ) -> float | None:
@@ -190,13 +247,14 @@ def _rows_of_readings(
     count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
     width = len(table.headings)
     places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
-    (label,) = at.get('point') or at.get('number') or [-1]
+    both = 'point' not in at and {'row', 'column'} <= {*at}
+    (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
     for k, row in enumerate(table.rows):
         cells = [*row, *[''] * (width - len(row))]
         values = [cells[c] for c in at['thickness']] if films else []
         placed = any(is_value(cells[c]) for c in places)
         begins = next(text_of(cell) for cell in cells if cell != '')
-        listed = label >= 0 and text_of(cells[label]) in labels
+        listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''
         missing = bool(values) and all(map(is_nothing, values))
         named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
         if named and not placed and not listed:

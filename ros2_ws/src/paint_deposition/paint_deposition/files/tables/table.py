@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.tables.headings import Heading
+from paint_deposition.files.tables.headings import Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
 # A heading further down than this is none.
@@ -20,9 +20,14 @@ NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:i
 # With one mark only, three digits behind it may be thousands.
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
-NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE)
+NOTHING = re.compile(
+    r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
+)
 Kind = TypeVar('Kind', bound='Table')
-SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
+SWITCHED = {
+    **dict.fromkeys(('true', 'on', 'yes', 'wahr', 'ein', 'an', 'ja'), 1.0),
+    **dict.fromkeys(('false', 'off', 'no', 'falsch', 'aus', 'nein'), 0.0),
+}
 
 
 @dataclass
@@ -69,6 +74,7 @@ class Table:
             if value is None:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
+                wanted += ', or n/a where there is none' if may_be_empty else ''
                 self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
                 self.complain(index, f'{name} is {cell}; expected a finite number')
@@ -183,6 +189,15 @@ def find_table(
 def headings_in(row: list[Cell]) -> list[Heading]:
     """The cells of a row as headings."""
     return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
+
+
+def with_units_below(headings: list[Heading], row: list[Cell]) -> list[Heading] | None:
+    """The headings with the units that a row below them holds, None where it is no such row."""
+    units = [unit_of(text_of(cell)) for cell in row]
+    if not any(units) or any(map(is_value, row)):
+        return None
+    pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
+    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs]
 
 
 def shown(headings: Sequence[Heading]) -> str:
