@@ -20,6 +20,7 @@ from paint_deposition.part.surface import Surface
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0
 MOST_LABELS_SHOWN = 6
+NO_LABEL = 'the point has no label'
 
 
 def read_readings(
@@ -107,7 +108,7 @@ class MeasuringPoints:
         for row, label in enumerate(labels):
             other = first.setdefault(label, row)
             if not label:
-                read.table.complain(row, 'the point has no label')
+                read.table.complain(row, NO_LABEL)
             elif not np.array_equal(positions[row], positions[other]):
                 same = f"point '{label}' is elsewhere in line {read.table.lines[other]}"
                 read.table.complain(row, f'{same}; keep one')
@@ -127,7 +128,8 @@ class MeasuringPoints:
         for row, label in enumerate(wanted):
             if label not in places:
                 known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
-                readings.table.complain(row, f"no point '{label}' in {self.path.name} ({known})")
+                missing = f"no point '{label}' in {self.path.name} ({known})"
+                readings.table.complain(row, missing if label else NO_LABEL)
         rows = [places.get(label, 0) for label in wanted]
         words = f'{self.words}, joined {by}'
         if unmeasured := [label for label in self.labels if label not in set(wanted)]:
@@ -144,6 +146,12 @@ class MeasuringPoints:
         """
         labels, by = readings.labels, readings.named_by
         orders = [([str(k) for k in order], count) for order, count in readings.orders]
+        again = by == ('number',) and len({*(labels or ())}) < len(readings)
+        if again and len({*readings.texts('block')}) > 1:
+            raise readings.table.error(
+                f"'{readings.heading('number')}' counts anew in each block; give a column 'point' "
+                'with the labels of the points'
+            )
         if labels is not None and (by != ('number',) or labels != orders[0][0]):
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
         for wanted, count in orders:

@@ -60,6 +60,10 @@ class PoseTable(Table):
         ).select(below)
         if not len(table):
             raise table.error('no poses below the row of headings')
+        for k, row in enumerate(table.rows):
+            if any(cell != '' for cell in row[len(headings) :]):
+                table.complain(k, f'{len(row)} values under {len(headings)} column names')
+        table.refuse_errors()
         if not sheet.form.startswith('commas'):
             table, _ = table.with_decimal(range(len(headings)))
         return table
@@ -96,6 +100,8 @@ class PoseTable(Table):
         if (unit or 's') not in TIMES:
             raise RecordingError(f"{written}: '{unit}' is no unit of time")
         scale = TIMES[unit or 's']
+        if clock := next((text for text in self.texts(column) if ':' in text), ''):
+            raise RecordingError(f"{written} has the time of day '{clock}'; give seconds, as time_s")
         times = self.values([column])[:, 0]
         if not np.isfinite(times).all():
             raise RecordingError(f'{written} has a time that is not finite')

@@ -15,7 +15,7 @@ from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
-SUFFIXES = ('.csv', '.tsv', '.txt')
+SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
 # No cell is larger: the unit is another one.
 LARGEST_CELL_M = 50.0
 # Names of columns, as `column_name` leaves them. The letter t is also an angle of Kawasaki's.

@@ -155,12 +155,14 @@ class Table:
 
 
 def find_table(
-    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = ''
+    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = '',
+    columns: int = 0,
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
     ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
-    ``sheet`` names a workbook's sheet. Raises ``refusal`` for a file that cannot be read, or with
+    ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
+    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
     tables in several sheets.
     """
     sheets = read_sheets(path, refusal)
@@ -183,7 +185,16 @@ def find_table(
     wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
     if found:
         return (wide or found[-1:])[0]
-    return max(sheets, key=lambda s: len(s.rows[0]) if s.rows else 0), None
+    wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
+    if columns and wide_enough:
+        return wide_enough[0], None
+    return max(sheets, key=lambda s: len(widest(s))), None
+
+
+def widest(sheet: Sheet) -> list[Cell]:
+    """The cells of the first row of a sheet with the most of them that are not blank."""
+    above = ([cell for cell in row if cell != ''] for row in sheet.rows[:MOST_LINES_ABOVE])
+    return max(above, key=len, default=[])
 
 
 def headings_in(row: list[Cell]) -> list[Heading]:
