@@ -10,6 +10,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.effect_source import needs_file, source_of
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
@@ -132,7 +133,10 @@ def diagnose(
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.
     """
-    library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
+    own = {effect.id: effect for effect in own_effects}
+    for effect in filter(needs_file, own.values()):
+        source_of(effect)  # refuses what could not be written with the model
+    library = dict(EFFECTS) | own
     start, known, doubts = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
     reaches = () if known else short_reaches(found.study.campaign, found.model)

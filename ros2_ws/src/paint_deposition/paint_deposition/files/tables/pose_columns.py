@@ -101,7 +101,9 @@ class PoseTable(Table):
             raise RecordingError(f"{written}: '{unit}' is no unit of time")
         scale = TIMES[unit or 's']
         if clock := next((text for text in self.texts(column) if ':' in text), ''):
-            raise RecordingError(f"{written} has the time of day '{clock}'; give seconds, as time_s")
+            raise RecordingError(
+                f"{written} has the time of day '{clock}'; give seconds, as time_s"
+            )
         times = self.values([column])[:, 0]
         if not np.isfinite(times).all():
             raise RecordingError(f'{written} has a time that is not finite')

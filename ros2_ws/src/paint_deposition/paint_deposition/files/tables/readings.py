@@ -20,7 +20,8 @@ from paint_deposition.files.tables.table import Table, is_nothing, is_value
 LARGEST_PART_M = 20.0
 STATISTIC = re.compile(
     r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
-    r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|anzahl|sum|total|n|s|x)\b'
+    r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
+    r'anzahl|sum|total|n|s|x)\b'
 )
 
 
@@ -55,7 +56,11 @@ class ReadingTable:
             return len(at) if ('thickness' in at if films else known_columns.has_place(at)) else 0
 
         sheet, header = cells_of.find_table(
-            path, ReadingsError, known, layout.sheet, max(layout.columns.values()) if numbered else 0
+            path,
+            ReadingsError,
+            known,
+            layout.sheet,
+            max(layout.columns.values()) if numbered else 0,
         )
         first = 0 if numbered or header is None else header + 1
         headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []

@@ -155,7 +155,10 @@ class Table:
 
 
 def find_table(
-    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = '',
+    path: Path,
+    refusal: type[PaintError],
+    known: Callable[[list[Heading]], int],
+    sheet: str = '',
     columns: int = 0,
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
