@@ -49,7 +49,8 @@ class ReadingTable:
         A row with one of ``labels``, those of the listed points, is no statistic. Raises
         ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
-        numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
+        numbers = [n for n in layout.columns.values() if isinstance(n, int)]
+        numbered = 0 < len(numbers) == len(layout.columns)
 
         def known(headings: list[Heading]) -> int:
             at = known_columns.columns_of(headings, layout)
@@ -60,7 +61,7 @@ class ReadingTable:
             ReadingsError,
             known,
             layout.sheet,
-            max(layout.columns.values()) if numbered else 0,
+            max(numbers) if numbered else 0,
         )
         first = 0 if numbered or header is None else header + 1
         headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
