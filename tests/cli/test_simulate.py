@@ -200,3 +200,21 @@ def test_an_output_that_is_a_file_is_refused(panel, one_pass, tmp_path):
         'simulate', '--mesh', panel, '--trajectory', one_pass, '-o', tmp_path / 'out'
     )  # fmt: skip
     assert_refused(done, '-o', 'is a file')
+
+
+def test_a_log_with_a_gap_and_a_log_pasted_twice_are_warned_of_before_the_film(tmp_path):
+    rows = [f'{k / 50},{k / 50 - 1},-0.25,0.5,-0.70710678,0,0,0.70710678' for k in range(101)]
+    head = 't,x_m,y_m,z_m,qx,qy,qz,qw'
+    logs = {'gap': [*rows[:30], *rows[60:]], 'twice': rows * 2}
+    for name, log in logs.items():
+        (tmp_path / f'{name}.csv').write_text('\n'.join([head, *log]))
+        given = ('--mesh', DOOR, '--trajectory', tmp_path / f'{name}.csv', *COARSE)
+        done = paint('simulate', *given, '-o', tmp_path / name)
+        words = {
+            'gap': 'a gap in the poses while',
+            'twice': 'as if the log were in the file twice',
+        }
+        (line,) = (line for line in done.stderr.splitlines() if words[name] in line)
+        assert line.startswith('warning: ')
+        told = json.loads((tmp_path / name / 'stats.json').read_text())
+        assert line.removeprefix('warning: ') in told['warnings']

@@ -1,6 +1,8 @@
 """A user's own effect: one file, taken in like those of the project or refused with a remedy."""
 
+import importlib.util
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -9,8 +11,10 @@ from numba import njit
 
 from booth import SAMPLES, painted, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import TRIAL_RAY, load_effect_file
 from paint_deposition.errors import ModelError
+from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.kernel.laws import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()
@@ -128,3 +132,26 @@ def test_an_unknown_id_is_answered_with_the_nearest():
         effect_class('air_drfit')
     with pytest.raises(ModelError, match='there are: incidence_attraction, '):
         effect_class('???')
+
+
+def test_a_class_of_a_script_is_kept_as_a_file_beside_the_model(own, tmp_path):
+    """With what it uses of the script, and nothing else that the script does."""
+    path = own(
+        ('class WakeLoss', 'GAIN = 0.7\nFIELDS = list(Ray._fields)\n\n\nclass WakeLoss'),
+        ('return exp', 'return GAIN * exp'),
+    )
+    spec = importlib.util.spec_from_file_location('script', path)
+    script = sys.modules['script'] = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    model = DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
+    write_model(tmp_path / 'out.yaml', model)
+    (effect,) = read_model(tmp_path / 'out.yaml').effects
+    assert effect.loss_per_m_per_s == 0.3
+    ray = Ray(*map(float, TRIAL_RAY))
+    assert effect.flux_factor(ray, 0.3) == script.WakeLoss.flux_factor(ray, 0.3)
+    assert 'FIELDS' not in (tmp_path / 'wake_loss.py').read_text()
+    script.WakeLoss.__module__ = 'elsewhere'
+    with pytest.raises(
+        ModelError, match="source of effect 'wake_loss' is not known: put WakeLoss in"
+    ):
+        write_model(tmp_path / 'out.yaml', model)

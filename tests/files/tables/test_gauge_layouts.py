@@ -187,22 +187,46 @@ def test_measuring_robot(file):
     assert 'thickness in µm (no unit is given)' in readings.understood
 
 
-def test_readings_in_order_belong_to_points_numbered_from_one(file):
-    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0,0,0\n')
-    readings = read_readings(file('b.txt', 'DFT\n20.5\n21\n'), listed)
-    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.2], [0.3, 0.0, 0.4]]
-    assert '1 of them without a reading: 3' in readings.understood
+IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
 
 
 @pytest.mark.parametrize(
-    'text', ['DFT\n20,5\nn/a\n21\n', 'time,DFT\n8:00,20.5\n8:01,\n8:02,21\nend of list,\n']
+    ('text', 'measured'),
+    [
+        ('DFT\n20,5\nn/a\n21\n22\nOL\n23', [1, 3, 4, 6]),
+        ('time,DFT\n8:00,20.5\n8:01,\n8:02,21\n8:03,22\n8:04,\n8:05,23\nend,\n', [1, 3, 4, 6]),
+        ('DFT\n20.5\n\n21\n22\n\n23\n\nMean,21\n', [1, 3, 4, 6]),
+        ('DFT\n\n20.5\n21\n22\n\n\n\n23\n24\n25\n', [1, 2, 3, 4, 5, 6]),
+        ('no,DFT\n1,20\n2,21\n4,22\n5,22\n', [1, 2, 4, 5]),
+        ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
+    ],
+)  # fmt: skip
+def test_a_missing_reading_keeps_its_number(file, text, measured):
+    readings = read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
+    assert readings.positions_m[:, 0].tolist() == [k / 10 for k in measured]
+    assert readings.point.tolist() == [str(k) for k in measured]
+
+
+@pytest.mark.parametrize(
+    'text',
+    ['DFT\n20\n21\n', 'DFT\n20\n\n21\n', 'no,DFT\n1,20\n2,21\n3,22\n', 'DFT\n' + '20\n' * 7],
 )
-def test_a_missing_reading_keeps_its_number(file, text):
-    listed = file('points.csv', 'no,x_m,y_m,z_m\n1,0.1,0,0.2\n2,0.3,0,0.4\n3,0.5,0,0\n')
-    readings = read_readings(file('b.csv', text), listed)
-    assert readings.positions_m[:, 0].tolist() == [0.1, 0.5]
-    assert 'without a reading: 2' in readings.understood
-    assert '1 row without a reading' in readings.understood
+def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
+    with pytest.raises(
+        ReadingsError, match=r'readings in order for the 6 points .*; write n/a in'
+    ):
+        read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
+
+
+def test_blank_cells_of_a_workbook_keep_their_numbers(tmp_path, file):
+    """72 readings in one column, the 6th not measured and the 34th not available."""
+    films = [[20.0 + k] for k in range(1, 73)]
+    films[5], films[33] = [None], ['n/a']
+    path = write_workbook(tmp_path / 'door.xlsx', {'Door': [['DFT [µm]'], *films]})
+    listed = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},{k},0,0\n' for k in range(1, 73))
+    readings = read_readings(path, file('points.csv', listed))
+    assert np.array_equal(readings.thickness_um, 20.0 + readings.positions_m[:, 0])
+    assert '(2 of them without a reading: 6, 34)' in readings.understood
 
 
 def test_points_that_are_not_listed_are_named_all_at_once(file):
@@ -278,3 +302,116 @@ def test_labels_of_listed_points_are_no_statistics(file):
     text = 'point,DFT\nN,20\nS,21\nX,22\nMean,21\nn,3\n'
     readings = read_readings(file('a.csv', text), listed)
     assert readings.point.tolist() == ['N', 'S', 'X']
+
+
+# What else shops have: each is read as these readings, or refused with the reason.
+PLACED = 'Punkt;X [mm];Y [mm];Z [mm];Dicke [µm]\nA1;100,0;0;50;21,5\nA2;100,0;0;200;22,1\n'
+SHEET = ['Messpunkt', 'X [mm]', 'Y [mm]', 'Z [mm]', 'Dicke [µm]']
+ELCOMASTER = (
+    'ElcoMaster 2.0\r\nBatch,Door 17\r\nUnits,mils\r\n\r\nReading #,Thickness,Date\r\n'
+    '1,0.85,12/03/2026\r\n2,0.87,12/03/2026\r\n\r\nStatistics\r\nNumber Of Readings,2\r\n'
+    'Mean,0.86\r\nCoef. of Variation,1.2%\r\nHigh Limit,2\r\n'
+)
+IN_CELLS = {
+    'units below, a title above': [
+        ['Schichtdicke Tür'], ['Messpunkt', 'X', 'Y', 'Z', 'Dicke'],
+        [None, 'mm', 'mm', 'mm', 'µm'],
+        ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '22,1'],
+    ],
+    'statistics without labels': [
+        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1], [], [None] * 4 + [21.8],
+    ],
+}  # fmt: skip
+REFUSED_CELLS = {
+    'stands over several columns or is a title': [[*SHEET, None], ['A1', 100, 0, 50, 21.5, 22]],
+    "'12.5' beside it in line 3 has no heading": [
+        ['Dicke', None, None], ['Ort', 'Basis', 'Klar'], ['A1', 12.5, 21.5],
+    ],
+    "line 3: Dicke .* is '#DIV/0!'; expected .* or n/a where": [
+        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '#DIV/0!'],
+    ],
+    "line 3: X .* is ''": [SHEET, ['A1', 100, 0, 50, 21.5], [None] * 4 + [21.5]],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('text', 'encoding'),
+    [
+        (PLACED, 'utf-8-sig'), (PLACED, 'utf-16'), (PLACED, 'latin-1'),
+        ('sep=;\n' + PLACED, 'utf-8'),
+        (PLACED.replace('\n', '\r'), 'utf-8'),
+        (PLACED.replace(' [mm]', '').replace(' [µm]', '').replace('\n', '\n;mm;mm;mm;mil\n', 1)
+         .replace('21,5', '0,84646').replace('22,1', '0,87008'), 'utf-8'),
+    ],
+)  # fmt: skip
+def test_encodings_and_units_below_headings(file, text, encoding):
+    require_two(read_readings(file('a.csv', text, encoding)))
+
+
+def require_two(readings):
+    assert readings.thickness_um == pytest.approx([21.5, 22.1], abs=1e-3)
+    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.05], [0.1, 0.0, 0.2]]
+    assert readings.point.tolist() == ['A1', 'A2']
+
+
+@pytest.mark.parametrize('rows', IN_CELLS.values(), ids=IN_CELLS)
+def test_what_stands_around_a_table_of_a_workbook(tmp_path, rows):
+    require_two(read_readings(write_workbook(tmp_path / 'a.xlsx', {'S': rows})))
+
+
+@pytest.mark.parametrize('message', REFUSED_CELLS)
+def test_cells_that_could_mislead_are_refused(tmp_path, message):
+    path = write_workbook(tmp_path / 'a.xlsx', {'S': REFUSED_CELLS[message]})
+    with pytest.raises(ReadingsError, match=message):
+        read_readings(path)
+
+
+@pytest.mark.parametrize(
+    ('text', 'columns', 'message'),
+    [
+        ('20,5\n21,5\n', {'thickness': 1}, "'20,5' in line 1 may be two numbers or one with a"),
+        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each block"),
+        ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
+        ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
+        ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
+    ],
+)
+def test_tables_without_places_that_could_mislead_are_refused(file, text, columns, message):
+    with pytest.raises(ReadingsError, match=message):
+        read_readings(file('a.csv', text), file('p.csv', IN_ORDER), Layout(columns=columns))
+
+
+def test_the_limits_below_an_export_are_no_readings(file):
+    listed = 'no,x_m,y_m,z_m\n1,0.1,0,0.05\n2,0.1,0,0.2\n'
+    readings = read_readings(file('a.csv', ELCOMASTER, 'utf-8-sig'), file('p.csv', listed))
+    assert readings.thickness_um == pytest.approx([21.59, 22.098])
+    assert '5 rows of statistics' in readings.understood
+
+
+@pytest.mark.parametrize('places', [';X [mm];Y [mm];Z [mm]', ''])
+def test_points_by_row_and_column_keep_their_names(file, places):
+    at = {(1, 1): ';100;0;50', (1, 2): ';200;0;50', (2, 1): ';100;0;20', (2, 2): ';200;0;20'}
+    listed = ''.join(f'{row};{column}{place}\n' for (row, column), place in at.items())
+    points = file('p.csv', 'Zeile;Spalte;X [mm];Y [mm];Z [mm]\n' + listed)
+    rows = ''.join(f'{r};{c}{at[r, c] if places else ""};2{r},{c}\n' for r, c in list(at)[::-1])
+    path = file('a.csv', f'Zeile;Spalte{places};Dicke\n{rows}', 'latin-1')
+    readings = read_readings(path, None if places else points)
+    assert readings.point.tolist()[1] == 'Zeile 2 Spalte 1'
+    assert readings.thickness_um.tolist() == [22.2, 22.1, 21.2, 21.1]
+    assert readings.positions_m[1].tolist() == [0.1, 0.0, 0.02]
+    assert readings.group.tolist() == ['Spalte 2', 'Spalte 1'] * 2
+
+
+def test_a_number_names_a_point_where_it_counts_no_repeats(file):
+    text = 'Nr;x_mm;y_mm;z_mm;DFT\n7;100;0;50;21\n3;100;0;200;22\n7;100;0;50;23\n'
+    assert read_readings(file('a.csv', text)).point.tolist() == ['7', '3', '7']
+    counted = read_readings(file('a.csv', text.replace('\n7;100;0;50;23', '\n8;100;0;50;23')))
+    assert counted.point.tolist() == ['line 2', 'line 3', 'line 2']
+
+
+@pytest.mark.parametrize('zero', ['missing', 'film', ''])
+def test_what_a_zero_is_can_be_said(file, zero):
+    text = 'DFT\n20,5\n0\n0,0\n22\n21\n23\n'
+    readings = read_readings(file('a.csv', text), file('p.csv', IN_ORDER), Layout(zero=zero))
+    assert readings.zero_is_film == (zero == 'film')
+    assert readings.point.tolist() == [*'1456'] if zero == 'missing' else [*'123456']

@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
+from workbook import write_workbook
 
 # A gun that sways while it goes, and is on in the middle.
 TIMES_S = np.array([0.0, 0.02, 0.041, 0.06, 0.0805])
@@ -85,6 +86,12 @@ LAYOUTS = {
             '/gun/pose/orientation/w', TIMES_S, POSITIONS_M, quaternions(),
         ), {},
     ),
+    'units below the headings, titles above': (
+        'Robot 7; booth 2\nProgram: DOOR_LH;V2\n' + table(
+            'Zeit;X;Y;Z;A;B;C\nms;mm;mm;mm;°;°;°', 1e3 * TIMES_S, 1e3 * POSITIONS_M,
+            degrees('ZYX'), separator=';', decimal=',',
+        ), {},
+    ),
     'NumPy': (table('# t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M, quaternions()), {}),
     'comments and blank lines': (
         '# robot 3, shift 2\n\n' + table('t,x,y,z,qx,qy,qz,qw', TIMES_S, POSITIONS_M,
@@ -121,6 +128,25 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
     assert np.array_equal(read.trigger_stamps_ns, read.stamps_ns)
     assert np.allclose(read.trigger_flow, flows)
     assert f'gun by {heading}' in read.notes[0]
+
+
+def test_what_could_be_the_trigger_is_named(tmp_path):
+    rows = [f'{k / 10},{k},2,3,0,0,0,1,{word},0' for k, word in enumerate(('AUS', 'EIN', 'aus'))]
+    (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw,Pistole,DO2\n' + '\n'.join(rows))
+    (note,) = read_recording(tmp_path / 'p.csv').notes
+    assert 'the gun sprays throughout (Pistole could be one, --trigger NAME)' in note
+    read = read_recording(tmp_path / 'p.csv', state_topic='Pistole')
+    assert read.trigger_flow.tolist() == [0.0, 1.0, 0.0]
+
+
+def test_a_workbook_is_a_log_too(tmp_path):
+    rows = [
+        ['t', *'xyz', 'qx', 'qy', 'qz', 'qw'],
+        [0, 1, 2, 3, 0, 0, 0, 1],
+        [0.1, 1, 2, '4,5', 0, 0, 0, 1],
+    ]
+    path = write_workbook(tmp_path / 'log.xlsx', {'Log': rows})
+    assert read_recording(path).positions_m.tolist() == [[1, 2, 3], [1, 2, 4.5]]
 
 
 def test_words_switch_the_gun_and_a_flow_counts_while_it_is_on(tmp_path):
@@ -161,6 +187,8 @@ def test_the_frame_of_the_poses_is_read(tmp_path):
         ('t,x,y,z,roll,pitch,yaw\n0,0,0,0,90,0,0\n', 'reach 90 and are read in rad'),
         ('t,x,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,0,1\n', 'x x could all be x; keep one'),
         ('t,x,y,z,qx,qy,qz,qw\n0,0,0,0,0,0,0,1\n9e9,0,0,0,0,0,0,1\n', 'write its unit'),
+        ('t,x,y,z,qx,qy,qz,qw\n0,0,0,1,0,0,0,0,0,0,0,1\n', 'line 2: 12 values under 8 column'),
+        ('t,x,y,z,qx,qy,qz,qw\n8:15:02,0,0,0,0,0,0,1\n', "the time of day '8:15:02'; give sec"),
         ('t,x,y,z,qx,qy,qz,qw\ntrue,0,0,0,0,0,0,1\n', 'has a word for a number'),
         ('t,x,y,z,qx,qy,qz,qw,flow [ml/min]\n0,0,0,0,0,0,0,1,300\n', 'relative to the calibrated'),
     ],

@@ -98,7 +98,7 @@ def improve(
     return Improvement(
         surface, target_region, model, request, trajectory, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
-        seen.geometry.warnings,
+        (*seen.trajectory.warnings, *seen.geometry.warnings),
     )  # fmt: skip
 
 

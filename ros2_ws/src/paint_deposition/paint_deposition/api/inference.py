@@ -10,6 +10,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.effect_source import needs_file, source_of
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
@@ -51,8 +52,9 @@ def calibrate(
         ReadingsError: the readings are not plausible, or determine nothing.
     """
     model = model or _model_of(campaign)
-    require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
+    doubts = require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
     found = calibrated(campaign, model, seed, progress)
+    found = replace(found, warnings=(*doubts, *found.warnings))
     return replace(found, remainder=left_over(found.study, found.fit))
 
 
@@ -70,16 +72,16 @@ def compare(
     model = model or _model_of(campaign)
     bell = with_brushes_of(campaign, DepositionModel())
     (model or bell).require_brushes(campaign.brushes)
-    require_paint(campaign, model or bell)
+    doubts = require_paint(campaign, model or bell)
     progress('fitting the pattern')
     if model is not None:
         study, _ = clean_and_fit(campaign, model, model.effects)
         progress('comparing')
-        return compared(study, model)
+        return replace(compared(study, model), warnings=doubts)
     study, fit = clean_and_fit(campaign, bell, starts=STARTS)
     progress('comparing')
     reaches = short_reaches(study.campaign, fit.model)
-    return replace(compared(study, fit.model), warnings=tuple(map(str, reaches)))
+    return replace(compared(study, fit.model), warnings=(*doubts, *map(str, reaches)))
 
 
 def compare_models(
@@ -104,11 +106,12 @@ def compare_models(
     for model in models.values():
         model.require_brushes(campaign.brushes)
     first = next(iter(models.values()))
+    doubts = require_paint(campaign, first)
     study, _ = clean_and_fit(campaign, first, first.effects)
     found = {}
     for name, model in models.items():
         progress(f'comparing {name}')
-        found[name] = compared(study, model)
+        found[name] = replace(compared(study, model), warnings=doubts)
     return SideBySide(found)
 
 
@@ -130,11 +133,14 @@ def diagnose(
         own_effects: to consider beside the catalogue's.
         seed: of the starts of the fits and of the simulated deviations.
     """
-    library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
-    start, known = _start(campaign, model, posterior)
+    own = {effect.id: effect for effect in own_effects}
+    for effect in filter(needs_file, own.values()):
+        source_of(effect)  # refuses what could not be written with the model
+    library = dict(EFFECTS) | own
+    start, known, doubts = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
     reaches = () if known else short_reaches(found.study.campaign, found.model)
-    found = replace(found, remarks=(*found.remarks, *map(str, reaches)))
+    found = replace(found, remarks=(*doubts, *found.remarks, *map(str, reaches)))
     progress('looking for what to measure and spray next')
     return with_proposals(found, library)
 
@@ -160,21 +166,22 @@ def refit(
     """
     if isinstance(added, str):
         added = effect_class(added)
-    start, known = _start(campaign, model, posterior)
-    return refitted(campaign, start, added, EFFECTS, seed, progress, known)
+    start, known, doubts = _start(campaign, model, posterior)
+    found = refitted(campaign, start, added, EFFECTS, seed, progress, known)
+    return replace(found, remarks=(*doubts, *found.remarks))
 
 
 def _start(
     campaign: Campaign, model: DepositionModel | None, posterior: Posterior | None
-) -> tuple[DepositionModel, Posterior | None]:
-    """The model to start from, by which all parts get paint, and what is known of it."""
+) -> tuple[DepositionModel, Posterior | None, tuple[str, ...]]:
+    """The model to start from, by which all parts get paint, what is known of it, warnings."""
     if model is None and campaign.model_file:
         file = read_model_file(campaign.model_file)
         model, posterior = file.model, posterior or file.posterior
     given = model or DepositionModel()
     start = with_brushes_of(campaign, given)
-    require_paint(campaign, start)
-    return start, of_brushes(posterior, given, start)
+    doubts = require_paint(campaign, start)
+    return start, of_brushes(posterior, given, start), doubts
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:

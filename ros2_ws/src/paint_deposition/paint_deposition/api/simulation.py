@@ -16,9 +16,11 @@ from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.motion.interruptions import interruptions
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import (
     DEFAULT_MAX_POSE_GAP_S,
+    require_motion,
     require_spraying,
     spray_path,
 )
@@ -35,7 +37,8 @@ class GunOnPart:
     """A part, its outward side turned to the gun, and the motion of the gun over it.
 
     Attributes:
-        trajectory: the motion as recorded; path: the same cut into sub-steps; counts: its poses.
+        trajectory: the motion as recorded, with warnings.
+        path: the same cut into sub-steps; counts: its poses.
         geometry: how the gun ran over the part, and what is odd.
     """
 
@@ -103,16 +106,17 @@ def look_at_guns(
     paths = []
     for trajectory, model in zip(trajectories, models, strict=True):
         path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
-        _require_motion(trajectory.source, path, counts, max_pose_gap_s)
+        require_motion(trajectory, path, counts, max_pose_gap_s)
         require_spraying(trajectory, path)
-        paths.append((path, counts))
-    surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p, _ in paths))
+        odd = (*trajectory.warnings, *interruptions(path, max_pose_gap_s))
+        paths.append((replace(trajectory, warnings=odd), path, counts))
+    surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for _, p, _ in paths))
     return [
         GunOnPart(
             surface, trajectory, path, counts,
             spray_geometry(surface, path, model, trajectory.frame_id),
         )
-        for trajectory, model, (path, counts) in zip(trajectories, models, paths, strict=True)
+        for model, (trajectory, path, counts) in zip(models, paths, strict=True)
     ]  # fmt: skip
 
 
@@ -126,25 +130,6 @@ def require_brushes(trajectory: Trajectory, model: DepositionModel) -> None:
         model.require_brushes(trajectory.brushes)
     except ModelError as error:
         raise ModelError(f'{trajectory.source}: {error}') from None
-
-
-def _require_motion(
-    source: str, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
-) -> None:
-    if len(path):
-        return
-    reasons = {
-        'not finite': counts.not_finite,
-        'without a unit quaternion': counts.not_unit_quaternions,
-        'with a repeated stamp': counts.repeated_stamps,
-        'with a backward stamp': counts.backward_stamps,
-        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
-    }
-    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
-    raise RecordingError(
-        f'{source}: no two of its {counts.received} poses make a motion'
-        f'{f" ({found})" if found else ""}; record again, or see --max-pose-gap-s'
-    )
 
 
 def simulate(

@@ -82,13 +82,14 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
+    from paint_deposition.batch.line.times import dated
 
     with Progress('line') as show:
         show('reading')
         cases, file, model, unmatched = line_cases(folder)
         finished, done, workers = _computed(computed, cases, {}, output, show, **where)
         show('pooling')
-        table = finished.table(case.digest for case in cases)
+        table = dated(finished.table(case.digest for case in cases))
         found = Line(folder, model, shared_files(folder, file), table, done, workers, unmatched)
         if not found.runs:
             name, error = found.errors[0]

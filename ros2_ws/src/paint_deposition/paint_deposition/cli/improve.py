@@ -78,7 +78,7 @@ def improve_command(
             pictures=pictures,
         )  # fmt: skip
     options.print_all('note', [*result.surface.notes, *recorded.notes])
-    options.print_all('warning', [*recorded.warnings, *result.warnings])
+    options.print_all('warning', result.warnings)
     options.print_results(files, as_json, _lines(result), model=chosen.words)
 
 

@@ -63,7 +63,9 @@ def _run(
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
         files = options.write_results(result, output, pictures=pictures, **more)
     options.print_all('note', data.understood)
-    if not isinstance(result, pd.SideBySide):
+    if isinstance(result, pd.SideBySide):
+        options.print_all('warning', next(iter(result.by_name.values())).warnings)
+    else:
         for name, found in result.geometry.items():
             options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
         options.print_all('warning', result.warnings)

@@ -147,7 +147,7 @@ def _gun_on_part(
             title = f'{path.name} over {mesh.name}'
             write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
     options.print_all('note', seen.notes)
-    options.print_all('warning', [*recorded.warnings, *seen.geometry.warnings])
+    options.print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
     figures: dict[str, Any] = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
     figures |= {'provenance': origin(model, {'mesh': mesh, 'trajectory': path})}
     lines = [seen.geometry.sentence, seen.geometry.facet_sentence]

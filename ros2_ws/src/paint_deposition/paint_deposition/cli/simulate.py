@@ -102,7 +102,6 @@ def simulate_command(
         files = options.write_results(film, output, made_from=made_from, pictures=pictures)
     options.print_all('note', film.notes)
     options.print_all('note', [readings.understood] if readings else [])
-    options.print_all('warning', [line for gun in guns for line in gun.trajectory.warnings])
     options.print_all('warning', film.warnings)
     words = '; '.join(dict.fromkeys(model.words for model in chosen))
     options.print_results(files, as_json, _lines(film), model=words)

@@ -18,9 +18,11 @@ from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
+from paint_deposition.motion.interruptions import interruptions
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import (
     DEFAULT_MAX_POSE_GAP_S,
+    require_motion,
     require_spraying,
     spray_path,
 )
@@ -106,6 +108,9 @@ class _Entry(_Gun):
         None, description="'comma' or 'point', how the readings' numbers are written"
     )
     sheet: Text | None = Field(None, description="the name of a workbook's sheet")
+    zero: Literal['missing', 'film'] | None = Field(
+        None, description="'missing' or 'film', what a reading of 0 is"
+    )
     switched_off: list[Literal['voltage', 'draught']] = Field(
         [], description="a list of what the cell had switched off, of 'voltage' and 'draught'"
     )
@@ -161,6 +166,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     paths = []
     for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
         path, counts = spray_path(trajectory, entry.max_pose_gap_s)
+        require_motion(trajectory, path, counts, entry.max_pose_gap_s)
         require_spraying(trajectory, path)
         if brush is not None:
             others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
@@ -170,6 +176,8 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
                 )
             path = path.with_(brush=np.full(len(path), brush))
         paths.append(path)
+        for warning in interruptions(path, entry.max_pose_gap_s):
+            remark('warning', name, warning)
         if counts.rejected:
             remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for p in paths))
@@ -180,7 +188,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     points = None if entry.points is None else folder / entry.points
     layout = Layout(
         entry.columns, {kind: length_of(unit) or 1.0 for kind, unit in entry.unit.items()},
-        {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '',
+        {None: '', 'comma': ',', 'point': '.'}[entry.decimal], entry.sheet or '', entry.zero or '',
     )  # fmt: skip
     readings = read_readings(files['measurements'], points, layout, surface)
     off = frozenset(entry.switched_off)

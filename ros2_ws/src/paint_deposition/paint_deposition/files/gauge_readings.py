@@ -20,6 +20,7 @@ from paint_deposition.part.surface import Surface
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0
 MOST_LABELS_SHOWN = 6
+NO_LABEL = 'the point has no label'
 
 
 def read_readings(
@@ -63,11 +64,11 @@ def read_readings(
             table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
     table.refuse_errors()
     notes = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
-    groups, sessions = (np.array(read.texts(name))[row] for name in ('group', 'session'))
+    groups, sessions = (np.array(c)[row] for c in (read.groups, read.texts('session')))
     readings = Readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
-        f'{path.name}: {"; ".join(filter(None, notes))}',
+        f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -98,17 +99,16 @@ class MeasuringPoints:
         """Read a list: point label and x, y, z, or from_left, height."""
         read = ReadingTable.read(path, False, Layout(unit=layout.unit))
         positions, normals, place_words = _places(read, surface)
-        quantity = 'point' if read.has('point') else 'number'
-        if not read.has(quantity):
+        labels = read.labels
+        if labels is None:
             raise read.table.error(
                 'the points have no labels; give a column point, with the labels of the readings'
             )
-        labels = read.texts(quantity)
         first: dict[str, int] = {}
         for row, label in enumerate(labels):
             other = first.setdefault(label, row)
             if not label:
-                read.table.complain(row, 'the point has no label')
+                read.table.complain(row, NO_LABEL)
             elif not np.array_equal(positions[row], positions[other]):
                 same = f"point '{label}' is elsewhere in line {read.table.lines[other]}"
                 read.table.complain(row, f'{same}; keep one')
@@ -123,16 +123,13 @@ class MeasuringPoints:
 
         Rows that name no listed point are complained of in the table of readings.
         """
-        quantity = 'point' if readings.has('point') else 'number'
-        if readings.has(quantity):
-            wanted, by = readings.texts(quantity), f"by '{readings.heading(quantity)}'"
-        else:
-            wanted, by = [str(k) for k in readings.order], 'by the order of the readings'
+        wanted, by = self._wanted_by(readings)
         places = {label: row for row, label in enumerate(self.labels)}
         for row, label in enumerate(wanted):
             if label not in places:
                 known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
-                readings.table.complain(row, f"no point '{label}' in {self.path.name} ({known})")
+                missing = f"no point '{label}' in {self.path.name} ({known})"
+                readings.table.complain(row, missing if label else NO_LABEL)
         rows = [places.get(label, 0) for label in wanted]
         words = f'{self.words}, joined {by}'
         if unmeasured := [label for label in self.labels if label not in set(wanted)]:
@@ -141,6 +138,30 @@ class MeasuringPoints:
             words += f' ({len(unmeasured)} of them without a reading: {named}{more})'
         normals = None if self.normals is None else self.normals[rows]
         return self.positions_m[rows], normals, np.array(wanted), words
+
+    def _wanted_by(self, readings: ReadingTable) -> tuple[list[str], str]:
+        """Labels (N,) of the points that the rows belong to, and by what they are known.
+
+        A gauge's own count of its readings is their order: it knows nothing of a point left out.
+        """
+        labels, by = readings.labels, readings.named_by
+        orders = [([str(k) for k in order], count) for order, count in readings.orders]
+        again = by == ('number',) and len({*(labels or ())}) < len(readings)
+        if again and len({*readings.texts('block')}) > 1:
+            raise readings.table.error(
+                f"'{readings.heading('number')}' counts anew in each block; give a column 'point' "
+                'with the labels of the points'
+            )
+        if labels is not None and (by != ('number',) or labels != orders[0][0]):
+            return labels, f"by '{' '.join(map(readings.heading, by))}'"
+        for wanted, count in orders:
+            if count == len(self.labels):
+                return wanted, 'by the order of the readings'
+        raise readings.table.error(
+            f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
+            f'{self.path.name}: which is missing is not known; write n/a in its place, or give a '
+            "column 'point' with the labels of the points"
+        )
 
 
 def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:
@@ -168,12 +189,17 @@ def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:
 
 
 def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
-    lines = read.table.lines
-    if read.has('point'):
-        labels = zip(read.texts('point'), lines, strict=True)
-        return np.array([label or f'line {line}' for label, line in labels])
+    """What the file calls the points, else the line of the first reading at each place."""
+    names = [f'line {line}' for line in read.table.lines]
     _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
-    return np.array([f'line {lines[row]}' for row in first[place.ravel()]])
+    given = read.labels
+    if given is not None and read.named_by == ('number',):
+        # A gauge counts the readings at one place, a list of points does not.
+        one_each = len({*given}) == len(first) == len({*zip(given, place.ravel(), strict=True)})
+        given = given if one_each else None
+    if given is None:
+        return np.array(names)[first[place.ravel()]]
+    return np.array([label or name for label, name in zip(given, names, strict=True)])
 
 
 def _places(

@@ -14,6 +14,7 @@ from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import write_text
+from paint_deposition.files.effect_source import file_name, needs_file, source_of
 from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
@@ -98,7 +99,8 @@ def write_model(
     """Write a model with what each number means; an older file is replaced at once.
 
     Reading the file gives exactly this model. Files of users' own effects are named relative to
-    it; ``header_comment`` stands at the top, the rest is as in ``ModelFile``.
+    it; classes without a file get one beside it. ``header_comment`` stands at the top, the rest is
+    as in ``ModelFile``.
     """
     path = Path(path)
     extras = {
@@ -106,6 +108,8 @@ def write_model(
         'posterior': posterior.model_dump(exclude_defaults=True) if posterior else {},
         'history': list(history or ()),
     }
+    for own in filter(needs_file, map(type, model.effects)):
+        write_text(path.with_name(file_name(own)), source_of(own).decode())
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 

@@ -13,6 +13,7 @@ from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.files.effect_source import file_name, needs_file
 from paint_deposition.files.json_files import plain
 from paint_deposition.model.brush import Brush, SetPoints
 
@@ -88,8 +89,10 @@ def _effect(effect: Effect, folder: Path) -> CommentedMap:
         about = f'{effect.over} [{effect.unit}]'
         text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
         return text
-    source = 'id' if effect.file is None else 'file'
-    name = effect.id if effect.file is None else _relative(effect.file, folder)
+    source = 'file' if effect.file or needs_file(type(effect)) else 'id'
+    name = effect.id if source == 'id' else file_name(type(effect))
+    if effect.file:
+        name = _relative(effect.file, folder)
     text = _fields(effect, **{source: name})
     text.yaml_add_eol_comment(effect.family, source, COMMENT_COLUMN)
     return text

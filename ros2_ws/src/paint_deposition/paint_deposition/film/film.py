@@ -103,7 +103,7 @@ class Film:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is odd in the geometry, each with its likely cause."""
+        """What is odd in recordings and geometry, each with its likely cause."""
         spraying_s = sum(gun.path.spraying_time_s for gun in self.guns)
         bare = (
             f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
@@ -111,7 +111,8 @@ class Film:
         )
         odd = self._of_each(lambda gun: gun.geometry.warnings)
         odd = odd or ((bare,) if self.statistics.coverage == 0.0 else ())
-        return (*odd, *self._of_each(lambda gun: impossible_brushes(gun.model)))
+        recorded = self._of_each(lambda gun: gun.trajectory.warnings)
+        return (*recorded, *odd, *self._of_each(lambda gun: impossible_brushes(gun.model)))
 
     def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(

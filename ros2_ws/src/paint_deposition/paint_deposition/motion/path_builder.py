@@ -195,6 +195,34 @@ def spray_path(
     return builder.take(finish=True), builder.counts
 
 
+def require_motion(
+    trajectory: Trajectory, path: SprayPath, counts: PoseCounts, max_pose_gap_s: float
+) -> None:
+    """Refuse a recording without a single sub-step, with what became of its poses."""
+    if len(path):
+        return
+    reasons = {
+        'not finite': counts.not_finite,
+        'without a unit quaternion': counts.not_unit_quaternions,
+        'with a repeated stamp': counts.repeated_stamps,
+        'with a backward stamp': counts.backward_stamps,
+        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
+    }
+    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
+    remedy = 'record again, or see --max-pose-gap-s'
+    if counts.gaps:
+        apart_s = 1e-9 * float(np.median(np.abs(np.diff(trajectory.stamps_ns))))
+        if apart_s <= 1e3 * max_pose_gap_s:
+            remedy = (
+                f'they are {apart_s:.3g} s apart: if these are milliseconds, give the unit in the '
+                f'heading, as in time [ms]; else {remedy}'
+            )
+    raise RecordingError(
+        f'{trajectory.source}: no two of its {counts.received} poses make a motion'
+        f'{f" ({found})" if found else ""}; {remedy}'
+    )
+
+
 def require_spraying(trajectory: Trajectory, path: SprayPath) -> None:
     """Refuse a motion, with at least one sub-step, along which the gun never sprays."""
     if np.any(path.flow > 0.0):

@@ -277,7 +277,9 @@ def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:
     since = np.maximum(times_s[:, np.newaxis] - began, 0.0)
     since -= since.mean(axis=0)
     left = values - values.mean()
-    return left @ left - (left @ since) ** 2 / np.sum(since**2, axis=0)
+    squares = np.sum(since**2, axis=0)
+    # No drift is told among parts of one time.
+    return left @ left - (left @ since) ** 2 / np.where(squares > 0.0, squares, 1.0)
 
 
 def _as_drift(series: Series, times_s: np.ndarray, errors: np.ndarray) -> Change:

@@ -63,7 +63,13 @@ def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> lis
     motion = read_motion(run.path, file)
     seen = look_at(surface, motion, model, max_pose_gap_s=file.max_pose_gap_s)
     stamp_s = 1e-9 * float(motion.stamps_ns[0])
-    time_s = stamp_s if stamp_s > EARLIEST_S else _date(run)
+    named_s = _date(run.name)
+    time_s = stamp_s if stamp_s > EARLIEST_S else named_s
+    if time_s is None:
+        raise ManyError(
+            f'{run.path}: the time of painting is unknown; put the date into its name, '
+            'such as 2026-11-12_0730, or record with the time of day'
+        )
     unused = run.remark
     rows: list[dict[str, Any]] = []
     if run.readings is not None:
@@ -74,24 +80,21 @@ def _rows(run: Run, file: LineFile, folder: Path, model: DepositionModel) -> lis
             rows = list(_measured(experiment, model))
         except PaintError as error:
             unused = str(error).removeprefix(f'{folder}/')
-    remarks = [line.removeprefix(f'{run.path}: ') for line in motion.warnings]
+    remarks = [line.removeprefix(f'{run.path}: ') for line in seen.trajectory.warnings]
     remarks += [*seen.geometry.warnings, *([f'simulated only: {unused}'] if unused else [])]
-    known = {'part': run.name, 'time_s': time_s, 'remark': '; '.join(remarks)}
+    known = {'part': run.name, 'time_s': time_s, 'named_s': named_s, 'remark': '; '.join(remarks)}
     known |= _film(seen.surface, seen.path, model)
     return [known | row for row in rows or [{}]]
 
 
-def _date(run: Run) -> float:
-    """Seconds since 1970 of the first date in the name of a run."""
-    if found := DATE.search(run.name):
+def _date(name: str) -> float | None:
+    """Seconds since 1970 of the first date in the name of a run, None for none."""
+    if found := DATE.search(name):
         with suppress(ValueError):
             year, month, day, hour, minute, second = (int(part or 0) for part in found.groups())
             there = datetime(year, month, day, hour, minute, second, tzinfo=timezone.utc)
             return there.timestamp()
-    raise ManyError(
-        f'{run.path}: the time of painting is unknown; put the date into its name, '
-        'such as 2026-11-12_0730, or record with the time of day'
-    )
+    return None
 
 
 @lru_cache(maxsize=4)

@@ -57,6 +57,12 @@ def length_of(text: str) -> float | None:
     return LENGTHS.get(_small(text).strip(' .[]()'))
 
 
+def unit_of(text: str) -> str:
+    """A known unit that stands alone, '' for another text."""
+    text = _small(text).strip(' .[]()')
+    return text if text in UNITS else ''
+
+
 def _small(text: str) -> str:
     text = unicodedata.normalize('NFKD', unicodedata.normalize('NFKC', text).casefold())
     return ''.join(letter for letter in text if not unicodedata.combining(letter))

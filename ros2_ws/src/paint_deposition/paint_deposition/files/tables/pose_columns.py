@@ -10,7 +10,13 @@ import numpy as np
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.headings import TIMES, Heading
 from paint_deposition.files.tables.sheets import text_of
-from paint_deposition.files.tables.table import Table, find_table, headings_in, is_comment
+from paint_deposition.files.tables.table import (
+    Table,
+    find_table,
+    headings_in,
+    is_comment,
+    with_units_below,
+)
 
 # No run is longer: the unit is another one.
 LONGEST_RUN_S = 1e6
@@ -46,12 +52,18 @@ class PoseTable(Table):
             )
         headings = headings_in(sheet.rows[header])
         names = [column_name(heading) for heading in headings]
-        below = range(header + 1, len(sheet.rows))
+        below = [k for k in range(header + 1, len(sheet.rows)) if not is_comment(sheet.rows[k])]
+        if below and (known := with_units_below(headings, sheet.rows[below[0]])):
+            headings, below = known, below[1:]
         table = PoseTable(
             path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
-        ).select([k for k in below if not is_comment(sheet.rows[k])])
+        ).select(below)
         if not len(table):
             raise table.error('no poses below the row of headings')
+        for k, row in enumerate(table.rows):
+            if any(cell != '' for cell in row[len(headings) :]):
+                table.complain(k, f'{len(row)} values under {len(headings)} column names')
+        table.refuse_errors()
         if not sheet.form.startswith('commas'):
             table, _ = table.with_decimal(range(len(headings)))
         return table
@@ -88,6 +100,10 @@ class PoseTable(Table):
         if (unit or 's') not in TIMES:
             raise RecordingError(f"{written}: '{unit}' is no unit of time")
         scale = TIMES[unit or 's']
+        if clock := next((text for text in self.texts(column) if ':' in text), ''):
+            raise RecordingError(
+                f"{written} has the time of day '{clock}'; give seconds, as time_s"
+            )
         times = self.values([column])[:, 0]
         if not np.isfinite(times).all():
             raise RecordingError(f'{written} has a time that is not finite')

@@ -9,12 +9,13 @@ from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.tables.headings import LENGTHS, SPEEDS
 from paint_deposition.files.tables.pose_columns import POSITION, PoseTable
 from paint_deposition.files.tables.rotations import read_rotations
+from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
-SUFFIXES = ('.csv', '.tsv', '.txt')
+SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
 # No cell is larger: the unit is another one.
 LARGEST_CELL_M = 50.0
 # Names of columns, as `column_name` leaves them. The letter t is also an angle of Kawasaki's.
@@ -125,7 +126,7 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
-        return None, 'no trigger, the gun sprays throughout'
+        return None, f'no trigger, the gun sprays throughout{_could_be_trigger(table)}'
     if flow is not None and table.units([flow]) != {''}:
         raise RecordingError(
             f'{table.written([flow])}: the flow is relative to the calibrated one, 1 for the '
@@ -137,6 +138,17 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     relative = values[:, -1] if flow is not None else np.full(len(on), np.nan)
     flows = [relative_flow(bool(a), float(b)) for a, b in zip(on, relative, strict=True)]
     return np.array(flows), f'gun by {table.written(used)}'
+
+
+def _could_be_trigger(table: PoseTable) -> str:
+    """Columns that say on and off, as a remark on what is not used; '' for none."""
+    columns = []
+    for column, heading in enumerate(table.headings):
+        seen = {text.lower() for text in table.texts(column)}
+        if len(seen) > 1 and seen <= {'0', '1', *SWITCHED}:
+            columns.append(heading.text)
+    named = ', '.join(filter(None, columns))
+    return f' ({named} could be one, --trigger NAME)' if named else ''
 
 
 def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:

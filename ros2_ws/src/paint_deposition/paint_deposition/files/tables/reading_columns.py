@@ -11,7 +11,7 @@ from typing import Any
 from paint_deposition.errors import did_you_mean
 from paint_deposition.files.tables.headings import Heading
 from paint_deposition.files.tables.sheets import Sheet
-from paint_deposition.files.tables.table import headings_in, shown
+from paint_deposition.files.tables.table import headings_in, shown, widest
 
 # Columns of our own; where those of a reading are all there, no other name is looked at.
 OWN = {
@@ -37,7 +37,10 @@ ALIASES = {
         'messstelle', 'stelle',
     ),
     'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
+    'row': ('row', 'zeile', 'reihe'),
+    'column': ('column', 'col', 'spalte'),
     'group': ('group', 'gruppe'),
+    'block': ('block', 'block no', 'block nr'),
     'unit': ('unit', 'units', 'einheit'),
 }  # fmt: skip
 QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
@@ -54,6 +57,7 @@ class Layout:
     unit: Mapping[Any, float] = field(default_factory=dict)
     decimal: str = ''  # '.' or ','
     sheet: str = ''  # name of a workbook's sheet
+    zero: str = ''  # 'missing' or 'film', what a reading of 0 is; '' where not known
 
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
@@ -99,7 +103,7 @@ def not_found(sheet: Sheet, films: bool, layout: Layout) -> str:
     """Why a file has no such table, and what to do."""
     if not sheet.rows:
         return 'there is nothing to read in it; give a table with a heading over each column'
-    headings = headings_in(sheet.rows[0])
+    headings = headings_in(widest(sheet))
     texts = [heading.text for heading in headings]
     named = {q: name for q, name in layout.columns.items() if isinstance(name, str)}
     for quantity, name in ((q, name) for q, name in named.items() if name not in texts):

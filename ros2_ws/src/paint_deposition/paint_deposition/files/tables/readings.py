@@ -1,6 +1,7 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
 import re
+from bisect import bisect
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,8 +19,9 @@ from paint_deposition.files.tables.table import Table, is_nothing, is_value
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
 STATISTIC = re.compile(
-    r'(mean|average|avg|mittel\w*|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
-    r'lowest|highest|coefficient|vari\w*|statist\w*|number of|count|anzahl|sum|total|n|s|x)\b'
+    r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
+    r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
+    r'anzahl|sum|total|n|s|x)\b'
 )
 
 
@@ -31,7 +33,9 @@ class ReadingTable:
     # Columns of each quantity; several of the thickness where each row holds repeats.
     at: dict[str, list[int]]
     layout: Layout
-    order: list[int]  # number of each row from 1, those without a reading counted
+    # Number of each row from 1, those without a reading counted, and of all of them; then the same
+    # with blank rows counted, too.
+    orders: tuple[tuple[list[int], int], ...]
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
     left_out: str  # what was not taken for a row, for the user
@@ -45,36 +49,53 @@ class ReadingTable:
         A row with one of ``labels``, those of the listed points, is no statistic. Raises
         ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
-        numbered = bool(layout.columns) and all(type(n) is int for n in layout.columns.values())
+        numbers = [n for n in layout.columns.values() if isinstance(n, int)]
+        numbered = 0 < len(numbers) == len(layout.columns)
 
         def known(headings: list[Heading]) -> int:
             at = known_columns.columns_of(headings, layout)
             return len(at) if ('thickness' in at if films else known_columns.has_place(at)) else 0
 
-        sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet)
+        sheet, header = cells_of.find_table(
+            path,
+            ReadingsError,
+            known,
+            layout.sheet,
+            max(numbers) if numbered else 0,
+        )
         first = 0 if numbered or header is None else header + 1
         headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
+        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
+        if rows and 'unit' not in known_columns.columns_of(headings, layout):
+            below = cells_of.with_units_below(headings, sheet.rows[rows[0]])
+            headings, rows = (below, rows[1:]) if below else (headings, rows)
         at = known_columns.columns_of(headings, layout)
         if header is None and not (numbered and known(headings)):
             raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')
-        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
         _refuse_rivals(table, at)
+        _refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
+        if numbered and layout.decimal != '.':
+            _refuse_cut_numbers(table)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
         table, doubt = table.with_decimal(numeric, layout.decimal)
         if doubt:
             raise table.error(doubt)
-        kept, order, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
+        if films and layout.zero == 'missing':
+            table = table.without_zeros(at['thickness'])
+        kept, missing, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
+        begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
+        orders = _orders(table.lines, kept, missing, begin)
         table = table.select(kept)
         return ReadingTable(
-            table, at, layout, order, _unit_beside(table, at, sheet, header or 0), left_out
+            table, at, layout, orders, _unit_beside(table, at, sheet, header or 0), left_out
         )
 
     def __len__(self) -> int:
@@ -91,6 +112,29 @@ class ReadingTable:
     def heading(self, quantity: str) -> str:
         """What stands over the column; the quantity's own name where there is none."""
         return self.table.headings[self.at[quantity][0]].text if self.has(quantity) else quantity
+
+    @property
+    def labels(self) -> list[str] | None:
+        """What the file calls the points of the rows, None where it names none."""
+        by = self.named_by
+        if len(by) < 2:
+            return self.texts(by[0]) if by else None
+        pairs = zip(*(self.texts(quantity) for quantity in by), strict=True)
+        names = [self.heading(quantity) for quantity in by]
+        return [' '.join(f'{n} {text}' for n, text in zip(names, p, strict=True)) for p in pairs]
+
+    @property
+    def named_by(self) -> tuple[str, ...]:
+        """The quantities that name a point."""
+        ways = (('point',), ('row', 'column'), ('number',))
+        return next((way for way in ways if self.has(*way)), ())
+
+    @property
+    def groups(self) -> list[str]:
+        """The group of each row, else its column where points are named by row and column."""
+        if self.has('group') or not self.has('row', 'column'):
+            return self.texts('group')
+        return [f'{self.heading("column")} {text}' for text in self.texts('column')]
 
     def numbers(self, quantity: str, may_be_empty: bool = False) -> np.ndarray:
         """A column (N,) of numbers as written."""
@@ -150,6 +194,34 @@ def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
             )
 
 
+def _refuse_merged(table: Table, films: list[int]) -> None:
+    """Refuse numbers without a heading right of the thickness's: it is merged over them."""
+    for column in range(max(films, default=len(table.headings)) + 1, len(table.headings)):
+        if table.headings[column].text:
+            return
+        for row, line in zip(table.rows, table.lines, strict=True):
+            if column < len(row) and is_value(row[column]):
+                raise table.error(
+                    f"'{table.headings[films[-1]].text}' stands over several columns or is a "
+                    f"title: '{text_of(row[column])}' beside it in line {line} has no heading; "
+                    'give each column one, or say columns: {thickness: ...} in the campaign'
+                )
+
+
+def _refuse_cut_numbers(table: Table) -> None:
+    """Refuse lines without headings that may be two numbers, or one with a decimal comma."""
+    cells = [text_of(cell) for row in table.rows for cell in row]
+    if (
+        table.form.startswith('commas')
+        and len(cells) == 2 * len(table)
+        and all(map(str.isdigit, cells))
+    ):
+        raise table.error(
+            f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
+            'decimal comma; say decimal: point if it is two, else put a heading over the column'
+        )
+
+
 def _unit_beside(
     table: Table, at: dict[str, list[int]], sheet: Sheet, header: int
 ) -> float | None:
@@ -171,24 +243,26 @@ def _unit_beside(
 def _rows_of_readings(
     table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
 ) -> tuple[list[int], list[int], str]:
-    """Rows that are readings or points, their numbers, and in words what else there is.
+    """Rows that are readings or points, rows without a reading, and in words what else there is.
 
     A row with a place is one, whatever its label. One without a place, or in a table without
     places, is a statistic if it begins with the name of one and not with the label of a listed
-    point. A missing reading keeps its number.
+    point.
     """
     kept: list[int] = []
-    order: list[int] = []
+    unread: list[int] = []
+    nowhere: list[int] = []  # the last rows, if they have neither place nor label
     count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
     width = len(table.headings)
     places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
-    (label,) = at.get('point') or at.get('number') or [-1]
+    both = 'point' not in at and {'row', 'column'} <= {*at}
+    (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
     for k, row in enumerate(table.rows):
         cells = [*row, *[''] * (width - len(row))]
         values = [cells[c] for c in at['thickness']] if films else []
         placed = any(is_value(cells[c]) for c in places)
         begins = next(text_of(cell) for cell in cells if cell != '')
-        listed = label >= 0 and text_of(cells[label]) in labels
+        listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''
         missing = bool(values) and all(map(is_nothing, values))
         named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
         if named and not placed and not listed:
@@ -197,12 +271,30 @@ def _rows_of_readings(
             # A remark has no reading either, but no other number and no n/a in its place.
             missing &= any(values) or any(map(is_value, cells))
             count['without a reading' if missing else 'of other text'] += 1
+            unread += [k] * missing
         elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
             table.complain(k, f'{len(row)} values under {width} column names')
         elif missing:
             count['without a reading'] += 1
+            unread.append(k)
         else:
             kept.append(k)
-            order.append(len(kept) + count['without a reading'])
+            homeless = not placed and (places or label >= 0) and cells[label] == ''
+            nowhere = [*nowhere, k] if homeless else []
+    # Apart from the table, a block of numbers without places or labels is its statistics.
+    if nowhere and nowhere[0] and table.lines[nowhere[0]] > table.lines[nowhere[0] - 1] + 1:
+        kept = kept[: -len(nowhere)]
+        count['of statistics'] += len(nowhere)
     parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
-    return kept, order, f'left out: {", ".join(parts)}' if parts else ''
+    return kept, unread, f'left out: {", ".join(parts)}' if parts else ''
+
+
+def _orders(
+    lines: list[int], kept: list[int], unread: list[int], begin: int
+) -> tuple[tuple[list[int], int], ...]:
+    """Numbers of the kept rows from 1 and the number of all, without and with blank rows."""
+    rows, end = sorted([*kept, *unread]), lines[max(kept)] + 1
+    blank = sorted({*range(begin, end)} - {*lines})
+    without = [bisect(rows, k) for k in kept]
+    with_blank = [n + bisect(blank, lines[k]) for n, k in zip(without, kept, strict=True)]
+    return (without, len(rows)), (with_blank, len(rows) + len(blank))

@@ -1,7 +1,7 @@
 """A table in a file: headings, the rows under them, and their numbers."""
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TypeVar
@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.tables.headings import Heading
+from paint_deposition.files.tables.headings import Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
 # A heading further down than this is none.
@@ -20,9 +20,14 @@ NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:i
 # With one mark only, three digits behind it may be thousands.
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 # Cells with which a gauge says that it has no reading.
-NOTHING = re.compile(r'[-–—.*]*|n\.?/?a\.?|#n/a|none|null', re.IGNORECASE)
+NOTHING = re.compile(
+    r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
+)
 Kind = TypeVar('Kind', bound='Table')
-SWITCHED = {'true': 1.0, 'on': 1.0, 'yes': 1.0, 'false': 0.0, 'off': 0.0, 'no': 0.0}
+SWITCHED = {
+    **dict.fromkeys(('true', 'on', 'yes', 'wahr', 'ein', 'an', 'ja'), 1.0),
+    **dict.fromkeys(('false', 'off', 'no', 'falsch', 'aus', 'nein'), 0.0),
+}
 
 
 @dataclass
@@ -69,6 +74,7 @@ class Table:
             if value is None:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
+                wanted += ', or n/a where there is none' if may_be_empty else ''
                 self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
                 self.complain(index, f'{name} is {cell}; expected a finite number')
@@ -112,6 +118,14 @@ class Table:
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
 
+    def without_zeros(self: Kind, columns: Collection[int]) -> Kind:
+        """The table with a missing reading in place of each zero of these columns."""
+        rows = [
+            ['n/a' if k in columns and self._number(c) == 0.0 else c for k, c in enumerate(row)]
+            for row in self.rows
+        ]
+        return replace(self, rows=rows)
+
     def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
 
@@ -141,12 +155,17 @@ class Table:
 
 
 def find_table(
-    path: Path, refusal: type[PaintError], known: Callable[[list[Heading]], int], sheet: str = ''
+    path: Path,
+    refusal: type[PaintError],
+    known: Callable[[list[Heading]], int],
+    sheet: str = '',
+    columns: int = 0,
 ) -> tuple[Sheet, int | None]:
     """The sheet with a table, and the row of its headings; None where none is found.
 
     ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
-    ``sheet`` names a workbook's sheet. Raises ``refusal`` for a file that cannot be read, or with
+    ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
+    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
     tables in several sheets.
     """
     sheets = read_sheets(path, refusal)
@@ -169,12 +188,30 @@ def find_table(
     wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
     if found:
         return (wide or found[-1:])[0]
-    return max(sheets, key=lambda s: len(s.rows[0]) if s.rows else 0), None
+    wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
+    if columns and wide_enough:
+        return wide_enough[0], None
+    return max(sheets, key=lambda s: len(widest(s))), None
+
+
+def widest(sheet: Sheet) -> list[Cell]:
+    """The cells of the first row of a sheet with the most of them that are not blank."""
+    above = ([cell for cell in row if cell != ''] for row in sheet.rows[:MOST_LINES_ABOVE])
+    return max(above, key=len, default=[])
 
 
 def headings_in(row: list[Cell]) -> list[Heading]:
     """The cells of a row as headings."""
     return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
+
+
+def with_units_below(headings: list[Heading], row: list[Cell]) -> list[Heading] | None:
+    """The headings with the units that a row below them holds, None where it is no such row."""
+    units = [unit_of(text_of(cell)) for cell in row]
+    if not any(units) or any(map(is_value, row)):
+        return None
+    pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
+    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs]
 
 
 def shown(headings: Sequence[Heading]) -> str:

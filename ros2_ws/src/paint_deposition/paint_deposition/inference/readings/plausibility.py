@@ -25,6 +25,7 @@ NEGATIVE_SIGMAS = 4.0
 NO_STRUCTURE_P = 1e-3
 # A point lies beside a pass from this share of the panel's scale on.
 BESIDE = 0.05
+MOST_NAMED = 6
 
 
 def check_enough(points: int) -> None:
@@ -140,12 +141,31 @@ def geometry_by_experiment(campaign: Campaign, model: DepositionModel) -> dict[s
     }
 
 
-def require_paint(campaign: Campaign, model: DepositionModel) -> None:
+def zeros_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
+    """A warning of zeros where film (N,) [um] is expected; '' for none."""
+    rows = (readings.thickness_um == 0.0) & (expected_um > THINNEST_FILM_UM)
+    if readings.zero_is_film or not rows.any():
+        return ''
+    points = list(dict.fromkeys(readings.point[rows].tolist()))
+    named = ', '.join(points[:MOST_NAMED]) + (', ...' if len(points) > MOST_NAMED else '')
+    low, high = expected_um[rows].min(), expected_um[rows].max()
+    return (
+        f'{np.count_nonzero(rows)} of {len(readings)} readings are 0 where the model expects '
+        f'{low:.0f} to {high:.0f} µm (points {named}), and count as bare; gauges write 0 for '
+        'what was not measured, too: say zero: missing, or zero: film if they are right'
+    )
+
+
+def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]:
     """Refuse an experiment in which no paint lands at any measured point.
 
     Args:
         model: its pattern and projection count, its effects do not.
+
+    Returns:
+        Warnings of readings that say otherwise, see ``zeros_in_doubt``.
     """
+    doubts = []
     plain = model.model_copy(update={'effects': ()})
     for one in campaign.experiments:
         try:
@@ -155,6 +175,8 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> None:
         painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
+            doubt = zeros_in_doubt(one.readings, painted.raw_um[one.means.owner])
+            doubts += [f'{one.name}: {doubt}'] * bool(doubt)
             continue
         cause = 'the gun never sprays'
         if np.any(one.path.flow > 0.0):
@@ -163,3 +185,4 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> None:
         raise ReadingsError(
             f"experiment '{one.name}': no paint lands where it was measured: {cause}"
         )
+    return tuple(doubts)

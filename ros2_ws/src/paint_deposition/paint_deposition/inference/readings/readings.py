@@ -25,6 +25,7 @@ class Readings:
         source: the file they came from, for messages.
         session: (N,) labels of the gauge session; '' where none.
         understood: how their file was read, in one line for the user; '' for none.
+        zero_is_film: whether the user says that a reading of 0 is one.
     """
 
     positions_m: np.ndarray
@@ -36,6 +37,7 @@ class Readings:
     source: str = 'readings'
     session: np.ndarray = field(default_factory=lambda: np.array(''))
     understood: str = ''
+    zero_is_film: bool = False
 
     def __post_init__(self) -> None:
         sessions = np.broadcast_to(self.session, len(self.thickness_um))
