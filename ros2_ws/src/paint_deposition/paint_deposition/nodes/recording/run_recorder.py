@@ -211,10 +211,10 @@ class RunRecorder(ManagedNode):
         return self.run.complete, self.summary()
 
     def _deactivate(self) -> None:
+        for topic in self._topics.values():
+            topic.unsubscribe()
         if self._error is not None:
             return
-        for topic in self._topics.values():
-            topic.drain()
         self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
         never = [name for name in self._wanted if name not in self._topics]
