@@ -38,7 +38,7 @@ class AdaptiveSubscription:
     replaced, counts once.
 
     Args:
-        take: called with each message by `take_pending`.
+        take: called by `take_pending` with each message and the time at which it was sent [ns].
         depth: of the queue.
 
     Attributes:
@@ -50,7 +50,7 @@ class AdaptiveSubscription:
         node: PaintNode,
         message: type,
         topic: str,
-        take: Callable[[Any], None],
+        take: Callable[[Any, int], None],
         *,
         depth: int,
         latched: bool = False,
@@ -115,4 +115,4 @@ class AdaptiveSubscription:
             return
         if self._latched and identity[0]:
             self._taken.append(identity)
-        self._take(message)
+        self._take(message, identity[0])

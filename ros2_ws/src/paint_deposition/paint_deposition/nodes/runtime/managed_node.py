@@ -29,9 +29,9 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     `configure` reads its files and creates its topics and services; `activate` starts its work.
     The reverse transition destroys the publishers, timers and so on that a transition created,
-    and `cleanup` those, too, that callbacks created since `configure`: a callback that creates one
-    for the time of activity destroys it in `_deactivate`. A PaintError leaves the state as it was; any other error leads to `unconfigured`. Either is
-    logged in one line.
+    and `cleanup` also those that callbacks created since `configure`: a callback that creates one
+    for the time of activity destroys it in `_deactivate`. A PaintError leaves the state as it
+    was; any other error leads to `unconfigured`. Either is logged in one line.
     """
 
     PARAMETERS: ParameterTable = MANAGED
