@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.brush import Brush
@@ -296,3 +298,31 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     assert list(node.values['part_pose']) == pose
     film, expected = painted(node, len(MOTION)), offline_um(node, MOTION)
     assert np.abs(film - expected).max() <= 1e-6 * expected.max()
+
+
+def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
+    simulator, robot, painted, asked, record, wider, wait_until, tmp_path
+):
+    """Two states are sent early, and half the poses before the part is announced."""
+    node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
+    recorder = record(output_directory=str(tmp_path / 'films'), name='before')
+    source = robot(node, recorder)
+    half = len(WITHOUT_TRIGGER) // 2
+    stamps = WITHOUT_TRIGGER.stamps_ns
+    for row, flow in ((0, 1.0), (half + 50, 0.0), (half + 90, 0.5)):
+        source.send_state(stamps[row], flow)
+    source.send(WITHOUT_TRIGGER, slice(0, half))
+    film, points, surface = painted(node, half), node.points, node.surface
+    future = asked(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(WITHOUT_TRIGGER, slice(half, None), frame_id='cell')
+    wait_until(future.done, what='the change')
+    second = painted(node, len(WITHOUT_TRIGGER) - half)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == half, what='the run')
+    recorder.close()
+    before = SimpleNamespace(points=points, surface=surface)
+    for run, live, of in (('before', film, before), ('1', second, node)):
+        motion = read_recording(tmp_path / 'films' / run, state_topic='/atomizer/state')
+        assert len(motion) == half
+        assert np.array_equal(offline_um(of, motion), live)
+    assert second.max() > 1.0

@@ -77,3 +77,17 @@ def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, pai
     wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
     (pose_input,) = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
     assert pose_input.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(
+    simulator, ros_context, spin, onlooker, wait_until, capfd
+):
+    """Neither side reports, at the start, that the other does not fit."""
+    source = Robot(ros_context, reliable=False)
+    spin(source)
+    node, viewer = simulator(), onlooker()
+    wait_until(lambda: source.is_subscribed_by(node))
+    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
+    said = capfd.readouterr().err
+    assert 'ready' in said
+    assert not {'[WARN]', '[ERROR]'} & set(said.split())

@@ -65,13 +65,23 @@ class RecordedTopic:
 
     def subscribe(self, profile: QoSProfile) -> None:
         """Subscribe with this quality of service, instead of the one before if any."""
-        if self._subscription:
-            self.drain()
-            self._node.destroy_subscription(self._subscription)
+        self._end()
         self.profile = profile
         self._subscription = self._node.create_subscription(
             self._message_class, self.name, self._on_message, profile, raw=True
         )
+
+    def unsubscribe(self) -> None:
+        """Take what is in the queue; what is sent until the next subscription is not missed."""
+        self._end()
+        self.profile = None
+        self._sequence.clear()
+
+    def _end(self) -> None:
+        if self._subscription is not None:
+            self.drain()
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None
 
     def drain(self) -> None:
         """Take all messages in the queue, without the executor."""
