@@ -18,7 +18,7 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.nodes.recording.initial_messages import InitialMessages
-from paint_deposition.nodes.recording.recorded_topic import RecordedTopic, bag_qos
+from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
     PART_POSE,
     POSES,
@@ -86,6 +86,7 @@ class RunRecorder(ManagedNode):
         name = _unused_name(self._folder, name) if self.runs else name
         self.run = self._create_run(name, self._custom_data)
         self.runs += 1
+        self._begun_ns = time.time_ns()
         self._part_run = ''
         self._topics: dict[str, RecordedTopic] = {}
         self._refused: set[str] = set()
@@ -136,7 +137,7 @@ class RunRecorder(ManagedNode):
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
             offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns)
+            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
         if topic.profile is None or incompatible_policies(profile, topic.profile):
@@ -227,6 +228,8 @@ class RunRecorder(ManagedNode):
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
+        unheard = [f'{topic.unheard} of {topic.name}' for topic in topics if topic.unheard]
+        lost += f', {" and ".join(unheard)} {UNHEARD}' if unheard else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
