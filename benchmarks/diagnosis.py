@@ -43,6 +43,8 @@ WORLDS = {
 PAINTED = ROOT / 'runs' / 'bench-diagnosis'
 # Constants of the diagnosis that have another value in this run, for its processes.
 CONSTANTS = 'PAINT_BENCH_CONSTANTS'
+# A reading this many times as far off as usual has a typing error; eight standard deviations.
+TYPING_ERROR = 12.0
 # Shares of the kinds of campaigns.
 SHARES = {'clean': 0.25, 'effect': 0.4, 'pair': 0.15, 'unknown': 0.1, 'footprint': 0.1}
 
@@ -141,7 +143,8 @@ def judged(painted: Painted) -> dict:
 def unseen_error(painted: Painted, campaign: Campaign, unseen: Campaign, model) -> float:
     """Error of fresh readings at unseen points over their noise; 1 where only noise is left.
 
-    The level of each part and the zero of its gauge are those that its readings show.
+    The level of each part and the zero of its gauge are those that its readings show, but for
+    typing errors.
     """
     read_um, there_um = (Forward(c).predict_um(model) for c in (campaign, unseen))
     squares, noise = [], []
@@ -151,6 +154,9 @@ def unseen_error(painted: Painted, campaign: Campaign, unseen: Campaign, model) 
         sigma = float(np.median(part.unseen_sigma_um))
         columns = np.column_stack([painted.level * predicted, np.full(own.sum(), painted.zero_um)])
         rest = campaign.means.mean_um[own] - predicted
+        away = np.abs(rest - np.median(rest))
+        sound = away <= TYPING_ERROR * np.median(away)
+        rest, columns = rest[sound], columns[sound]
         inner = sigma**2 * np.eye(2) + columns.T @ columns
         level, zero = np.linalg.solve(inner, columns.T @ rest)
         shown = there * (1.0 + painted.level * level) + painted.zero_um * zero

@@ -6,6 +6,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.remainder import Footprints, Remainder
@@ -96,8 +97,15 @@ def no_remainder(count: int) -> Remainder:
     none = np.zeros((count, count))
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
-    footprint = Footprints(3 * (none[:, :1],), 3 * (none[:1, :1],), none[0, :1], none[0, :1])
+    laws = 3 * (footprint_law(none[:1, :1]),)
+    footprint = Footprints(3 * (none[:, :1],), laws, none[0, :1], none[0, :1])
     return Remainder(MODEL, footprint, none, fields, fields, False, lengths_m, one_setting)
+
+
+def footprint_law(at_knots: np.ndarray) -> RandomLaw:
+    """A deviation of a footprint that shows in no reading, by its values (K, n) at knots."""
+    none = np.empty((0, len(at_knots)))
+    return RandomLaw(Basis(LearnedFootprint, {}, none, none.T, 1.0), at_knots)
 
 
 def prior_covariance(fit: Fit) -> np.ndarray:

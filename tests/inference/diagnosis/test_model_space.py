@@ -7,7 +7,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
-from inference.diagnosis.linear import bounds, linear_fit, no_remainder, null_of
+from inference.diagnosis.linear import bounds, footprint_law, linear_fit, no_remainder, null_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
@@ -75,7 +75,7 @@ def remainder() -> Remainder:
         settings=fields,
         footprint=Footprints(
             tuple(size * footprint for size in SHARES),
-            tuple(size * 0.1 * np.eye(1) for size in SHARES),
+            tuple(footprint_law(size * 0.1 * np.eye(1)) for size in SHARES),
             radius_m=np.zeros(1),
             flux=np.ones(1),
         ),

@@ -12,13 +12,12 @@ from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.remainder import (
     FOOTPRINTS,
     LENGTHS,
-    RADII,
     SIDEWAYS,
     TAILS,
     Remainder,
     painted_alike,
 )
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
+from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_basis
 from paint_deposition.inference.diagnosis.sprays import MENU
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -132,7 +131,7 @@ def mean_flux(radius_m: np.ndarray, power: tuple[float, float] = (1.0, 1.0)) -> 
 @pytest.fixture(scope='module')
 def knots_m(alone) -> np.ndarray:
     """(RADII,) radii at which the deviations of the footprint are given."""
-    basis = footprint_basis(alone[0], MODEL, RADII)
+    basis = footprint_basis(alone[0], MODEL)
     return np.linspace(0.0, basis.settings['reach_m'], RADII)
 
 
@@ -165,7 +164,7 @@ def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
     study, remainder = alone
     columns, of_peak = remainder.footprint.columns[-1], remainder.footprint.of_peak[-1]
     amounts = np.random.default_rng(1).normal(size=columns.shape[1])
-    basis = footprint_basis(study, MODEL, RADII)
+    basis = footprint_basis(study, MODEL)
     flux = np.repeat(mean_flux(np.linspace(0.0, basis.settings['reach_m'], RADII)), WAVES)
     expected = basis.film_um @ (of_peak @ amounts / flux) / study.sigma_um
     found = columns @ amounts

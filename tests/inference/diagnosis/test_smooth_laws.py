@@ -101,8 +101,6 @@ def test_harmonics_of_a_footprint_are_independent(study):
     wave = np.arange(len(covariance)) % 5
     assert np.abs(covariance[wave[:, np.newaxis] != wave]).max() < 1e-9
     assert covariance[10, 5] == pytest.approx(np.exp(-0.5 / 2.0**2), abs=0.03)
-    # The same law over twice the knots is resolved as finely.
-    assert len(footprint_basis(study, MODEL, radii=20).knots) == 2 * len(covariance)
 
 
 def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():

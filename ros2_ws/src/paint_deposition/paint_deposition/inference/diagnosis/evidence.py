@@ -79,11 +79,6 @@ class NullModel:
         """The same where some more directions (P, n) may vary."""
         return NullModel.of(np.hstack([self.columns, more]), self.raw, self.remainder)
 
-    def with_more(self, remainder: np.ndarray) -> 'NullModel':
-        """The same with a further covariance (P, P) of what nature leaves over."""
-        both = remainder if self.remainder is None else self.remainder + remainder
-        return NullModel.of(self.columns, self.raw, both)
-
     def with_remainder(self, remainder: np.ndarray) -> 'NullModel':
         """The same with another covariance (P, P) of what nature leaves over."""
         return NullModel.of(self.columns, self.raw, remainder)

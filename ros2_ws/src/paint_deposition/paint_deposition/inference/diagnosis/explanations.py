@@ -13,14 +13,14 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
+from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.inference.diagnosis.remainder import Footprints
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
     RandomLaw,
-    beside_pattern,
     curve_basis,
-    footprint_basis,
     map_bases,
 )
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -36,11 +36,11 @@ LARGEST = 0.95
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
-# Typical deviation of a footprint, as a share of the flux at the place.
-OF_FLUX = 0.15
-# Their lengths of correlation: over a covariate in its standard deviations, over the part [m], and
-# over the radius of the pattern in steps.
-LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25), FOOTPRINT: (2.0, 6.0)}
+# A law of any form, chosen among some dozens, is learned if it raises the log evidence by this
+# much, and one of the few corrections of what a model says already if by this.
+WORTH_LEARNING, WORTH_CORRECTING = 6.0, 3.0
+# Their lengths of correlation: over a covariate in its standard deviations, over the part [m].
+LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25)}
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,7 @@ class Explanation:
     # The law of any form whose amplitudes the directions are, or None.
     random: RandomLaw | None = None
     corrects: str = ''  # id of the effect whose law it corrects, if it does
+    worth: float = WORTH_LEARNING  # log evidence that it must add to be learned
 
     @property
     def learns(self) -> str:
@@ -135,25 +136,24 @@ def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explan
         names: ids of the effects. One that a part lacks has no such curve: curves act on all.
     """
     return [
-        replace(of_random(study, curve.centred), corrects=effect.id)
+        replace(of_random(study, curve.centred), corrects=effect.id, worth=WORTH_CORRECTING)
         for effect, _, curve in _laws_off(study, fit, names, fit.model)
         if curve and study.has(type(effect)).all() and not fit.model.effect(curve.basis.law.id)
     ]
 
 
-def of_footprint(study: Study, fit: Fit) -> list[Explanation]:
-    """Deviations of the footprint from the two Gaussians of eq. (1) that fit best."""
-    basis = footprint_basis(study, fit.model)
-    if fit.model.effect(basis.law.id) is not None:
+def of_footprint(study: Study, fit: Fit, worth: float = WORTH_LEARNING) -> list[Explanation]:
+    """Deviations of the footprint from the two Gaussians of eq. (1) that fit best.
+
+    Args:
+        study: the readings.
+        fit: of the model.
+        worth: log evidence that they must add to be learned.
+    """
+    if fit.model.effect(LearnedFootprint.id) is not None:
         return []
-    lengths = LENGTHS[FOOTPRINT]
-    found = []
-    for length in lengths:
-        free = basis.random(OF_FLUX, length).at_knots
-        beside, _ = beside_pattern(basis, free, study, fit)
-        random = RandomLaw(basis, basis.centred(beside))
-        found.append(of_random(study, random, 1.0 / len(lengths)))
-    return found
+    laws = Footprints.of(study, fit).laws
+    return [replace(of_random(study, law.centred, 1.0 / len(laws)), worth=worth) for law in laws]
 
 
 def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel) -> np.ndarray:

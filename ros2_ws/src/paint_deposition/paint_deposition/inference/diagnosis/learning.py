@@ -14,8 +14,6 @@ from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, Explana
 from paint_deposition.inference.diagnosis.model_space import SIZES
 
 MOST_LAWS = 2
-# A law must raise the log evidence by this much: it is chosen among some dozens.
-WORTH_LEARNING = 6.0
 
 
 @dataclass(frozen=True)
@@ -64,15 +62,17 @@ def choose_laws(
     left = {k: e for k, e in enumerate(explanations) if e.learns}
     chosen: list[tuple[int, float]] = []
     while left and len(chosen) < MOST_LAWS:
-        gain, k, size = max(
+        worth = [
             (float(value), k, float(size))
             for k, explanation in left.items()
             for value, size in zip(
                 by_size(nulls.of(explanation), explanation, freedom), SIZES, strict=True
             )
-        )
-        if gain < WORTH_LEARNING:
+            if value >= explanation.worth
+        ]
+        if not worth:
             break
+        _, k, size = max(worth)
         chosen.append((k, size))
         # What was chosen may vary from now on, too.
         nulls = nulls.beside(size * left[k].columns)

@@ -21,6 +21,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,
     UNKNOWN,
+    WORTH_CORRECTING,
     Explanation,
     of_any_form,
     of_corrections,
@@ -88,7 +89,7 @@ def diagnose(
         *of_corrections(run.study, run.fit, best.names),
         *of_any_form(run.study, model),
         *of_places(run.study, model),
-        *of_footprint(run.study, run.fit),
+        *of_footprint(run.study, run.fit, WORTH_CORRECTING),
     ]
     left_out = LeftOut(stages, options)
     _accept(run, groups, float(left_out.errors_um()[0]))
@@ -168,16 +169,17 @@ def _predicting(
 ) -> list[tuple[Explanation, float]]:
     """The first of some laws, as far as readings left out bear them out.
 
-    A curve must predict whole parts better, and a map these or patches of its own part. A
-    footprint, which a bell has on any part, must not predict parts worse: of two parts each says
-    little of the other.
+    A curve must predict whole parts better, a map or a footprint these or patches of the parts. A
+    footprint, which a bell has on any part, may also leave the error on parts as it is: of two
+    parts each says little of the other.
     """
     kept = 0
     for count, (law, _) in enumerate(laws, start=1):
-        most = 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN)
-        ways = (False, True) if law.learns == PLACE else (False,)
-        found = (left_out.errors_um(without, patches) for patches in ways)
-        if any(errors_um[count] <= most * errors_um[kept] for errors_um in found):
+        ways = [(False, 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN))]
+        if law.learns in (PLACE, FOOTPRINT):
+            ways.append((True, 1.0 - LEAST_GAIN))
+        errors = ((left_out.errors_um(without, patches), most) for patches, most in ways)
+        if any(errors_um[count] <= most * errors_um[kept] for errors_um, most in errors):
             kept = count
     return laws[:kept]
 

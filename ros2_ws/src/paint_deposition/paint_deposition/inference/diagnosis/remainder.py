@@ -19,6 +19,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import HARMONICS, WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import (
+    RADII,
+    RandomLaw,
     beside_pattern,
     flux_around,
     footprint_basis,
@@ -42,8 +44,8 @@ PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
 BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
-# footprint in steps of its radius, of which there are so many.
-LENGTHS, FOOTPRINT_LENGTHS, RADII = (0.1, 0.2, 0.6), (2.0, 6.0), 20
+# footprint in steps of its radius.
+LENGTHS, FOOTPRINT_LENGTHS = (0.1, 0.2, 0.6), (1.0, 3.0)
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
@@ -81,8 +83,7 @@ class Footprints:
     """Deviations of the footprint, which all parts share, for amplitudes of unit variance."""
 
     columns: tuple[np.ndarray, ...]  # for each size (P, n), of the readings over the noise
-    # For each (K, n), at the knots of a footprint, as shares of its peak.
-    of_peak: tuple[np.ndarray, ...]
+    laws: tuple[RandomLaw, ...]  # for each, as shares of the flux at K knots
     # (RADII,) distance of the knots, and the mean flux there over the peak's.
     radius_m: np.ndarray
     flux: np.ndarray
@@ -92,13 +93,19 @@ class Footprints:
         """For each size (P, P), of the readings over the noise."""
         return tuple(columns @ columns.T for columns in self.columns)
 
+    @cached_property
+    def of_peak(self) -> tuple[np.ndarray, ...]:
+        """For each size (K, n), at the knots, as shares of the peak."""
+        flux = np.repeat(self.flux, WAVES)[:, np.newaxis]
+        return tuple(flux * law.at_knots for law in self.laws)
+
     @staticmethod
     def of(study: Study, fit: Fit) -> 'Footprints':
         """What is left of them when the pattern has followed.
 
         The tails are kept as they are: the pattern follows them far from where it was fitted.
         """
-        basis = footprint_basis(study, fit.model, RADII)
+        basis = footprint_basis(study, fit.model)
         reach_m = basis.settings['reach_m']
         flux, tails = _flux_and_tails(fit.model.patterns, reach_m)
         at_knots = np.repeat(flux, WAVES)[:, np.newaxis]
@@ -108,7 +115,7 @@ class Footprints:
         ])  # fmt: skip
         pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
         of_film = basis.film_um / study.sigma_um[:, np.newaxis]
-        columns, of_peak = [], []
+        columns, laws = [], []
         for size in FOOTPRINTS:
             of_wave = np.where(HARMONICS % 2, min(size, SIDES), size)
             off = np.tile(of_wave, RADII)[:, np.newaxis]
@@ -116,9 +123,9 @@ class Footprints:
             beside, followed = beside_pattern(basis, free, study, fit)
             change = of_film @ free - pattern @ followed
             columns.append(np.hstack([of_film @ (TAILS * tails), change]))
-            of_peak.append(at_knots * np.hstack([TAILS * tails, beside]))
+            laws.append(RandomLaw(basis, np.hstack([TAILS * tails, beside])))
         radius_m = np.linspace(0.0, reach_m, RADII)
-        return Footprints(tuple(columns), tuple(of_peak), radius_m, flux)
+        return Footprints(tuple(columns), tuple(laws), radius_m, flux)
 
 
 @dataclass(frozen=True)
@@ -221,7 +228,7 @@ def _flux_and_tails(
     radius = np.linspace(0.0, reach_m, RADII)
     flux, tails = np.zeros(RADII), np.zeros((RADII, 2))
     for p in patterns:
-        flux += flux_around(p, reach_m, RADII).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
+        flux += flux_around(p, reach_m).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
         ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
         u = np.stack([
             (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2), radius**2 / (2.0 * p.sigma2_m**2)

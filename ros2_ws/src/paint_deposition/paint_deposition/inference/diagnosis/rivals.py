@@ -13,9 +13,9 @@ from paint_deposition.inference.diagnosis.explanations import (
     FACTOR,
     FOOTPRINT,
     LAW_LENGTH,
-    LENGTHS,
     UNKNOWN,
 )
+from paint_deposition.inference.diagnosis.remainder import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.inference.diagnosis.separation import Predicted
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_along
@@ -130,7 +130,7 @@ class Rivals:
         """What an explanation predicts, its amounts being 0."""
         if rival.name == FOOTPRINT:
             basis = footprint_along(rays, self.fit.model.patterns)
-            random = basis.random(FACTOR, LENGTHS[FOOTPRINT][0])
+            random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0])
             return _shapeless(random.change_um / sigma_um[:, np.newaxis])
         values = (
             Covariate(same[0].name, np.concatenate([part.values for part in same]))

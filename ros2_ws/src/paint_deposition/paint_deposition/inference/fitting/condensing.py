@@ -17,7 +17,7 @@ from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 
 # Points in all from which on readings are condensed, and cells that they are condensed to.
-MANY, CELLS = 600, 500
+MANY, CELLS = 500, 300
 # Halvings of the range of edges in which that of the cells is searched.
 HALVINGS = 30
 # The scatter is estimated about planes through so many neighbours on average, five at the least.
