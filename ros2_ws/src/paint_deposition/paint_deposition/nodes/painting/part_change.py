@@ -188,7 +188,12 @@ class PartChange:
         following = Part(type=request.type, serial=request.serial, mesh_file=mesh_file, coat=1)
         following.run = request.serial
         if request.coat:
-            if (request.serial, mesh_file) != (part.serial, part.mesh_file):
+            if not part.serial:
+                raise PaintError(
+                    'coat: the part in the cell has no serial number yet: announce it without coat'
+                )
+            same_mesh = os.path.realpath(mesh_file) == os.path.realpath(part.mesh_file)
+            if request.serial != part.serial or not same_mesh:
                 raise PaintError(
                     f"coat: the part in the cell is '{part.serial}' of {part.mesh_file}, not "
                     f"'{request.serial}' of {mesh_file}: a further coat needs the same part"

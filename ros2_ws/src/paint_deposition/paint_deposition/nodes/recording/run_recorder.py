@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.nodes.recording.initial_messages import InitialMessages
 from paint_deposition.nodes.recording.part_runs import part_data, unused_name
-from paint_deposition.nodes.recording.recorded_topic import RecordedTopic, bag_qos
+from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
     PARAMETER_EVENTS,
     PART_POSE,
@@ -147,7 +147,7 @@ class RunRecorder(ManagedNode):
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
             offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns)
+            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
         if topic.profile is None or incompatible_policies(profile, topic.profile):
@@ -195,9 +195,9 @@ class RunRecorder(ManagedNode):
 
     def _begin_run(self, run: RunWriter, log_time_ns: int) -> None:
         """Begin with what is in force."""
-        self.run = run
+        self.run, self._begun_ns = run, time.time_ns()
         for topic in self._topics.values():
-            topic.reset_counts()
+            topic.reset_counts(self._begun_ns)
             run.add_topic(topic.run_topic)
         for message in self._initial_messages.begin_run(log_time_ns):
             run.write(*message[:4])
@@ -255,6 +255,8 @@ class RunRecorder(ManagedNode):
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
+        unheard = [f'{topic.unheard} of {topic.name}' for topic in topics if topic.unheard]
+        lost += f', {" and ".join(unheard)} {UNHEARD}' if unheard else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
