@@ -89,16 +89,10 @@ MAX_POSE_GAP = click.option(
 )  # fmt: skip
 
 
-def pose_option(name: str, text: str) -> Callable:
-    """A pose, seven numbers in a list, or None."""
-    return click.option(
-        name, nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose, help=text
-    )
-
-
-PART_POSE = pose_option(
-    '--part-pose', 'Where the part stands in the frame of the poses [m, unit quaternion].'
-)
+PART_POSE = click.option(
+    '--part-pose', nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose,
+    help='Where the part stands in the frame of the poses [m, unit quaternion].',
+)  # fmt: skip
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
     click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),

@@ -87,7 +87,9 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     for path in sorted(set(folder.iterdir()) - set(shared)):
         if path.name.startswith('.'):
             continue
-        if path.is_dir() and _is_bag(path):
+        # One that was cut off has no metadata.
+        held = [*path.glob('metadata.yaml'), *path.glob('*.mcap'), *path.glob('*.db3')]
+        if path.is_dir() and held:
             recordings[path.name].append(path)
         elif path.suffix.lower() in BAGS:
             recordings[path.stem].append(path)
@@ -100,13 +102,6 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
             'their readings beside them, under the same name'
         )
     return runs, [path.name for paths in readings.values() for path in paths]
-
-
-def _is_bag(folder: Path) -> bool:
-    """Whether it holds a bag, one that was cut off and has no metadata included."""
-    return any(
-        ((folder / 'metadata.yaml').is_file(), *folder.glob('*.mcap'), *folder.glob('*.db3'))
-    )
 
 
 def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:
