@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 from pydantic import Field
 
@@ -12,32 +11,23 @@ from paint_deposition.batch.cases import Case, code_digest, digest_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.motion_source import MotionSource, Number, OnePart, Text
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
 NAME = 'line.yaml'
 BAGS = ('.bag', '.mcap')
 TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
 
 
-class LineFile(MotionSource, extra='forbid'):
+class LineFile(MotionSource, OnePart, extra='forbid'):
     """What all runs of a line share; paths are relative to the folder."""
 
     mesh: Text = Field(description='the name of a mesh file')
     model: Text = Field(description='the name of a model file, calibrated for this line')
     points: Text | None = Field(None, description='the name of a file of measuring points')
-    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
-    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
-    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
-        None, description='[x, y, z], the direction of gravity in the mesh frame'
-    )
     max_edge_length_m: Number = Field(0.02, gt=0.0, description='longest edge of the mesh [m]')
-    max_pose_gap_s: Number = Field(
-        DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
-    )
 
 
 @dataclass(frozen=True)
