@@ -9,11 +9,10 @@ from paint_deposition.errors import MeshError
 from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
-from paint_deposition.part.edges import Edges
+from paint_deposition.part.edges import Edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.welding import weld
 
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
