@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability numbers lint format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -44,6 +44,9 @@ fuzz: build  ## feed changed files to the readers; ARGS='-k rapid' chooses
 
 reliability: build  ## end the nodes at random moments, 50 times each
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.reliability $(ARGS)
+
+cell: build  ## take 10,000 random steps in a cell: poses, states, parts, kills; ARGS goes to pytest
+	@$(IN_ENVIRONMENT) PAINT_STEPS=$${PAINT_STEPS:-10000} pytest tests/nodes/test_random_cell.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for as much in less
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page soak $(ARGS)

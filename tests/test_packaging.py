@@ -141,6 +141,7 @@ def test_launch_file_describes_every_node():
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))
     assert set(wanted()) == {'deposition_simulator', 'index_planner'}
+    assert wanted(trigger='/gun')['atomizer_source'] == {'trigger': '/gun'}
 
 
 @pytest.mark.parametrize(

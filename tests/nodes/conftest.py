@@ -81,3 +81,20 @@ def painted(wait_until):
         return node.film.snapshot().film_um
 
     return painted
+
+
+@pytest.fixture
+def record(ros_context, spin, tmp_path):
+    """`record(**parameters)`: a recorder of the run `run`, running."""
+    from nodes.cell import parameters
+    from paint_deposition.nodes.recording.run_recorder import RunRecorder
+
+    def record(namespace='', **chosen) -> RunRecorder:
+        values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen
+        recorder = RunRecorder(
+            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
+        )
+        spin(recorder)
+        return recorder
+
+    return record

@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from lifecycle_msgs.msg import TransitionEvent
 from lifecycle_msgs.srv import ChangeState, GetState
+from paint_msgs.msg import ThicknessStats
 from paint_msgs.srv import SaveFilm
 from rclpy.qos import QoSProfile
 
@@ -18,6 +19,7 @@ from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.runtime.topics import LATCHED
 
 MOTION = two_passes()
 EVENTS = '/deposition_simulator/transition_event'
@@ -99,6 +101,39 @@ def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker
     rows = range(len(events.heard[EVENTS]))
     states = [events.decoded(EVENTS, row).goal_state.label for row in rows]
     assert states[-2:] == ['shuttingdown', 'finalized']
+
+
+@pytest.mark.parametrize('guns', [[], ['left', 'right']])
+def test_what_callbacks_replace_stays_until_cleanup(simulator, manager, ros_context, spin, painted,
+                                                    onlooker, wait_until, guns):  # fmt: skip
+    """Subscriptions match a robot that comes later; rate and pose of the part are set anew."""
+    node = simulator(atomizers=guns)
+    managed = manager(node)
+    robots = [Robot(ros_context, reliable=False, namespace=gun) for gun in guns or ['']]
+    spin(*robots)
+    # A best-effort robot is heard once the subscription has been replaced.
+    wait_until(lambda: all(source.has_subscribers(1) for source in robots))
+    placed = {'part_parent_frame': 'cell', 'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}
+    for change in parameters(publish_rate_hz=25.0, **placed):
+        assert node.set_parameters_atomically([change]).successful
+    for rows in (slice(0, 300), slice(300, 600)):
+        assert managed.deactivate() == (True, 'inactive')
+        assert managed.activate() == (True, 'active')
+        for source in robots:
+            source.send(MOTION, rows, frame_id='cell')
+        painted(node, len(robots) * rows.stop)
+    looks = {
+        'thickness/stats': (ThicknessStats, LATCHED),
+        'part_pose': (TransformStamped, LATCHED),
+    }
+    viewer = onlooker(looks)
+    wait_until(
+        lambda: viewer.shows('thickness/stats', lambda s: s.poses_received == len(robots) * 600)
+    )
+    wait_until(lambda: viewer.newest('part_pose'), what='the latched pose of the part')
+    assert managed.deactivate() == (True, 'inactive')
+    assert managed.cleanup() == (True, 'unconfigured')
+    wait_until(lambda: not any(source.has_subscribers(1) for source in robots))
 
 
 def test_poses_received_while_inactive_are_counted_and_not_painted(

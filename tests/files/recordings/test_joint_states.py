@@ -90,7 +90,7 @@ def test_another_link_and_another_base(arm, tmp_path):
 @pytest.mark.parametrize(
     ('given', 'words'),
     [
-        ({}, 'name a pose topic; it has no PoseStamped topic; it has joint states (--urdf)'),
+        ({}, 'name a pose topic; it has no PoseStamped topic; it has joint states (give urdf)'),
         ({'urdf': 'ARM', 'tip_link': 'tool1'}, "has no link 'tool1'; did you mean 'tool0'?"),
         ({'urdf': 'ARM', 'base_link': 'tool0', 'tip_link': 'base_link'}, 'does not hang on'),
         ({'urdf': 'ARM', 'tf': ['a', 'b']}, 'leave one of them out'),

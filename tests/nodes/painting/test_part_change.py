@@ -4,6 +4,7 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.brush import Brush
@@ -197,13 +199,15 @@ def test_a_further_coat_lies_on_the_first(simulator, robot, painted, change,
                                                       tmp_path):  # fmt: skip
     node = simulator()
     source = robot(node)
+    assert 'coat: the part in the cell has no serial' in change(serial='A-1', coat=True).message
     assert change(serial='A-1').success
     source.send(MOTION)
     once = painted(node, len(MOTION))
     assert "serial 'A-1' is the part in the cell: set coat: true" in change(serial='A-1').message
     other = change(serial='A-2', coat=True)
     assert "coat: the part in the cell is 'A-1' of " in other.message
-    coat = change(serial='A-1', coat=True)
+    same_mesh = node.mesh_file.replace('/panel', '/../' + tmp_path.name + '/panel')
+    coat = change(serial='A-1', coat=True, mesh_file=same_mesh)
     assert coat.success, coat.message
     assert coat.run == 'A-1_coat_2'
     source.send(later(MOTION))
@@ -224,9 +228,9 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
     robot(node).send(MOTION)
     film = painted(node, len(MOTION))
     for fields, message in (
-        ({'serial': ''}, "serial '': use letters, digits"),
-        ({'serial': '../4711'}, "serial '../4711': use letters, digits"),
-        ({'serial': '..'}, "serial '..': use letters"),
+        ({'serial': ''}, "serial '': use at most 200 letters"),
+        ({'serial': '../4711'}, "serial '../4711': use at most 200"),
+        ({'serial': '..'}, "serial '..': use at most"),
         ({'serial': '1', 'mesh_file': 'nowhere.stl'}, 'nowhere.stl: no such mesh file'),
         ({'serial': '1', 'part_pose': [0.0, 0.0, 0.0]}, 'part_pose'),
         ({'prepare': True}, 'prepare needs a mesh_file'),
@@ -296,3 +300,31 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
     assert list(node.values['part_pose']) == pose
     film, expected = painted(node, len(MOTION)), offline_um(node, MOTION)
     assert np.abs(film - expected).max() <= 1e-6 * expected.max()
+
+
+def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
+    simulator, robot, painted, asked, record, wider, wait_until, tmp_path
+):
+    """Two states are sent early, and half the poses before the part is announced."""
+    node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
+    recorder = record(output_directory=str(tmp_path / 'films'), name='before')
+    source = robot(node, recorder)
+    half = len(WITHOUT_TRIGGER) // 2
+    stamps = WITHOUT_TRIGGER.stamps_ns
+    for row, flow in ((0, 1.0), (half + 50, 0.0), (half + 90, 0.5)):
+        source.send_state(stamps[row], flow)
+    source.send(WITHOUT_TRIGGER, slice(0, half))
+    film, points, surface = painted(node, half), node.points, node.surface
+    future = asked(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(WITHOUT_TRIGGER, slice(half, None), frame_id='cell')
+    wait_until(future.done, what='the change')
+    second = painted(node, len(WITHOUT_TRIGGER) - half)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == half, what='the run')
+    recorder.close()
+    before = SimpleNamespace(points=points, surface=surface)
+    for run, live, of in (('before', film, before), ('1', second, node)):
+        motion = read_recording(tmp_path / 'films' / run, state_topic='/atomizer/state')
+        assert len(motion) == half
+        assert np.array_equal(offline_um(of, motion), live)
+    assert second.max() > 1.0

@@ -1,9 +1,12 @@
 """What the gun's states do to the film while it is painted."""
 
 import numpy as np
+import rclpy
 from paint_msgs.msg import AtomizerState
+from rclpy.context import Context
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from std_msgs.msg import Bool
 
 from nodes.cell import Robot, offline_um, two_passes
 
@@ -77,3 +80,30 @@ def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, pai
     wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
     (pose_input,) = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
     assert pose_input.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+
+def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(
+    simulator, ros_context, spin, onlooker, wait_until, capfd
+):
+    """Neither side reports, at the start, that the other does not fit."""
+    source = Robot(ros_context, reliable=False)
+    spin(source)
+    node, viewer = simulator(), onlooker()
+    wait_until(lambda: source.is_subscribed_by(node))
+    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
+    said = capfd.readouterr().err
+    assert 'ready' in said
+    assert not {'[WARN]', '[ERROR]'} & set(said.split())
+
+
+def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_until):
+    """It cannot be heard, and the gun would count as always on."""
+    simulator()
+    viewer, apart = onlooker(), Context()  # one participant has one type for a topic
+    rclpy.init(context=apart, domain_id=ros_domain)
+    controller = Node('plc', context=apart)
+    controller.create_publisher(Bool, 'atomizer/state', 10)
+    told = 'atomizer/state comes as std_msgs/msg/Bool and does not switch the gun'
+    wait_until(lambda: viewer.reports(POSES, told, b'\x02'))
+    controller.destroy_node()
+    apart.try_shutdown()

@@ -4,23 +4,6 @@ import pytest
 
 
 @pytest.fixture
-def record(ros_context, spin, tmp_path):
-    """`record(**parameters)`: a recorder of the run `run`, running."""
-    from nodes.cell import parameters
-    from paint_deposition.nodes.recording.run_recorder import RunRecorder
-
-    def record(namespace='', **chosen) -> RunRecorder:
-        values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen
-        recorder = RunRecorder(
-            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
-        )
-        spin(recorder)
-        return recorder
-
-    return record
-
-
-@pytest.fixture
 def cell(ros_context, spin):
     """A node to publish from."""
     from rclpy.node import Node

@@ -1,8 +1,12 @@
 """What was lost on the way to a recorder is counted, or it says that it cannot be."""
 
+from collections import Counter
+from collections.abc import Callable
+
 import numpy as np
+import pytest
 from geometry_msgs.msg import PoseStamped
-from rclpy.qos import QoSProfile
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from files.recorded import START_NS
@@ -44,3 +48,39 @@ def test_a_queue_that_overflows_shows_as_missed(record, cell, publisher, wait_un
     assert lost > 0
     missed = f', {lost} missed' if NUMBERED else UNCOUNTED
     assert f'{recorder.run.message_count} messages{missed}' in recorder.summary()
+
+
+@pytest.mark.skipif(not NUMBERED, reason='this middleware does not number messages')
+def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wait_until):
+    """Of one robot that starts after the recorder, and of one that has long been sending."""
+    sent = Counter()
+
+    def start(gun: str) -> Callable[[], None]:
+        best_effort = QoSProfile(depth=5, reliability=ReliabilityPolicy.BEST_EFFORT)
+        robot = cell.create_publisher(PoseStamped, f'{gun}/atomizer/pose', best_effort)
+
+        def send() -> None:
+            robot.publish(pose(START_NS + sent[gun]))
+            sent[gun] += 1
+
+        cell.create_timer(0.005, send)
+        return send
+
+    start('old')
+    wait_until(lambda: sent['old'] >= 300, what='poses that no recorder was there for')
+    recorder = record(atomizers=['old', 'new'])
+    sent_before, counts = sent['old'], recorder.run.counts
+    wait_until(lambda: counts.get('/old/atomizer/pose', 0) >= 60, what='poses of the first')
+    send = start('new')
+    for _ in range(20):
+        send()
+    wait_until(lambda: counts.get('/new/atomizer/pose', 0) >= 60, what='poses of both')
+    recorder.close()
+    unheard = sent['new'] - counts['/new/atomizer/pose']
+    assert unheard >= 20
+    assert recorder._topics['/new/atomizer/pose'].losses == (
+        f'0 missed, {unheard} sent before the recorder heard their publisher'
+    )
+    of_old = recorder._topics['/old/atomizer/pose'].unheard
+    assert 0 < of_old < sent_before, 'by its rate, those since the recording began'
+    assert f'{unheard} of /new/atomizer/pose sent before the' in recorder.summary()

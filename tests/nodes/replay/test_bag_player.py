@@ -9,8 +9,10 @@ from std_srvs.srv import Trigger
 from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
 from nodes.replay.listener import recorded
 from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.headers import stamp_ns
+from robot_arm import JOINTS, sweep, urdf
 
 
 @pytest.mark.parametrize('rate', [0.0, 20.0])
@@ -41,6 +43,37 @@ def test_a_ros1_bag_is_replayed_as_ros2_messages(play, listen, wait_until, tmp_p
     assert [stamp_ns(pose.header) for pose in poses] == written.stamps_ns.tolist()
     assert [pose.pose.position.x for pose in poses] == written.positions_m[:, 0].tolist()
     assert {pose.header.frame_id for pose in poses} == {'door'}
+
+
+@pytest.mark.parametrize('kind', ['tf', 'urdf'])
+def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_path):
+    """From transforms or joint states of a robot, with the trigger, as `paint simulate` does."""
+    messages, entries = Messages(), []
+    stamps_ns = START_NS + 20_000_000 * np.arange(40)
+    (tmp_path / 'arm.urdf').write_text(urdf())
+    for stamp, joints in zip(stamps_ns.tolist(), sweep(40), strict=True):
+        if kind == 'urdf':
+            moved = '/joint_states', stamp + 100, messages.joints(stamp, JOINTS, joints)
+        else:
+            pose = [joints[0], 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]
+            moved = '/tf', stamp + 100, messages.transforms((stamp, 'base', 'tool0', pose))
+        entries.append(moved)
+    entries.insert(20, ('/gun', int(stamps_ns[20]), messages.trigger(True)))
+    bag = write_bag(tmp_path / 'run', entries, messages=messages)
+    remedy = 'give tf: TARGET SOURCE' if kind == 'tf' else 'give urdf'
+    with pytest.raises(RecordingError, match=remedy):
+        play(bag)
+    given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(tmp_path / 'arm.urdf')}
+    listener = listen()
+    player = play(bag, rate=0.0, state_topic='/gun', **given)
+    wait_until(player.finished.done, what='the end of the replay')
+    poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
+    offline = read_recording(bag, state_topic='/gun', **given)
+    assert [stamp_ns(pose.header) for pose in poses] == offline.stamps_ns.tolist()
+    places = [(p.x, p.y, p.z) for p in (pose.pose.position for pose in poses)]
+    np.testing.assert_array_equal(places, offline.positions_m)
+    assert {pose.header.frame_id for pose in poses} == {offline.frame_id}
+    assert [stamp_ns(s.header) for s in listener.states] == offline.trigger_stamps_ns.tolist()
 
 
 def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, tmp_path):

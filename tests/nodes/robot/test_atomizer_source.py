@@ -1,5 +1,6 @@
 """Poses from joints and states from signals, over real DDS, as a robot's driver sends them."""
 
+import math
 import time
 
 import numpy as np
@@ -138,6 +139,44 @@ def test_signals_are_flow_brush_and_programmed_speed(source, driver, viewer, wai
     assert speeds == pytest.approx([0.35, 0.35, 0.35, 0.5], rel=1e-12)
 
 
+def test_a_trigger_alone_switches_a_robot_that_publishes_poses(
+    source, ros_context, spin, wait_until, viewer
+):
+    """Poses of its own, a Bool of the PLC: sent when it says, unless the clocks differ."""
+    node = source(urdf_file='', trigger='/gun')
+    robot = Node('robot', context=ros_context)
+    gun = robot.create_publisher(Bool, '/gun', 10)
+    poses = robot.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    spin(robot)
+    wait_until(
+        lambda: gun.get_subscription_count() and poses.get_subscription_count() == 2,
+        what='discovery',
+    )
+
+    def move(stamp: int) -> None:
+        pose = PoseStamped()
+        pose.header.frame_id = 'cell'
+        pose.header.stamp = Time(nanoseconds=stamp).to_msg()
+        poses.publish(pose)
+
+    before_ns = time.time_ns()
+    move(before_ns)
+    wait_until(lambda: viewer.heard['atomizer/pose'], what='the pose')
+    for value in (True, False):
+        gun.publish(Bool(data=value))
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the changes')
+    first = viewer.decoded('atomizer/state', 0)
+    assert (first.spraying, first.header.frame_id) == (True, 'cell')
+    assert before_ns <= Time.from_msg(first.header.stamp).nanoseconds <= time.time_ns()
+    assert node.count_publishers('atomizer/pose') == 1
+    wait_until(lambda: viewer.reports('atomizer_source: robot', 'the robot publishes its poses'))
+    move(before_ns - 30_000_000_000)
+    wait_until(lambda: len(viewer.heard['atomizer/pose']) == 2, what='the other clock')
+    gun.publish(Bool(data=True))
+    wait_until(lambda: viewer.reports('atomizer_source: signals', '/gun has no stamps', b'\x02'))
+    assert len(viewer.heard['atomizer/state']) == 2
+
+
 def test_unusable_signals_are_reported(source, driver, viewer, wait_until):
     source(trigger='/io.level > 1')
     robot = driver(('/io', UInt16))
@@ -147,6 +186,35 @@ def test_unusable_signals_are_reported(source, driver, viewer, wait_until):
     assert 'wrist_roll' in viewer.status('atomizer_source: robot').message
     told = '/io: UInt16 has no number or Bool at .level'
     wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'))
+
+
+@pytest.mark.parametrize(
+    ('wrong', 'told'),
+    [
+        ({'/level': math.nan}, '/level: trigger is nan: give a number'),
+        ({'/number': 2.7}, '/number: brush is 2.7: give 0 to'),
+        ({'/number': math.nan}, '/number: brush is nan'),
+        ({'/number': 1e12}, '/number: brush is 1e+12'),
+    ],
+)
+def test_a_signal_that_fails_keeps_the_gun_as_it_was(
+    source, driver, viewer, wait_until, wrong, told
+):
+    source(trigger='/level > 12', brush='/number')
+    robot = driver(('/level', Float64), ('/number', Float64))
+
+    def say(values) -> None:
+        for topic, value in values.items():
+            robot.signals[topic].publish(Float64(data=value))
+
+    say({'/level': 24.0, '/number': 2.0})
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 1, what='the gun')
+    say(wrong)
+    wait_until(lambda: viewer.reports('atomizer_source: signals', told, b'\x02'), what=told)
+    say({'/number': 2.0, '/level': 3.0})
+    wait_until(lambda: len(viewer.heard['atomizer/state']) == 2, what='the gun closed')
+    states = [viewer.decoded('atomizer/state', row) for row in (0, 1)]
+    assert [(state.spraying, state.brush) for state in states] == [(True, 2), (False, 2)]
 
 
 def test_a_signal_without_stamps_needs_the_robots_clock(source, driver, viewer, wait_until):

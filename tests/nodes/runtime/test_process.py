@@ -1,9 +1,14 @@
 """How node processes end: signals, errors, and what is finished before."""
 
+import socket
+import time
+
+import domain_coordinator
 import pytest
 
 from nodes.cell import write_panel
 from nodes.processes import NodeProcess
+from nodes.recording.runs import NUMBERED
 
 NODE = """
 import os, signal, sys, time
@@ -154,3 +159,21 @@ def test_security_without_keys_is_refused_in_a_line(ros_domain, tmp_path, monkey
         assert process.wait() == 2
         assert process.err.splitlines()[-1].startswith('error: ROS cannot make the node: ')
         assert 'Traceback' not in process.err
+
+
+@pytest.mark.skipif(not NUMBERED, reason='only Fast DDS waits seconds between announcements')
+def test_a_node_announces_itself_often(ros_domain, tmp_path, monkeypatch):
+    """A tenth time within two seconds, not after fifteen, so that it hears a robot soon."""
+    with (
+        domain_coordinator.domain_id() as empty_domain,
+        socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant,
+    ):
+        monkeypatch.setenv('ROS_DOMAIN_ID', str(empty_domain))
+        # Where DDS announces to the fourth participant on a machine.
+        participant.bind(('127.0.0.1', 7400 + 250 * empty_domain + 10 + 2 * 3))
+        participant.settimeout(30.0)
+        with NodeProcess(tmp_path / 'source', 'atomizer_source', trigger='/gun'):
+            first_s, *_, tenth_s = [
+                participant.recv(65536) and time.monotonic() for _ in range(10)
+            ]
+    assert tenth_s - first_s < 5.0

@@ -45,7 +45,8 @@ ARGUMENTS = (
     (
         'trigger',
         '',
-        'Signal that opens the gun, with urdf or base_frame: /gun, or "/io.level > 12" [topic]',
+        'Signal that opens the gun: /gun, or "/io.level > 12"; alone, or with urdf or base_frame '
+        '[topic]',
     ),
     ('bag', '', 'Bag to replay into the cell; empty: poses come from the robot [path]'),
     ('pose_topic', '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"),
@@ -104,8 +105,8 @@ def node_parameters(given):
         raise ValueError('urdf and base_frame are given: the poses come from joints or from tf')
     if given['tip_frame'] and not given['base_frame']:
         raise ValueError('tip_frame is given without base_frame: name the frame of the poses')
-    if given['trigger'] and not (given['urdf'] or given['base_frame']):
-        raise ValueError('trigger is given without urdf or base_frame: give one of them')
+    if given['trigger'] and given['bag']:
+        raise ValueError('trigger and bag are given: state_topic names the trigger in a bag')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
     replay = {
@@ -131,6 +132,8 @@ def node_parameters(given):
             'tip_link': given['tip_frame'],
             'trigger': given['trigger'],
         }
+    elif given['trigger']:
+        nodes['atomizer_source'] = {'trigger': given['trigger']}
     if given['bag']:
         nodes['bag_player'] = replay
     if given['record']:

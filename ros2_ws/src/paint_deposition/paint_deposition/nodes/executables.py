@@ -6,6 +6,7 @@ import signal
 import sys
 from functools import partial
 from importlib.util import find_spec
+from pathlib import Path
 
 # As cli/main.py does, before NumPy is loaded: a node multiplies no large matrices.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
@@ -14,6 +15,11 @@ REMEDIES = {
     'rclpy': 'source a ROS 2 installation, or use the one that `make build` installs',
     'paint_msgs': 'build the workspace with `make build` or colcon and source it',
 }
+# Fast DDS reads its settings from the file that is named here; in Jazzy under its former name.
+FAST_DDS_FILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
+if not any(name in os.environ for name in FAST_DDS_FILES):
+    announced_often = str(Path(__file__).with_name('runtime') / 'fastdds.xml')
+    os.environ[FAST_DDS_FILES[os.environ.get('ROS_DISTRO') == 'jazzy']] = announced_often
 
 
 def _run(name: str, folder: str, node_class: str) -> int:

@@ -18,11 +18,10 @@ from paint_deposition.planning.index_search import (
     cycle_time_s,
     passes_to_cover,
 )
-from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest
+from paint_deposition.planning.requests import FASTEST_M_PER_S, SLOWEST_M_PER_S, IndexRequest
 
 # Film below this share of the mean, between passes, is a bare stripe.
 BARE = 0.01
-SLOWEST_M_PER_S = 0.005
 FIRST_GUESS_M_PER_S = 0.2
 SPEED_ROUNDS = 6
 # Within this share of a speed film goes as 1 / speed, whatever an effect makes of the speed.

@@ -15,7 +15,7 @@ USUAL_RANGE_M = (0.2, 0.8)
 # A pattern whose SB50 lies here is searched over the usual range, another one over its own scale.
 USUAL_HALF_WIDTHS_M = (0.25, 0.75)
 RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
-FASTEST_M_PER_S = 3.0
+SLOWEST_M_PER_S, FASTEST_M_PER_S = 0.005, 3.0
 
 Positive = Annotated[float, Field(gt=0.0)]
 Vector = Annotated[tuple[float, float, float], BeforeValidator(tuple)]
@@ -25,8 +25,9 @@ class FilmBuild(Request):
     """How much film passes lay."""
 
     speed_m_per_s: float | None = given(
-        None, 'Speed of the passes [m/s].', '--speed', above=0.0, most=FASTEST_M_PER_S
-    )
+        None, 'Speed of the passes [m/s].', '--speed',
+        least=SLOWEST_M_PER_S, most=FASTEST_M_PER_S,
+    )  # fmt: skip
     target_um: float | None = given(
         None, 'Mean film build; the speed is chosen for it if it is not given [µm].', above=0.0
     )

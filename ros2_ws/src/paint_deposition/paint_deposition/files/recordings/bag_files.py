@@ -25,6 +25,8 @@ from paint_deposition.files.recordings import message_definitions as definitions
 
 # The key under which the custom data of a plan's bag names its trigger topic.
 TRIGGER = 'trigger_topic'
+# The key under which a run says how many messages of a topic are of its part, if not all.
+KEPT = 'messages_of_the_part'
 ROS2_SUFFIXES = ('.mcap', '.db3')
 
 
@@ -57,8 +59,13 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
+        kept = custom_data(path if path.is_dir() else path.parent).get(KEPT, '').split()
+        self._kept = {name: int(n) for name, _, n in (entry.partition('=') for entry in kept)}
         # Sorted by name, topics without messages included.
-        self.topics = [BagTopic(*key, count) for key, count in sorted(counts.items())]
+        self.topics = [
+            BagTopic(*key, min(count, self._kept.get(key[0], count)))
+            for key, count in sorted(counts.items())
+        ]
 
     def topics_of(self, *types: str) -> list[BagTopic]:
         """Topics of these types, those of the first type first."""
@@ -93,10 +100,15 @@ class Bag:
 
     def messages(self, topics: Sequence[str] = ()) -> Iterator[RawMessage]:
         """Messages of these topics (all, if none are named) in the order of their log time."""
+        left = dict(self._kept)
         with _read_errors(self.path):
             chosen = [c for c in self._reader.connections if not topics or c.topic in topics]
             for connection, log_time_ns, data in self._reader.messages(connections=chosen):
                 topic, type_ = connection.topic, connection.msgtype
+                if topic in left:
+                    if not left[topic]:
+                        continue
+                    left[topic] -= 1
                 cdr = self._types(topic).ros1_to_cdr(data, type_) if self._is_ros1 else data
                 yield RawMessage(topic, type_, log_time_ns, bytes(cdr))
 
@@ -154,7 +166,8 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
     try:
-        metadata = yaml.safe_load((path / 'metadata.yaml').read_text(encoding='utf-8'))
+        text = (path / 'metadata.yaml').read_text(encoding='utf-8')
+        metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
         return dict(metadata['rosbag2_bagfile_information'].get('custom_data') or {})
     except Exception:  # an older version, damaged, or no bag, which reading it reports
         return {}

@@ -58,16 +58,7 @@ def trajectory_of(
     Raises:
         RecordingError: one line that names the bag, what is wrong and what to do.
     """
-    if tf:
-        from paint_deposition.files.recordings.transforms import read_tf_poses
-
-        trajectory, log_times_ns = read_tf_poses(bag, *tf)
-    elif robot:
-        from paint_deposition.files.recordings.joint_states import read_joint_poses
-
-        trajectory, log_times_ns = read_joint_poses(bag, robot, pose_topic)
-    else:
-        trajectory, log_times_ns = _read_poses(bag, choose_pose_topic(bag, pose_topic))
+    trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot)
     if not state_topic:
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
     gun = read_trigger(bag, state_topic)
@@ -82,6 +73,24 @@ def trajectory_of(
         trigger_brush=gun.brush, trigger_set_points=gun.set_points,
         notes=(*trajectory.notes, *gun.notes), settings=gun.settings,
     )  # fmt: skip
+
+
+def motion_of(
+    bag: Bag,
+    pose_topic: str | None = None,
+    tf: Sequence[str] | None = None,
+    robot: Robot | None = None,
+) -> tuple[Trajectory, np.ndarray]:
+    """The poses alone, as for ``trajectory_of``, and their log times (N,) int64 [ns]."""
+    if tf:
+        from paint_deposition.files.recordings.transforms import read_tf_poses
+
+        return read_tf_poses(bag, *tf)
+    if robot:
+        from paint_deposition.files.recordings.joint_states import read_joint_poses
+
+        return read_joint_poses(bag, robot, pose_topic)
+    return _read_poses(bag, choose_pose_topic(bag, pose_topic))
 
 
 def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
@@ -102,9 +111,9 @@ def _other_motion(bag: Bag) -> str:
     """Other sources of motion in a bag, for a message."""
     moves = []
     if bag.topics_of(*TF_TYPES):
-        moves.append('transforms (--tf TARGET SOURCE)')
+        moves.append('transforms (give tf: TARGET SOURCE)')
     if bag.topics_of(JOINT_TYPE):
-        moves.append('joint states (--urdf)')
+        moves.append('joint states (give urdf)')
     return f'; it has {" and ".join(moves)}' if moves else ''
 
 

@@ -51,7 +51,7 @@ class Robot:
         parents.add_nodes_from(link.name for link in links)
         last = sorted(link for link in parents if not parents.in_degree(link))
         if tip is None and DEFAULT_TIP not in parents and len(last) != 1:
-            raise RecordingError(f'{path} ends in {" ".join(last)}; name one with --tip')
+            raise RecordingError(f'{path} ends in {" ".join(last)}; name one as tip_link')
         tip = tip or (DEFAULT_TIP if DEFAULT_TIP in parents else last[0])
         base = base or next((link for link in parents if not parents.out_degree(link)), '')
         for name in (tip, base):
@@ -59,7 +59,7 @@ class Robot:
                 known = did_you_mean(name, sorted(parents))
                 raise RecordingError(f"{path} has no link '{name}'; {known}")
         if tip == base or not nx.has_path(parents, tip, base):
-            raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give --base")
+            raise RecordingError(f"{path}: link '{tip}' does not hang on '{base}'; give base_link")
         way = nx.utils.pairwise(nx.shortest_path(parents, tip, base))
         return Robot(path, base, tip, [parents.edges[pair]['joint'] for pair in way][::-1])
 

@@ -21,6 +21,7 @@ from rosbags.rosbag2.metadata import dump_qos_v9
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import write_text
+from paint_deposition.files.recordings.bag_files import KEPT
 from paint_deposition.files.recordings.message_definitions import Definition
 
 METADATA_VERSION = 9
@@ -150,6 +151,11 @@ class RunWriter:
             with self._write_errors():
                 self._writer.flush()
             self._chunk_opened_s = None
+
+    def keep(self, counts: Mapping[str, int]) -> None:
+        """Readers are to take so many messages of these topics, the first; the rest is not its."""
+        if counts:
+            self.custom_data[KEPT] = ' '.join(f'{name}={n}' for name, n in counts.items())
 
     def finish(self) -> Path:
         """Complete the run and return its folder."""

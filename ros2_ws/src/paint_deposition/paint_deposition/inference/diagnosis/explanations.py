@@ -37,8 +37,8 @@ LARGEST = 0.95
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
 # A law of any form, chosen among some dozens, is learned if it raises the log evidence by this
-# much, and one of the few corrections of what a model says already if by this.
-WORTH_LEARNING, WORTH_CORRECTING = 6.0, 3.0
+# much, and a footprint, of which there is one, beside an effect if by this.
+WORTH_LEARNING, WORTH_FOOTPRINT = 6.0, 3.0
 # Their lengths of correlation: over a covariate in its standard deviations, over the part [m].
 LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25)}
 
@@ -136,7 +136,7 @@ def of_corrections(study: Study, fit: Fit, names: frozenset[str]) -> list[Explan
         names: ids of the effects. One that a part lacks has no such curve: curves act on all.
     """
     return [
-        replace(of_random(study, curve.centred), corrects=effect.id, worth=WORTH_CORRECTING)
+        replace(of_random(study, curve.centred), corrects=effect.id)
         for effect, _, curve in _laws_off(study, fit, names, fit.model)
         if curve and study.has(type(effect)).all() and not fit.model.effect(curve.basis.law.id)
     ]

@@ -21,7 +21,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,
     UNKNOWN,
-    WORTH_CORRECTING,
+    WORTH_FOOTPRINT,
     Explanation,
     of_any_form,
     of_corrections,
@@ -89,7 +89,7 @@ def diagnose(
         *of_corrections(run.study, run.fit, best.names),
         *of_any_form(run.study, model),
         *of_places(run.study, model),
-        *of_footprint(run.study, run.fit, WORTH_CORRECTING),
+        *of_footprint(run.study, run.fit, WORTH_FOOTPRINT),
     ]
     left_out = LeftOut(stages, options)
     _accept(run, groups, float(left_out.errors_um()[0]))

@@ -31,14 +31,14 @@ class PolledCallbackGroup(CallbackGroup):
 
 
 class AdaptiveSubscription:
-    """A polled subscription, reliable until a best-effort publisher appears.
+    """A polled subscription, reliable unless there is, or appears, a best-effort publisher.
 
     It then stays best effort as long as there is any publisher. With `latched` it is transient
     local where all publishers are. A message received twice, because the subscription was
     replaced, counts once.
 
     Args:
-        take: called with each message by `take_pending`.
+        take: called by `take_pending` with each message and the time at which it was sent [ns].
         depth: of the queue.
 
     Attributes:
@@ -50,7 +50,7 @@ class AdaptiveSubscription:
         node: PaintNode,
         message: type,
         topic: str,
-        take: Callable[[Any], None],
+        take: Callable[[Any, int], None],
         *,
         depth: int,
         latched: bool = False,
@@ -61,6 +61,8 @@ class AdaptiveSubscription:
         self._group = PolledCallbackGroup()
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED_MESSAGES)
         self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
+        # At once as the publishers that are known: they would report one that does not match.
+        self._profile = self._best_profile()
         self._subscription = self._create_subscription()
         node.create_steady_timer(QOS_PERIOD_S, self._match_qos)
 
@@ -68,8 +70,7 @@ class AdaptiveSubscription:
         """Take all messages in the queue."""
         self._drain(self._subscription)
 
-    def _match_qos(self) -> None:
-        """Replace the subscription if another quality of service matches the publishers better."""
+    def _best_profile(self) -> QoSProfile:
         publishers = self._node.get_publishers_info_by_topic(self._topic)
         best = compatible_qos([info.qos_profile for info in publishers], self._profile.depth)
         if publishers:
@@ -77,6 +78,11 @@ class AdaptiveSubscription:
             best.reliability = max(best.reliability, self._profile.reliability)
         if not (self._latched and publishers):
             best.durability = DurabilityPolicy.VOLATILE
+        return best
+
+    def _match_qos(self) -> None:
+        """Replace the subscription if another quality of service matches the publishers better."""
+        best = self._best_profile()
         now = self._profile.reliability, self._profile.durability
         if (best.reliability, best.durability) != now:
             before, self._profile = self._subscription, best
@@ -109,4 +115,4 @@ class AdaptiveSubscription:
             return
         if self._latched and identity[0]:
             self._taken.append(identity)
-        self._take(message)
+        self._take(message, identity[0])

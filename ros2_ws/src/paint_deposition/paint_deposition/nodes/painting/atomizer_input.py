@@ -42,6 +42,8 @@ class AtomizerInput:
 
     Attributes:
         poses_received, states_received: since the node started.
+        newest_ns: stamp of the last pose that was passed on or dropped, 0 before the first.
+        sent_ns: when the last pose received was sent, 0 before the first.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
@@ -67,7 +69,7 @@ class AtomizerInput:
         self.name = name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
-        self.poses_received = self.states_received = 0
+        self.poses_received = self.states_received = self.newest_ns = self.sent_ns = 0
         self.refused_s = self.pose_s = -math.inf
         self.spraying = False
         self.speed = SpeedNow()
@@ -77,6 +79,7 @@ class AtomizerInput:
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
+        self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
         self.reset_counts()
         depth = node.values['pose_queue_depth']
@@ -105,6 +108,8 @@ class AtomizerInput:
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
         self.reset_counts()
+        if self._newest is not None:
+            self.newest_ns = stamp_ns(self._newest.header)
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
@@ -130,8 +135,9 @@ class AtomizerInput:
 
     # --- holding
 
-    def hold(self) -> None:
-        """Keep all messages, untransformed, until `release`."""
+    def hold(self, after_ns: int) -> None:
+        """Keep messages sent later, untransformed, until `release`."""
+        self._hold_after_ns = after_ns
         if self._held is None:
             self._held = []
 
@@ -139,11 +145,11 @@ class AtomizerInput:
         """Process the messages that were kept, as if they were received now."""
         held, self._held = self._held or [], None
         for message in held:
-            self._process(message)
+            self._process(message, 0)
         self.flush()
 
-    def _process(self, message: PoseStamped | AtomizerState) -> None:
-        if self._held is not None:
+    def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
+        if self._held is not None and sent_ns > self._hold_after_ns:
             self._held.append(message)
         elif isinstance(message, AtomizerState):
             self._process_state(message)
@@ -173,6 +179,7 @@ class AtomizerInput:
             return
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._poses.clear()
+        self.newest_ns = int(stamps[-1])
         self.intervals.add(stamps)
         self.speed.add(stamps, positions)
         jumped = self.jumps.count
@@ -186,11 +193,11 @@ class AtomizerInput:
 
     # --- poses
 
-    def _take_pose(self, message: PoseStamped) -> None:
+    def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
         self.poses_received += 1
-        self._newest = message
+        self._newest, self.sent_ns = message, sent_ns
         self.pose_s = time.monotonic()
-        self._process(message)
+        self._process(message, sent_ns)
         if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
@@ -218,9 +225,9 @@ class AtomizerInput:
 
     # --- states
 
-    def _take_state(self, message: AtomizerState) -> None:
+    def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
         self.states_received += 1
-        self._process(message)
+        self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:
         stamp = stamp_ns(message.header)

@@ -111,6 +111,15 @@ class DepositionSimulator(PaintingNode):
                 f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
             )
 
+    def reset(self) -> tuple[bool, str]:
+        """Clear the film and all counts; a new run begins, if there were poses."""
+        self.catch_up()
+        had_poses = self.film.counts.received > 0
+        answer = super().reset()
+        if had_poses:
+            self.parts.begin_again()
+        return answer
+
     def publish(self) -> None:
         """Publish the film if it has changed, or to new subscribers."""
         self.catch_up()

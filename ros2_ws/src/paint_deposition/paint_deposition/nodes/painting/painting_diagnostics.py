@@ -5,6 +5,7 @@ import math
 import time
 from collections.abc import Callable, Mapping
 
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.model.brush import BETWEEN
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -58,6 +59,9 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         return Status(WARN, words, values)
     if not node.active:
         return Status(OK, 'inactive', values)
+    if another := _state_of_another_type(node, source.name):
+        node.get_logger().error(another, once=True)
+        return Status(ERROR, another, values)
     now_s = time.monotonic()
     if source.refused_frames and now_s - source.refused_s < RECENT_S:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
@@ -77,6 +81,18 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     if wrong:
         return Status(WARN, ', '.join(wrong), values)
     return Status(OK, 'waiting for poses' if silent_s > SILENT_S else 'painting', values)
+
+
+def _state_of_another_type(node: PaintingNode, gun: str) -> str:
+    """What to do where a Bool, say, comes as the gun's state, which nobody hears; else ''."""
+    topic = gun_topic(gun, 'atomizer/state')
+    for info in node.get_publishers_info_by_topic(node.resolve_topic_name(topic)):
+        if info.topic_type != STATE_TYPE:
+            return (
+                f'{topic} comes as {info.topic_type} and does not switch the gun: publish it on '
+                'a topic of its own, and start atomizer_source with that topic as trigger'
+            )
+    return ''
 
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:

@@ -14,6 +14,7 @@ from rclpy.timer import Timer
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
+from paint_deposition.film.live_film import BEFORE_ALL_NS
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
@@ -150,10 +151,10 @@ class PaintingNode(ManagedNode, ABC):
         sums = [np.sum(times_s, axis=0) for times_s in self._times_s if times_s]
         return float(sum(spent_s / duration_s for spent_s, duration_s in sums))
 
-    def hold(self) -> None:
-        """Keep poses and states unprocessed until `release`."""
+    def hold(self, after_ns: int = BEFORE_ALL_NS) -> None:
+        """Keep poses and states that are sent later unprocessed until `release`."""
         for source in self.inputs:
-            source.hold()
+            source.hold(after_ns)
 
     def release(self) -> None:
         """Process the poses and states that were held."""

@@ -1,6 +1,7 @@
 """Changing the part in the cell: the film is saved, and a new film and a new run begin."""
 
 import os
+import threading
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
@@ -28,6 +29,8 @@ from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
+# With several guns, poses of the others may still be on their way when those of one are there.
+SETTLE_S = 0.03
 # Prepared parts beside the one in the cell; a large one takes some 100 MB.
 MAX_KEPT_PARTS = 4
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
@@ -56,7 +59,7 @@ class PartChange:
 
     Attributes:
         part: the part in the cell, as published.
-        waiting: whether the mesh of the next part is still being read.
+        waiting: whether a change is under way: the mesh of the next part is still being read.
     """
 
     def __init__(
@@ -68,6 +71,8 @@ class PartChange:
     ) -> None:
         self._node, self._version, self._saving = node, version, saving
         self.part = Part(mesh_file=node.mesh_file, coat=1)
+        # The run of the part and coat, and how often the film was reset since.
+        self._run, self._resets = '', 0
         self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
         present.set_result(PreparedPart(node.surface, node.points, node.film))
@@ -133,19 +138,33 @@ class PartChange:
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
-        began_s = time.monotonic()
+        began_s, since_ns = time.monotonic(), self._newest_ns()
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
-        save = self._film_writer() if node.film.counts.received else None
+        save = None
+        self.waiting = True
         try:
+            if len(node.inputs) > 1:
+                node.hold(max(source.sent_ns for source in node.inputs))
+                await self._settled()
+            node.hold()
             version = mesh_version(following.mesh_file)
             ready = None if request.coat else await self._ready(version)
-            self._install(version, ready, request.part_pose)
+            if node.film.counts.received:
+                save = self._film_writer()
+            if ready is not None:
+                node.change_part(version[0], ready)
+                self._version = version
+            self.part, self._since = following, datetime.now(timezone.utc)
+            self._run, self._resets = following.run, 0
+            self._publish(since_ns, request.part_pose)
+            # After the part, so that a recorder knows whose pose it is.
+            if len(request.part_pose):
+                self._set_pose(list(request.part_pose))
         finally:
+            self.waiting = False
             node.release()
-        self.part, self._since = following, datetime.now(timezone.utc)
         self._gap_s = response.gap_s = time.monotonic() - began_s
-        self._publish()
         response.run = following.run
         if save is not None:
             response.paths = await self._saved(save)
@@ -160,18 +179,28 @@ class PartChange:
             PaintError: the request is inconsistent, or the run already exists.
         """
         require_file_name('serial', request.serial)
+        pose = list(request.part_pose)
+        if wrong := self._node.PARAMETERS['part_pose'].error_for(pose):
+            raise PaintError(f'part_pose {wrong}')
+        if pose and not self._node.values['part_parent_frame']:
+            raise PaintError('part_pose is given, and the parameter part_parent_frame is empty')
         part, mesh_file = self.part, os.path.expanduser(request.mesh_file) or self.part.mesh_file
         following = Part(type=request.type, serial=request.serial, mesh_file=mesh_file, coat=1)
         following.run = request.serial
         if request.coat:
-            if (request.serial, mesh_file) != (part.serial, part.mesh_file):
+            if not part.serial:
+                raise PaintError(
+                    'coat: the part in the cell has no serial number yet: announce it without coat'
+                )
+            same_mesh = os.path.realpath(mesh_file) == os.path.realpath(part.mesh_file)
+            if request.serial != part.serial or not same_mesh:
                 raise PaintError(
                     f"coat: the part in the cell is '{part.serial}' of {part.mesh_file}, not "
                     f"'{request.serial}' of {mesh_file}: a further coat needs the same part"
                 )
             following.type, following.coat = request.type or part.type, part.coat + 1
             following.run = f'{part.serial}_coat_{following.coat}'
-        if following.run == part.run:
+        elif request.serial == part.serial:
             raise PaintError(
                 f"serial '{part.serial}' is the part in the cell: set coat: true for another "
                 'coat on it, or give the serial number of the next part'
@@ -185,32 +214,27 @@ class PartChange:
         return following
 
     async def _ready(self, version: Version) -> PreparedPart:
-        """The part of this mesh; poses and states are held while it is read."""
+        """The part of this mesh, once it is read."""
         read = self._prepared(version)
-        if read.done():
-            return read.result()
-        self.waiting = True
-        self._node.hold()
-        try:
-            return await self._node.result_of(read)
-        finally:
-            self.waiting = False
+        return read.result() if read.done() else await self._node.result_of(read)
 
-    def _install(
-        self, version: Version, ready: PreparedPart | None, part_pose: Sequence[float]
-    ) -> None:
-        """Set the part's pose, if given, and start on the prepared part, if it is another one."""
-        pose = list(self._node.values['part_pose'] or [])
-        if len(part_pose):
-            self._set_pose(list(part_pose))
-        if ready is None:
-            return
-        try:
-            self._node.change_part(version[0], ready)
-        except PaintError:
-            self._set_pose(pose)
-            raise
-        self._version = version
+    async def _settled(self) -> None:
+        """Wait for messages that were sent before now."""
+        settled: Future[None] = Future()
+        threading.Timer(SETTLE_S, settled.set_result, [None]).start()
+        await self._node.result_of(settled)
+
+    def begin_again(self) -> None:
+        """Begin another run of the part, whose film was reset."""
+        self._resets += 1
+        if self._run:
+            self.part.run = f'{self._run}_reset_{self._resets}'
+        self._publish(self._newest_ns(), ())
+
+    def _newest_ns(self) -> int:
+        """Stamp of the newest pose of the part in the cell; without any the time now."""
+        newest_ns = max(source.newest_ns for source in self._node.inputs)
+        return newest_ns or self._node.get_clock().now().nanoseconds
 
     def _set_pose(self, part_pose: list[float]) -> None:
         change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
@@ -274,10 +298,10 @@ class PartChange:
         self._save_error = ''
         return [str(path) for path in paths]
 
-    def _publish(self) -> None:
+    def _publish(self, since_ns: int, part_pose: Sequence[float]) -> None:
         part, node = self.part, self._node
-        part.header = header(node.frame.frame_id, node.get_clock().now().nanoseconds)
+        part.header = header(node.frame.frame_id, since_ns)
         part.mesh_id = node.surface.mesh_id
         part.part_parent_frame = node.values['part_parent_frame']
-        part.part_pose = list(node.values['part_pose'] or [])
+        part.part_pose = list(part_pose) or list(node.values['part_pose'] or [])
         self._publisher.publish(part)

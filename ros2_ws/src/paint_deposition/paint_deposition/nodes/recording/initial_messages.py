@@ -1,37 +1,151 @@
-"""The messages that are still valid when a run begins, and are repeated at its beginning."""
+"""The messages with which a run begins: what is in force, and what came for its part already."""
 
-from collections.abc import Collection, Iterator
+import math
+from collections import deque
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
+from geometry_msgs.msg import TransformStamped
+from paint_msgs.msg import Part
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.recording.recorder_parameters import PARAMETER_EVENTS, STATIC_TF
+from paint_deposition.nodes.runtime.messages import header_stamp_ns
+
+# Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.
+REMEMBERED_MESSAGES = 20_000
+# Transforms last in tf2 for so long.
+TF, REMEMBERED_TF_NS = '/tf', 10_000_000_000
+
+
+class Recorded(NamedTuple):
+    """A serialised message, when it was logged and sent, and its stamp if it moves a gun."""
+
+    topic: str
+    cdr: bytes
+    log_time_ns: int
+    sent_ns: int
+    stamp_ns: int = 0
 
 
 class InitialMessages:
-    """Serialised messages that later runs need: newest state and part pose, tf, parameters.
+    """Remembers what later runs need: poses and states, part pose, transforms, parameters.
 
-    ``newest_topics`` are the topics whose newest message is valid until the next one.
+    Args:
+        guns: topic of the states by that of the poses, of each gun.
+        part_pose: topic of the part's pose.
     """
 
-    def __init__(self, newest_topics: Collection[str]) -> None:
-        self._newest_topics = newest_topics
-        self._messages: dict[object, tuple[str, bytes, int]] = {}
+    def __init__(self, guns: Mapping[str, str], part_pose: str) -> None:
+        self._guns, self._part_pose = guns, part_pose
+        self._motion: dict[str, deque[Recorded]] = {
+            topic: deque(maxlen=REMEMBERED_MESSAGES) for gun in guns.items() for topic in gun
+        }
+        self._states_of = {topic: gun[1] for gun in guns.items() for topic in gun}
+        self._newest_pose_ns = dict.fromkeys(guns, 0)
+        # Topics of states that this run does not have yet.
+        self._due: set[str] = set()
+        self._placed: list[Recorded] = []
+        self._transforms: deque[Recorded] = deque()
+        self._lasting: dict[object, Recorded] = {}
 
-    def __iter__(self) -> Iterator[tuple[str, bytes, int]]:
-        """(topic, serialised message, time sent [ns]), the latest last."""
-        return iter(self._messages.values())
-
-    def add(self, topic: str, cdr: bytes, sent_ns: int) -> None:
-        """Keep a message if it stays valid, instead of the one that it replaces."""
-        key: object = topic
-        if topic == PARAMETER_EVENTS:
+    def add(self, topic: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> list[Recorded]:
+        """Remember a message if a later run may need it; what the run has to hold before it."""
+        message = Recorded(topic, cdr, log_time_ns, sent_ns)
+        if topic in self._motion:
+            message = message._replace(stamp_ns=header_stamp_ns(cdr))
+            states = self._states_in_force(message)
+            self._motion[topic].append(message)
+            return states
+        if topic == self._part_pose:
+            self._placed.append(message)
+        elif topic == TF:
+            self._transforms.append(message)
+            while self._transforms[0].sent_ns < sent_ns - REMEMBERED_TF_NS:
+                self._transforms.popleft()
+        elif topic == PARAMETER_EVENTS:
             event = deserialize_message(cdr, ParameterEvent)
             changed = (*event.new_parameters, *event.changed_parameters)
-            key = event.node, *(parameter.name for parameter in changed)
+            self._replace((event.node, *(parameter.name for parameter in changed)), message)
         elif topic == STATIC_TF:
-            key = cdr
-        elif topic not in self._newest_topics:
-            return
-        self._messages.pop(key, None)
-        self._messages[key] = topic, cdr, sent_ns
+            self._replace(cdr, message)
+        return []
+
+    def begin_part(self, part: Part, sent_ns: int) -> dict[str, int]:
+        """Forget what only the parts before needed.
+
+        Args:
+            part: as a simulator announced it; header.stamp is that of the last pose before it, or
+                the time if there was none.
+            sent_ns: when it did.
+
+        Returns:
+            The number of messages by topic that were recorded before, and belong to this part.
+        """
+        last_ns = stamp_ns(part.header)
+        # Other guns may stamp by other clocks, and stamps start anew where a bag is replayed.
+        remembered = [pose for poses in self._guns for pose in self._motion[poses]]
+        cut_ns = max((p.sent_ns for p in remembered if p.stamp_ns == last_ns), default=last_ns)
+        early = {poses: self._forget_motion(poses, cut_ns) for poses in self._guns}
+        # A simulator says where a part stands after it has said that the part is there.
+        later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
+        before = self._placed[: len(self._placed) - len(later)][-1:]
+        stays = not later and before and _pose(before[0]) == _values(part.part_pose)
+        self._placed = before if stays else later
+        return {topic: n for topic, n in {**early, self._part_pose: len(later)}.items() if n}
+
+    def end_motion(self) -> None:
+        """Forget the poses, which no run needs any more, and where the part stood before."""
+        self._placed = self._placed[-1:]
+        for poses in self._guns:
+            self._forget_motion(poses, math.inf)
+
+    def begin_run(self, log_time_ns: int) -> list[Recorded]:
+        """The first messages of a run; what was in force before is logged at this time."""
+        self._due = set(self._guns.values())
+        lasting = [*self._lasting.values(), *self._transforms, *self._placed]
+        early = [pose for poses in self._guns for pose in self._motion[poses]]
+        states = [state for pose in early for state in self._states_in_force(pose)]
+        begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
+        return [m._replace(log_time_ns=begin_ns) for m in lasting + states] + early
+
+    def _replace(self, key: object, message: Recorded) -> None:
+        self._lasting.pop(key, None)
+        self._lasting[key] = message
+
+    def _states_in_force(self, first: Recorded) -> list[Recorded]:
+        """The states of a gun before its first message in a run, unless its stream restarted."""
+        topic = self._states_of[first.topic]
+        if topic not in self._due:
+            return []
+        self._due.remove(topic)
+        states = self._motion[topic]
+        if states and first.stamp_ns < states[0].stamp_ns:
+            states.clear()
+        return [state._replace(log_time_ns=first.log_time_ns) for state in states]
+
+    def _forget_motion(self, poses: str, until_ns: float) -> int:
+        """Forget poses sent until then, and superseded states; the number of later poses."""
+        remembered = self._motion[poses]
+        while remembered and remembered[0].sent_ns <= until_ns:
+            self._newest_pose_ns[poses] = remembered.popleft().stamp_ns
+        states, newest_ns = self._motion[self._guns[poses]], self._newest_pose_ns[poses]
+        passed = [row for row, state in enumerate(states) if state.stamp_ns <= newest_ns]
+        for _ in range(passed[-1] if passed else 0):
+            states.popleft()
+        return len(remembered)
+
+
+def _pose(message: Recorded) -> list[float]:
+    """The pose in a message of the part's pose."""
+    placed = deserialize_message(message.cdr, TransformStamped).transform
+    t, q = placed.translation, placed.rotation
+    return [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
+
+
+def _values(part_pose: Sequence[float]) -> list[float]:
+    """The pose as it is published, none if it is not known."""
+    return list(Rigid.of(part_pose).values) if len(part_pose) else []

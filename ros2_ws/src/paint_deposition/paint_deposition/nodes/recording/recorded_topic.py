@@ -1,5 +1,6 @@
 """A recorded topic: the subscription to its serialised messages, and their counts."""
 
+import math
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -21,29 +22,55 @@ from paint_deposition.nodes.runtime.messages import header_stamp_ns, message_cla
 
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
+MESSAGES_OF_RATE = 50
+UNHEARD = 'sent before the recorder heard their publisher'
+
+
+class Beginning:
+    """How a publisher was first heard: the number of its message, and after how long [ns]."""
+
+    def __init__(self, number: int, sent_ns: int, waited_ns: int) -> None:
+        self._number, self._sent_ns, self._waited_ns = number, sent_ns, waited_ns
+        self._period_ns = math.inf
+
+    def add(self, number: int, sent_ns: int) -> None:
+        """Take a later message: the first few tell how often the publisher sends."""
+        if 0 < number - self._number <= MESSAGES_OF_RATE:
+            self._period_ns = (sent_ns - self._sent_ns) / (number - self._number)
+
+    @property
+    def unheard(self) -> int:
+        """Messages sent before the first one, but not those from before the recording."""
+        sent_meanwhile = max(self._waited_ns, 0) / max(self._period_ns, 1.0)
+        return int(min(self._number - 1, sent_meanwhile))
 
 
 class RecordedTopic:
     """Subscribes to the serialised messages of a topic.
 
     `max_gap_ns` is the longest interval between header stamps that is no gap; None: gaps are not
-    counted.
+    counted. `begun_ns` is when the run began.
 
     Attributes:
         run_topic: the topic as the run stores it; name: of the topic.
         messages: number of messages received, in all runs.
-        missed: messages lost, by the gaps in the publishers' sequence numbers.
+        missed: messages lost after the first, by the gaps in the publishers' sequence numbers.
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
     """
 
     def __init__(
-        self, node: Node, run_topic: RunTopic, take: TakeMessage, max_gap_ns: int | None
+        self,
+        node: Node,
+        run_topic: RunTopic,
+        take: TakeMessage,
+        max_gap_ns: int | None,
+        begun_ns: int,
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
         self.messages = 0
-        self.reset_counts()
+        self.reset_counts(begun_ns)
         self._sequence: dict[bytes, int] = {}
         self._log_time_ns = 0
         self.profile: QoSProfile | None = None
@@ -53,25 +80,45 @@ class RecordedTopic:
         self._max_gap_ns = max_gap_ns
         self._subscription: Subscription | None = None
 
-    def reset_counts(self) -> None:
-        """Set the counts of the run to zero."""
+    def reset_counts(self, begun_ns: int) -> None:
+        """Set the counts of the run, which began then, to zero."""
+        self._begun_ns = begun_ns
         self.missed = self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
+        self._beginnings: dict[bytes, Beginning] = {}
+
+    @property
+    def unheard(self) -> int:
+        """Messages sent while this was recording, before the first one of their publisher."""
+        return sum(beginning.unheard for beginning in self._beginnings.values())
 
     @property
     def losses(self) -> str:
         """The number of lost messages, as text."""
-        return 'losses cannot be counted' if self.unnumbered else f'{self.missed} missed'
+        if self.unnumbered:
+            return 'losses cannot be counted'
+        before = f', {self.unheard} {UNHEARD}' if self.unheard else ''
+        return f'{self.missed} missed{before}'
 
     def subscribe(self, profile: QoSProfile) -> None:
         """Subscribe with this quality of service, instead of the one before if any."""
-        if self._subscription:
-            self.drain()
-            self._node.destroy_subscription(self._subscription)
+        self._end()
         self.profile = profile
         self._subscription = self._node.create_subscription(
             self._message_class, self.name, self._on_message, profile, raw=True
         )
+
+    def unsubscribe(self) -> None:
+        """Take what is in the queue; what is sent until the next subscription is not missed."""
+        self._end()
+        self.profile = None
+        self._sequence.clear()
+
+    def _end(self) -> None:
+        if self._subscription is not None:
+            self.drain()
+            self._node.destroy_subscription(self._subscription)
+            self._subscription = None
 
     def drain(self) -> None:
         """Take all messages in the queue, without the executor."""
@@ -96,10 +143,16 @@ class RecordedTopic:
         if number is None or gid is None:
             self.unnumbered += 1
             return
-        previous = self._sequence.get(gid['data'])
-        if previous is not None and number > previous:
+        gid, sent_ns = gid['data'], info['source_timestamp']
+        previous = self._sequence.get(gid)
+        if previous is None:
+            waited_ns = info['received_timestamp'] - self._begun_ns
+            self._beginnings[gid] = Beginning(number, sent_ns, waited_ns)
+        elif number > previous:
             self.missed += number - previous - 1
-        self._sequence[gid['data']] = number
+        if gid in self._beginnings:
+            self._beginnings[gid].add(number, sent_ns)
+        self._sequence[gid] = number
 
     def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
         gap_ns = stamp_ns - self.newest_stamp_ns

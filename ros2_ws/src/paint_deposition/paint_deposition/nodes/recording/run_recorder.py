@@ -1,6 +1,5 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
-import itertools
 import shutil
 import time
 from collections import Counter
@@ -16,10 +15,13 @@ from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bags import POSE_TYPE
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.nodes.recording.initial_messages import InitialMessages
-from paint_deposition.nodes.recording.recorded_topic import RecordedTopic, bag_qos
+from paint_deposition.nodes.recording.part_runs import part_data, unused_name
+from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
+    PARAMETER_EVENTS,
     PART_POSE,
     POSES,
     RECORDER,
@@ -69,8 +71,14 @@ class RunRecorder(ManagedNode):
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
-        newest_topics = (PART_POSE, *(gun_topic(gun, STATES) for gun in guns))
-        self._initial_messages = InitialMessages(set(map(self.resolve_topic_name, newest_topics)))
+        motion = {
+            self.resolve_topic_name(gun_topic(gun, POSES)):
+            self.resolve_topic_name(gun_topic(gun, STATES)) for gun in guns
+        }  # fmt: skip
+        self._initial_messages = InitialMessages(motion, self.resolve_topic_name(PART_POSE))
+        # Also while no run is recorded, since they stay in force.
+        self._always_heard = {PARAMETER_EVENTS, *motion.values()}
+        self._topics: dict[str, RecordedTopic] = {}
         self._error: RecordingError | None = None
         self._progress = {
             self.resolve_topic_name(gun_topic(gun, POSES)): self.create_publisher(
@@ -81,13 +89,12 @@ class RunRecorder(ManagedNode):
         self.create_trigger_service('~/stop', self._stop)
 
     def _activate(self) -> None:
-        name = self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
         # Only after a run of this node's own is another name chosen for one that exists.
-        name = _unused_name(self._folder, name) if self.runs else name
-        self.run = self._create_run(name, self._custom_data)
+        name = unused_name(self._folder, self._own_name) if self.runs else self._own_name
+        self._begin_run(self._create_run(name, self._custom_data), time.time_ns())
         self.runs += 1
-        self._part_run = ''
-        self._topics: dict[str, RecordedTopic] = {}
+        # Run and stamp of the part, as it was announced.
+        self._part: tuple[str, int] | None = None
         self._refused: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
@@ -102,6 +109,10 @@ class RunRecorder(ManagedNode):
     @property
     def _folder(self) -> Path:
         return Path(self.values['output_directory'])
+
+    @property
+    def _own_name(self) -> str:
+        return self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
 
     def _create_run(self, name: str, custom_data: dict[str, str]) -> RunWriter:
         folder = self._folder / name
@@ -136,7 +147,7 @@ class RunRecorder(ManagedNode):
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
             offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns)
+            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
         if topic.profile is None or incompatible_policies(profile, topic.profile):
@@ -145,38 +156,51 @@ class RunRecorder(ManagedNode):
     # --- writing
 
     def _write(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
+        if not self.active:
+            self._initial_messages.add(name, cdr, log_time_ns, sent_ns)
+            return
         if name == self._part_topic:
-            self._change_part(deserialize_message(cdr, Part), log_time_ns)
-        self._initial_messages.add(name, cdr, sent_ns)
+            self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
+        for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
+            self._guarded(self.run.write, *first[:4])
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_PER_REPORT == 0:
             self._report_progress()
 
-    def _change_part(self, part: Part, log_time_ns: int) -> None:
+    def _change_part(self, part: Part, log_time_ns: int, sent_ns: int) -> None:
         """Complete the run of the previous part, and begin that of the new one."""
+        before, self._part = self._part, (part.run, stamp_ns(part.header))
         # The message is latched, and may be received again.
-        if self._error is not None or part.run == self._part_run:
+        if self._error is not None or self._part == before:
             return
+        if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
+            return  # a reset from before this recorder
         try:
-            name = _unused_name(self._folder, part.run)
-            new_run = self._create_run(name, _part_data(part, self.values['model_file']))
-            # Messages that are still in the queues belong to the previous part.
+            name = unused_name(self._folder, part.run or self._own_name)
+            new_run = self._create_run(name, part_data(part, self.values['model_file']))
             for recorded in self._topics.values():
                 if recorded.name != self._part_topic:
                     recorded.drain()
+            # Some messages were sent for this part, and are in the run before, too.
+            early = self._initial_messages.begin_part(part, sent_ns)
+            self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
             self.run.finish()
             self.get_logger().info(self.summary())
-            self.run, self._part_run = new_run, part.run
-            for topic in self._topics.values():
-                topic.reset_counts()
-                self.run.add_topic(topic.run_topic)
-            for name, cdr, sent_ns in self._initial_messages:
-                self.run.write(name, cdr, log_time_ns, sent_ns)
+            self._begin_run(new_run, log_time_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
             self._record_failure(error)
         except PaintError as error:
             self.get_logger().error(f'{self._part_topic}: {error}; the run continues')
+
+    def _begin_run(self, run: RunWriter, log_time_ns: int) -> None:
+        """Begin with what is in force."""
+        self.run, self._begun_ns = run, time.time_ns()
+        for topic in self._topics.values():
+            topic.reset_counts(self._begun_ns)
+            run.add_topic(topic.run_topic)
+        for message in self._initial_messages.begin_run(log_time_ns):
+            run.write(*message[:4])
 
     def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
         """Write, unless writing has failed before; the first error ends the recording."""
@@ -211,10 +235,14 @@ class RunRecorder(ManagedNode):
         return self.run.complete, self.summary()
 
     def _deactivate(self) -> None:
+        for topic in self._topics.values():
+            if topic.name in self._always_heard:
+                topic.drain()
+            else:
+                topic.unsubscribe()
+        self._initial_messages.end_motion()
         if self._error is not None:
             return
-        for topic in self._topics.values():
-            topic.drain()
         self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
         never = [name for name in self._wanted if name not in self._topics]
@@ -227,6 +255,8 @@ class RunRecorder(ManagedNode):
         missed = sum(topic.missed for topic in topics)
         state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
+        unheard = [f'{topic.unheard} of {topic.name}' for topic in topics if topic.unheard]
+        lost += f', {" and ".join(unheard)} {UNHEARD}' if unheard else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
         gaps = sum(topic.gaps for topic in topics)
@@ -265,21 +295,3 @@ class RunRecorder(ManagedNode):
         if any(topic.missed for topic in topics):
             return Status(WARN, 'messages were missed', values)
         return Status(OK, 'recording', values)
-
-
-def _part_data(part: Part, model_file: str) -> dict[str, str]:
-    """The custom data of a part's run."""
-    data = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
-    if part.part_pose:
-        data['part_pose'] = ' '.join(map(str, part.part_pose))
-    # The mesh file of a simulator on another machine may not exist here.
-    mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
-    return provenance(mesh_file, model_file) | data
-
-
-def _unused_name(folder: Path, run: str) -> str:
-    """The name of a run, with date and time appended if it already exists."""
-    require_file_name('run', run)
-    dated = run + time.strftime('_%Y%m%d_%H%M%S')
-    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
-    return next(name for name in names if not (folder / name).exists())

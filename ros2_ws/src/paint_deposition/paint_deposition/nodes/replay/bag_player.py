@@ -2,6 +2,7 @@
 
 import math
 import threading
+from pathlib import Path
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped
@@ -13,7 +14,12 @@ from rosgraph_msgs.msg import Clock
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
-from paint_deposition.files.recordings.bags import choose_pose_topic, read_trajectory
+from paint_deposition.files.recordings.bags import (
+    choose_pose_topic,
+    motion_of,
+    trajectory_of,
+)
+from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
 from paint_deposition.nodes.replay.flow_control import FlowControl
@@ -21,6 +27,7 @@ from paint_deposition.nodes.replay.replay_clock import ReplayClock
 from paint_deposition.nodes.replay.replayed_messages import (
     ReplayedTransforms,
     ReplayMessage,
+    pose_messages,
     replay_messages,
 )
 from paint_deposition.nodes.runtime import topics
@@ -34,8 +41,25 @@ PLAYER = fixed_while_running(
     'the replay has begun with it; start another player',
     bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
     pose_topic=NodeParameter(
-        '', "PoseStamped topic in the bag; empty: the bag's only one [topic]"
+        '',
+        "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only one "
+        '[topic]',
     ),
+    tf=NodeParameter(
+        [],
+        'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
+        'empty: they do not [names]',
+        constraints='two names, or none',
+        allows=lambda value: not value or len(value) == 2,
+        element=str,
+    ),
+    urdf=NodeParameter(
+        '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
+    ),
+    tip_link=NodeParameter(
+        '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
+    ),
+    base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
     state_topic=NodeParameter(
         '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
     ),
@@ -59,7 +83,8 @@ PLAYER = fixed_while_running(
 class BagPlayer(PaintNode):
     """Publishes `atomizer/pose`, `atomizer/state` and transforms as recorded, and /clock.
 
-    At any rate, poses are published in the recorded order as the recorded bytes. A std_msgs/Bool
+    At any rate, poses are published in the recorded order as the recorded bytes, or as computed
+    from transforms or joint states of the bag. A std_msgs/Bool
     trigger becomes an AtomizerState stamped with its log time. At rate 0 the player stays at most
     `window` poses ahead of the slowest node that reports PoseProgress on `atomizer/progress`; a
     node that does not report may lose what overflows its queue. In a loop the stamps jump back to
@@ -111,14 +136,27 @@ class BagPlayer(PaintNode):
             raise PaintError('bag_player: bag is empty: give the path of a recording')
         with open_bag(values['bag']) as bag:
             self._transforms = ReplayedTransforms(self, bag)
-            self._pose_topic = choose_pose_topic(bag, values['pose_topic'])
+            robot = None
+            if values['tf'] and values['urdf']:
+                raise PaintError('bag_player: tf and urdf are given: poses come from one of them')
+            if values['urdf']:
+                robot = Robot.read(
+                    Path(values['urdf']), values['tip_link'] or None, values['base_link'] or None
+                )
+            given = values['pose_topic'] or None, values['tf'] or None, robot
+            # The topic of the poses, or the poses of a bag that has none.
+            self._pose_topic, self._motion = '', None
+            if robot or values['tf']:
+                self._motion = motion_of(bag, *given)
+            else:
+                self._pose_topic = choose_pose_topic(bag, values['pose_topic']).name
             self._state_topic: BagTopic | None = None
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
                 self._state_topic = choose_state_topic(bag, values['state_topic'])
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
-                    read_trajectory(values['bag'], self._pose_topic.name, values['state_topic'])
+                    trajectory_of(bag, given[0], values['state_topic'], *given[1:])
             elif unused:
                 known = ' '.join(unused)
                 self.get_logger().info(
@@ -167,8 +205,9 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            topics = (self._pose_topic, self._state_topic, self._transforms.topics)
-            for message in replay_messages(bag, *topics):
+            computed = pose_messages(*self._motion) if self._motion else ()
+            topics = self._pose_topic, self._state_topic, self._transforms.topics
+            for message in replay_messages(bag, *topics, computed):
                 if not begun:
                     begun = True
                     self._time.stop_at(message.log_time_ns)

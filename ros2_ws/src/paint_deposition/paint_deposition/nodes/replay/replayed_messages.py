@@ -1,11 +1,14 @@
 """The messages that a bag player publishes: poses, states of the atomizer, transforms."""
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from heapq import merge
 from itertools import groupby
+from operator import attrgetter
 from typing import Any, NamedTuple
 
-from geometry_msgs.msg import TransformStamped
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -24,6 +27,7 @@ from paint_deposition.files.recordings.transforms import (
     part_pose_topics,
 )
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
@@ -43,19 +47,38 @@ class ReplayMessage(NamedTuple):
 
 
 def replay_messages(
-    bag: Bag, poses: BagTopic, states: BagTopic | None, transforms: Sequence[str] = ()
+    bag: Bag,
+    pose_topic: str,
+    states: BagTopic | None,
+    transforms: Sequence[str] = (),
+    poses: Iterable[RawMessage] = (),
 ) -> Iterator[ReplayMessage]:
-    """Poses, states and transforms by log time; at equal times, poses last."""
-    names = [poses.name, *([states.name] if states else []), *transforms]
-    as_state = _state_converter(bag, states)
-    for _, simultaneous in groupby(bag.messages(names), key=lambda message: message.log_time_ns):
-        for message in sorted(simultaneous, key=lambda message: message.topic == poses.name):
+    """Poses, states and transforms by log time; at equal times, poses last.
+
+    `poses` are those of a bag that has no topic of poses: `pose_topic` is ''.
+    """
+    names = [*filter(None, [pose_topic, states and states.name]), *transforms]
+    as_state, logged = _state_converter(bag, states), attrgetter('log_time_ns')
+    messages = merge(bag.messages(names) if names else (), poses, key=logged)
+    for _, simultaneous in groupby(messages, key=logged):
+        for message in sorted(simultaneous, key=lambda message: message.topic == pose_topic):
             if message.topic in transforms:
                 yield ReplayMessage(message.log_time_ns, False, 0, b'', message)
                 continue
-            is_pose = message.topic == poses.name
+            is_pose = message.topic == pose_topic
             cdr = message.cdr if is_pose else as_state(message)
             yield ReplayMessage(message.log_time_ns, is_pose, header_stamp_ns(cdr), cdr)
+
+
+def pose_messages(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawMessage]:
+    """Serialised poses of a motion that is no topic of its own; log times (N,) never go back."""
+    logged_ns = np.maximum.accumulate(log_times_ns).tolist()
+    poses = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
+    for stamp, at_ns, values in zip(motion.stamps_ns.tolist(), logged_ns, poses, strict=True):
+        pose = PoseStamped(header=header(motion.frame_id, stamp))
+        p, q = pose.pose.position, pose.pose.orientation
+        p.x, p.y, p.z, q.x, q.y, q.z, q.w = values
+        yield RawMessage('', '', at_ns, serialize_message(pose))
 
 
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:

@@ -15,9 +15,15 @@ from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
 from paint_deposition.files.recordings.signals import Signal
+from paint_deposition.model.brush import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trigger import ONLY_BRUSH
-from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, JointPoses, TfPoses
+from paint_deposition.nodes.robot.robot_poses import (
+    QUEUE_DEPTH,
+    JointPoses,
+    PublishedPoses,
+    TfPoses,
+)
 from paint_deposition.nodes.runtime.messages import header, message_class
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
@@ -26,7 +32,13 @@ from paint_deposition.nodes.runtime.topics import POSE_DEPTH, compatible_qos
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 DISCOVERY_PERIOD_S = 0.1
+POSES = 'atomizer/pose'
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
+# What a signal must be, where not every number will do.
+USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
+    'trigger': (math.isfinite, 'a number or Bool'),
+    'brush': (lambda value: value.is_integer() and 0 <= value <= MOST, f'0 to {MOST}'),
+}
 # (topic, message, message info of the middleware)
 TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
@@ -34,7 +46,9 @@ SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 1
 SOURCE = fixed_while_running(
     'the subscriptions are made with it when the node starts; restart the node',
     urdf_file=NodeParameter(
-        '', 'The robot, URDF, whose joint states give the poses; empty: tf gives them [path]'
+        '',
+        'The robot, URDF, whose joint states give the poses; empty: tf gives them, or without '
+        'base_link the robot publishes them itself [path]',
     ),
     tip_link=NodeParameter(
         '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
@@ -71,17 +85,15 @@ SOURCE = fixed_while_running(
 class AtomizerSource(PaintNode):
     """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
-    A pose has the stamp of its joint state or transform. A signal takes effect at the stamp of
-    its message, or at the time it was sent if there is none.
+    With a trigger alone it publishes the states of a robot that publishes its poses itself. A pose
+    has the stamp of its joint state or transform. A signal takes effect at the stamp of its
+    message, or at the time it was sent if there is none.
     """
 
     PARAMETERS = SOURCE
 
     def __init__(self, **kwargs: Any):
         super().__init__('atomizer_source', **kwargs)
-        self._pose_publisher = self.create_publisher(
-            PoseStamped, 'atomizer/pose', QoSProfile(depth=POSE_DEPTH)
-        )
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
@@ -89,20 +101,21 @@ class AtomizerSource(PaintNode):
         self._missing: dict[str, Callable[..., None]] = {
             signal.topic: self._on_signal_message for signal in self._signals.values()
         }
-        self._motion = self._create_motion()
         self._values: dict[str, float] = {}
         self._published = ''
         self._poses = 0
         self._clock_offset_s = 0.0
-        self._problem = ''
+        self._motion = self._create_motion()
+        self._problems: dict[str, str] = {}  # by topic
         self._discovery_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
         Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
 
     def _validate(self, values: Mapping[str, Any]) -> None:
-        if not values['urdf_file'] and not values['base_link']:
+        if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
             raise PaintError(
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
-                'frame in which tf knows its tip'
+                'frame in which tf knows its tip; or trigger alone beside a robot that publishes '
+                f'{POSES}'
             )
         alone = [name for name in SIGNALS[1:] if values[name] and not values['trigger']]
         if alone:
@@ -124,8 +137,12 @@ class AtomizerSource(PaintNode):
 
     # --- poses
 
-    def _create_motion(self) -> JointPoses | TfPoses:
+    def _create_motion(self) -> JointPoses | TfPoses | PublishedPoses:
         values = self.values
+        if self._robot is None and not values['base_link']:
+            return PublishedPoses(self, POSES, self._compare_clocks)
+        depth = QoSProfile(depth=POSE_DEPTH)
+        self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
         if self._robot is None:
             tip = values['tip_link'] or DEFAULT_TIP
             return TfPoses(self, values['base_link'], tip, self._publish_pose)
@@ -135,12 +152,15 @@ class AtomizerSource(PaintNode):
 
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
-            self._clock_offset_s = (sent_ns - stamp) * 1e-9
+            self._compare_clocks(stamp, sent_ns)
         pose = PoseStamped(header=header(self._motion.base, stamp))
         p, q = pose.pose.position, pose.pose.orientation
         p.x, p.y, p.z, q.x, q.y, q.z, q.w = (tip @ self._tcp).values
         self._pose_publisher.publish(pose)
         self._poses += 1
+
+    def _compare_clocks(self, stamp: int, sent_ns: int) -> None:
+        self._clock_offset_s = (sent_ns - stamp) * 1e-9
 
     # --- signals
 
@@ -149,7 +169,13 @@ class AtomizerSource(PaintNode):
         for topic, take in tuple(self._missing.items()):
             found = self.get_publishers_info_by_topic(self.resolve_topic_name(topic))
             if found:
-                message = message_class(found[0].topic_type)
+                kind = found[0].topic_type
+                try:
+                    message = message_class(kind)
+                except (ImportError, AttributeError):
+                    reason = f'{topic} comes as {kind}, which is not installed: source it'
+                    self._problems[topic] = reason
+                    continue
                 profile = compatible_qos([info.qos_profile for info in found], QUEUE_DEPTH)
                 self.create_subscription(message, topic, partial(take, topic), profile)
                 del self._missing[topic]
@@ -159,22 +185,25 @@ class AtomizerSource(PaintNode):
     def _on_signal_message(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
         """Take trigger, flow, brush and speed, which may be fields of one message."""
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
-        self._problem = ''
+        problem = ''
         for name, signal in self._signals.items():
             if signal.topic != topic:
                 continue
             value = signal.value(message)
             if value is None:
                 kind, path = type(message).__name__, signal.path or '.data'
-                self._problem = f'{topic}: {kind} has no number or Bool at {path}'
+                problem = f'{topic}: {kind} has no number or Bool at {path}'
+            elif name in USABLE and not USABLE[name][0](value):
+                problem = f'{topic}: {name} is {value:g}: give {USABLE[name][1]}'
             elif not stamp and abs(self._clock_offset_s) > MAX_CLOCK_OFFSET_S:
-                self._problem = (
+                problem = (
                     f'{topic} has no stamps, and the poses of the robot are sent '
                     f'{self._clock_offset_s:.3g} s off their own stamps: set the clocks'
                 )
             else:
                 self._values[name] = value
-        if not self._problem:
+        self._problems[topic] = problem
+        if not problem:
             now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
             self._publish_state(stamp or now_ns)
 
@@ -208,8 +237,8 @@ class AtomizerSource(PaintNode):
             f'{name}, {signal.topic}{signal.path}': self._values.get(name, 'not received')
             for name, signal in self._signals.items()
         }
-        if self._problem:
-            return Status(ERROR, self._problem, values)
+        if problems := [problem for problem in self._problems.values() if problem]:
+            return Status(ERROR, '; '.join(problems), values)
         missing = [name for name, value in values.items() if value == 'not received']
         if missing:
             return Status(WARN, f'not received: {" ".join(missing)}', values)

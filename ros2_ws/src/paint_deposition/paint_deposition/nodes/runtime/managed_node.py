@@ -28,9 +28,10 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     """A node with the lifecycle of a managed node of ROS 2.
 
     `configure` reads its files and creates its topics and services; `activate` starts its work.
-    The reverse transition destroys whatever publishers, timers and so on a transition created. A
-    PaintError leaves the state as it was; any other error leads to `unconfigured`. Either is
-    logged in one line.
+    The reverse transition destroys the publishers, timers and so on that a transition created,
+    and `cleanup` also those that callbacks created since `configure`: a callback that creates one
+    for the time of activity destroys it in `_deactivate`. A PaintError leaves the state as it
+    was; any other error leads to `unconfigured`. Either is logged in one line.
     """
 
     PARAMETERS: ParameterTable = MANAGED
@@ -39,8 +40,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     _failure: Exception | None = None
 
     def __init__(self, name: str, **kwargs: Any):
-        # The entities from before `configure`, and those from before `activate`.
-        self._entities_before: list[set[Any]] = []
+        # The entities that `configure` created, and those that `activate` created.
+        self._created: list[set[Any]] = []
         # The mixin does not pass arguments on; it is initialised once the node exists.
         PaintNode.__init__(self, name, **kwargs)
 
@@ -77,12 +78,12 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     @property
     def configured(self) -> bool:
-        return len(self._entities_before) > 0
+        return len(self._created) > 0
 
     @property
     def active(self) -> bool:
         """Whether the node is in the state `active`."""
-        return len(self._entities_before) > 1
+        return len(self._created) > 1
 
     def close(self) -> None:
         """Deactivate and clean up, if the node is active or configured."""
@@ -142,24 +143,32 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         return TransitionCallbackReturn.SUCCESS
 
     def _enter(self, step: Callable[[], None]) -> None:
-        kinds = (getattr(self, f'{kind}s') for kind in ENTITIES)
-        self._entities_before.append({entity for entities in kinds for entity in entities})
+        before = self._entities
+        if not self.configured:
+            self._lasting = before
+        self._created.append(set())
         try:
             step()
         except BaseException:
-            self._destroy_entities()
+            self._created.pop()
+            self._destroy(self._entities - before)
             raise
+        self._created[-1] = self._entities - before
 
     def _leave(self, step: Callable[[], None]) -> None:
         try:
             step()
         finally:
-            self._destroy_entities()
+            created = self._created.pop()
+            self._destroy(created if self.configured else self._entities - self._lasting)
 
-    def _destroy_entities(self) -> None:
-        before = self._entities_before.pop()
+    @property
+    def _entities(self) -> set[Any]:
+        return {entity for kind in ENTITIES for entity in getattr(self, f'{kind}s')}
+
+    def _destroy(self, entities: set[Any]) -> None:
         for kind in ENTITIES:
-            for entity in set(getattr(self, f'{kind}s')) - before:
+            for entity in entities.intersection(getattr(self, f'{kind}s')):
                 getattr(self, f'destroy_{kind}')(entity)
 
     def _state_status(self) -> Status:

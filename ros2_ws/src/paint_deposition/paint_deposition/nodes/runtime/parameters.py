@@ -23,9 +23,13 @@ INT64_MAX = 2**63 - 1
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 RESERVED_PREFIX = 'qos_overrides.'
+LONGEST_SHOWN = 40  # letters of a name that is refused
 RUNS = 'runs'  # `fixed_while`: in every state
-FILE_NAME = re.compile(r'[A-Za-z0-9_-][A-Za-z0-9._-]*')
-FILE_NAME_RULE = "letters, digits, '-', '_' and '.', the last not in front"
+# Room is left for what is appended: a date, the number of a coat, the ending of a file.
+FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9._-]{0,199}')
+FILE_NAME_RULE = (
+    "at most 200 letters, digits, '-', '_' and '.', the first a letter, a digit or '_'"
+)
 TYPE_DESCRIPTIONS = {
     Parameter.Type.BOOL: 'true or false',
     Parameter.Type.INTEGER: 'a whole number',
@@ -246,4 +250,5 @@ def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParame
 def require_file_name(what: str, name: str) -> None:
     """Raise PaintError for a name that is empty or could lead to another folder."""
     if not FILE_NAME.fullmatch(name):
-        raise PaintError(f"{what} '{name}': use {FILE_NAME_RULE}")
+        shown = name if len(name) <= LONGEST_SHOWN else f'{name[:LONGEST_SHOWN]}...'
+        raise PaintError(f"{what} '{shown}': use {FILE_NAME_RULE}")

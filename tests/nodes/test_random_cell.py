@@ -1,0 +1,317 @@
+"""Whatever happens in a cell, each recorded run has the film that was seen, to the bit.
+
+Simulator, robot and recorder are nodes over DDS, the recorder in a process of its own, which is
+also killed. `make cell` takes 10,000 steps; PAINT_STEPS says how many here.
+"""
+
+import itertools
+import os
+import time
+from pathlib import Path
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from hypothesis import HealthCheck, Phase, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import (
+    RuleBasedStateMachine,
+    initialize,
+    precondition,
+    rule,
+    run_state_machine_as_test,
+)
+from lifecycle_msgs.srv import ChangeState
+from paint_msgs.msg import AtomizerState
+from paint_msgs.srv import ChangePart
+from rcl_interfaces.srv import SetParameters
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from std_srvs.srv import Trigger
+
+from brushes import NARROW, WIDE, two_brushes
+from nodes.cell import FACING_PANEL, Onlooker, Robot, offline_um, parameters, write_panel
+from nodes.processes import NodeProcess
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import STATE_TOPIC
+from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.model.brush import Brush
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+
+STEPS = int(os.environ.get('PAINT_STEPS', '30'))
+STEPS_OF_A_CELL = min(100, STEPS)
+STEP_NS = 4_000_000
+SPEED_M_PER_S = 0.8
+# A killed recorder loses what came in the last half second.
+WRITTEN_S = 0.8
+POSES = {False: [], True: [0.1, 0.0, 0.05, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]}
+SIMULATOR, RECORDER = '/deposition_simulator', '/run_recorder'
+counts = st.integers(0, 80)
+
+
+class Simulator(DepositionSimulator):
+    """Keeps the film of the part that leaves, and of one that is reset."""
+
+    left: SimpleNamespace | None = None
+
+    def keep(self) -> None:
+        self.left = SimpleNamespace(
+            points=self.points, surface=self.surface, film=self.film.snapshot().film_um,
+            models=self.models, received=self.film.counts.received,
+        )  # fmt: skip
+
+    def change_part(self, *part) -> None:
+        self.keep()
+        super().change_part(*part)
+
+
+class Cell(RuleBasedStateMachine):
+    """A robot paints parts that change, as an operator and an integrator would let it."""
+
+    numbers = itertools.count()
+
+    def __init__(self, context, executor, wait_until, folder: Path) -> None:
+        super().__init__()
+        self.context, self.executor, self.wait_until = context, executor, wait_until
+        self.folder = folder / f'cell_{next(self.numbers)}'
+        self.folder.mkdir()
+        self.recorders, self.serials = itertools.count(), itertools.count(1)
+        self.clients: dict[str, object] = {}
+
+    # --- the cell
+
+    @initialize()
+    def begin(self) -> None:
+        narrow, wide = write_panel(self.folder / 'a.stl'), self.folder / 'b.stl'
+        mesh = read_mesh(narrow)
+        trimesh.Trimesh(1.3 * mesh.vertices_m, mesh.faces).export(wide)
+        self.meshes = [str(narrow), str(wide)]
+        models = (
+            two_brushes(),
+            DepositionModel.of_brushes(
+                [Brush(number=1, planar=WIDE), Brush(number=2, planar=NARROW)]
+            ),
+        )
+        self.models = [str(self.folder / f'{name}.yaml') for name in 'ab']
+        for path, model in zip(self.models, models, strict=True):
+            write_model(path, model)
+        chosen = {
+            'mesh_file': self.meshes[0], 'max_edge_length_m': 0.1, 'model_file': self.models[0],
+            'output_directory': str(self.folder / 'films'), 'part_parent_frame': 'cell',
+        }  # fmt: skip
+        self.simulator = Simulator(context=self.context, parameter_overrides=parameters(**chosen))
+        self.robot, self.operator = Robot(self.context), Onlooker(self.context, {})
+        latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self.robot.destroy_publisher(self.robot.state_publisher)
+        self.robot.state_publisher = self.robot.create_publisher(
+            AtomizerState, 'atomizer/state', latched
+        )
+        self.nodes = [self.simulator, self.robot, self.operator]
+        for node in self.nodes:
+            self.executor.add_node(node)
+        self.active, self.frame, self.sent = True, 'part', 0
+        self.stamp_ns = self.gun_ns = time.time_ns() + 3_600_000_000_000
+        self.start_recorder()
+        self.change_part(0, 0, 0, False)
+        self.robot.send_state(self.stamp_ns, 1.0, 1)
+
+    def start_recorder(self) -> None:
+        """Its first run is of a part that is there already."""
+        name = f'run_{next(self.recorders)}'
+        log = self.folder / name
+        self.recorder = NodeProcess(
+            log, 'run_recorder', output_directory=self.folder / 'runs', name=name
+        )
+        self.wait_until(lambda: self.robot.has_subscribers(2), what='the recorder')
+        self.run, self.is_whole = name, False
+
+    def call(self, service, name: str, **fields):
+        future = self.ask(service, name, **fields)
+        self.wait_until(future.done, what=f'the answer of {name}')
+        return future.result()
+
+    def ask(self, service, name: str, **fields):
+        if name not in self.clients:
+            self.clients[name] = self.operator.create_client(service, name)
+        self.wait_until(self.clients[name].service_is_ready, what=name)
+        return self.clients[name].call_async(service.Request(**fields))
+
+    def settle(self) -> None:
+        """All that was sent is painted."""
+        if self.active:
+            self.wait_until(lambda: self.painted == self.sent, what='all painted')
+        self.simulator.catch_up()
+
+    @property
+    def painted(self) -> int:
+        return self.simulator.film.counts.received + self.painted_before
+
+    painted_before = 0
+
+    def check(self, run: Path, of: SimpleNamespace) -> None:
+        """Compare the film of a run with that which the simulator had of it."""
+        self.wait_until((run / 'metadata.yaml').is_file, what=f'the end of {run}')
+        if not of.received:
+            return
+        motion = read_recording(run, state_topic=STATE_TOPIC)
+        assert len(motion) == of.received, run
+        offline = offline_um(of, motion, of.models[0])
+        assert np.array_equal(offline, of.film), (run, np.abs(offline - of.film).max())
+
+    def leave(self, next_run: str) -> None:
+        """The part has left: compare, and go on with the next run."""
+        self.painted_before += self.simulator.left.received
+        if self.is_whole:
+            self.check(self.folder / 'runs' / self.run, self.simulator.left)
+        self.run, self.is_whole = next_run, True
+        self.wait_until((self.folder / 'runs' / self.run).is_dir, what=self.run)
+
+    # --- what happens
+
+    @precondition(lambda self: self.active)
+    @rule(count=counts, wait=st.booleans())
+    def poses(self, count: int, wait: bool) -> None:
+        """Back and forth, each time at another height."""
+        for _ in range(count):
+            travelled_m = self.sent * STEP_NS * 1e-9 * SPEED_M_PER_S
+            turn, along = divmod(travelled_m, 1.0)
+            across = along - 0.5 if turn % 2 else 0.5 - along
+            place = np.array([across, -0.25, 0.3 * np.sin(turn)])
+            turned = FACING_PANEL
+            if self.frame == 'cell':
+                place, turned = Rigid.of(POSES[True]).applied(place, turned)
+            self.robot.send_pose(self.stamp_ns, place, turned, self.frame)
+            self.stamp_ns += STEP_NS
+            self.sent += 1
+        if wait:
+            self.settle()
+
+    @rule(flow=st.sampled_from([0.0, 0.5, 1.0]), brush=st.sampled_from([1, 2]),
+          ahead_ms=st.sampled_from([0, 1, 50, 300]))  # fmt: skip
+    def state(self, flow: float, brush: int, ahead_ms: int) -> None:
+        self.gun_ns = max(self.gun_ns, self.stamp_ns + ahead_ms * 1_000_000)
+        self.robot.send_state(self.gun_ns, flow, brush)
+
+    @rule(mesh=st.integers(0, 1), before=counts, after=counts, placed=st.booleans())
+    def change_part(self, mesh: int, before: int, after: int, placed: bool) -> None:
+        """While poses come, if the node is active."""
+        serial, placed = str(next(self.serials)), placed or self.frame == 'cell'
+        request = {
+            'serial': serial, 'mesh_file': self.meshes[mesh], 'part_pose': POSES[placed],
+        }  # fmt: skip
+        if self.active:
+            self.poses(before, False)
+        if placed and self.frame == 'part':
+            # The robot says from now on where it is in the cell.
+            self.settle()
+        asked = self.ask(ChangePart, f'{SIMULATOR}/change_part', **request)
+        if placed and self.frame == 'part':
+            self.wait_until(asked.done)
+            self.frame = 'cell'
+        if self.active:
+            self.poses(after, False)
+        self.wait_until(asked.done, what='the change')
+        assert asked.result().success, asked.result().message
+        self.leave(serial)
+
+    @rule()
+    def reset(self) -> None:
+        self.settle()
+        self.simulator.keep()
+        self.call(Trigger, f'{SIMULATOR}/reset')
+        if self.simulator.left.received:
+            self.leave(self.simulator.parts.part.run)
+
+    @rule()
+    def pause(self) -> None:
+        """Deactivate the simulator, or activate it again."""
+        self.settle()
+        request = ChangeState.Request()
+        request.transition.label = 'deactivate' if self.active else 'activate'
+        name = f'{SIMULATOR}/change_state'
+        answer = self.call(ChangeState, name, transition=request.transition)
+        assert answer.success
+        self.active = not self.active
+
+    @rule(change=st.sampled_from([
+        ('publish_rate_hz', 5.0), ('publish_rate_hz', 25.0), ('trigger_latency_s', 0.05),
+        ('trigger_latency_s', 0.2), ('color_max_um', 20.0), ('model_file', 0), ('model_file', 1),
+    ]))  # fmt: skip
+    def set_parameter(self, change: tuple[str, object]) -> None:
+        name, value = change
+        value = self.models[value] if name == 'model_file' else value
+        sent = [change.to_parameter_msg() for change in parameters(**{name: value})]
+        answer = self.call(SetParameters, f'{SIMULATOR}/set_parameters', parameters=sent)
+        assert answer.results[0].successful, answer.results[0].reason
+        if name == 'model_file':
+            self.wait_until(lambda: not self.simulator.repainting, what='the new model')
+            assert not self.simulator.model_problem
+
+    @rule(signal=st.sampled_from(['kill', 'terminate', 'stop', 'cycle']), each=st.integers(0, 3))
+    def end_recorder(self, signal: str, each: int) -> None:
+        """Kill it and recover its run, or end it as it should be, and start another."""
+        if each:  # seldom: a process takes seconds to start
+            return
+        self.settle()
+        self.simulator.keep()
+        run, of = self.folder / 'runs' / self.run, self.simulator.left
+        # What was sent is with the recorder, and in its file.
+        until_s = time.monotonic() + WRITTEN_S
+        self.wait_until(lambda: time.monotonic() > until_s)
+        if signal == 'cycle':
+            for label in ('deactivate', 'activate'):
+                request = ChangeState.Request()
+                request.transition.label = label
+                name = f'{RECORDER}/change_state'
+                assert self.call(ChangeState, name, transition=request.transition).success
+            if self.is_whole:
+                self.check(run, of)
+            self.wait_until(lambda: self.robot.has_subscribers(2))
+            self.is_whole = False
+            return
+        if signal == 'stop':
+            assert self.call(Trigger, f'{RECORDER}/stop').success
+        else:
+            getattr(self.recorder, signal)()
+        code = self.recorder.wait()
+        assert code == (-9 if signal == 'kill' else 0), self.recorder.err
+        assert 'Traceback' not in self.recorder.err
+        if signal == 'kill' and of.received:
+            run = recover(run, run.with_name(f'{run.name}_recovered')).folder
+        if self.is_whole:
+            self.check(run, of)
+        self.wait_until(lambda: not self.robot.has_subscribers(2))
+        self.clients = {name: c for name, c in self.clients.items() if RECORDER not in name}
+        self.start_recorder()
+
+    def teardown(self) -> None:
+        if not hasattr(self, 'recorder'):
+            return
+        try:
+            self.settle()
+            self.simulator.keep()
+            self.recorder.terminate()
+            assert self.recorder.wait() == 0, self.recorder.err
+            if self.is_whole:
+                self.check(self.folder / 'runs' / self.run, self.simulator.left)
+        finally:
+            self.recorder.__exit__()
+            for node in self.nodes:
+                self.executor.remove_node(node)
+                node.destroy_node()
+
+
+@pytest.mark.timeout(0 if STEPS > 1000 else 600)
+def test_every_run_has_the_film_that_was_seen(ros_context, executor, wait_until, tmp_path):
+    many = settings(
+        max_examples=max(1, STEPS // STEPS_OF_A_CELL), stateful_step_count=STEPS_OF_A_CELL,
+        phases=[Phase.explicit, Phase.generate], suppress_health_check=list(HealthCheck),
+        derandomize=STEPS <= 1000, database=None, print_blob=True,
+    )  # fmt: skip
+    run_state_machine_as_test(
+        lambda: Cell(ros_context, executor, wait_until, tmp_path), settings=many
+    )
