@@ -52,7 +52,8 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
         part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
         shown_um = np.clip(residual_um[rows], -largest, largest)
         colours = scale.rgba(shown_um, np.ones(count, dtype=bool)) / 255.0
-        axes.scatter(*places.T, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
+        x, y = places.T
+        axes.scatter(x, y, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
         colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
         figures.append(figure)
     film_um = data.painted[index][-1].film_um
