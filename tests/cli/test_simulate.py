@@ -168,6 +168,8 @@ def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
     [
         ('--mesh', 'nowhere.stl', ['nowhere.stl', 'no such mesh file']),
         ('--mesh', __file__, ['.py', '.stl']),
+        ('--mesh', '', ['--mesh is empty']),
+        ('--trajectory', '', ['--trajectory is empty']),
         ('--trajectory', 'nowhere', ['no bag at nowhere']),
         ('--model', 'nowhere.yaml', ['nowhere.yaml', 'no such file']),
         ('--mesh-scale', '-1', ['--mesh-scale', '-1']),

@@ -1,5 +1,7 @@
 """Passes planned on parts, and their files."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,21 @@ def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
     assert mean == pytest.approx(20.0, rel=3e-3)
     assert planned.sigma_n == pytest.approx(sigma_n, rel=1e-4)
     assert planned.statistics.coverage == 1.0
+
+
+@pytest.mark.parametrize(
+    ('wanted', 'words'),
+    [
+        ({'target_um': 20.0}, []),
+        ({'target_um': 16.0, 'speed_m_per_s': 0.3}, ['mean film will be 20.0 µm, not the target']),
+        ({'target_um': 20.0, 'speed_max_m_per_s': 0.11}, ['to 0.11 m/s are allowed']),
+    ],
+)
+def test_what_was_asked_for_and_is_not_reached_is_warned_of(planned, wanted, words):
+    warnings = list(replace(planned, request=PlanRequest(**wanted)).warnings)
+    assert [word in line for word, line in zip(words, warnings, strict=True)] == [True] * len(
+        words
+    )
 
 
 def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(planned):

@@ -33,13 +33,31 @@ class FiniteNumber(Finite, click.types.FloatParamType):
 
 
 class FiniteRange(Finite, click.FloatRange):
-    """A finite number within bounds."""
+    """A finite number within bounds; of a length in millimetres it says what is wanted."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            if param is not None and str(param.name).endswith('_m'):
+                error.message = f'{error.message.rstrip(".")}, in metres'
+            raise
+
+
+class File(click.Path):
+    """A path that is not empty, as that of a variable of the shell which is not set."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        if value == '':
+            name = param.opts[0] if param else 'the path'
+            raise click.UsageError(f'{name} is empty; give a file', ctx)
+        return super().convert(value, param, ctx)
 
 
 NUMBER = FiniteNumber()
 POSITIVE = FiniteRange(min=0.0, min_open=True)
 NOT_NEGATIVE = FiniteRange(min=0.0)
-FILE = click.Path(path_type=Path)
+FILE = File(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
 CAMPAIGN = click.argument('campaign', type=FILE)

@@ -111,7 +111,7 @@ def plan_command(
         }
         results.write(result, made_from=made_from, part_pose=part_pose, frame_id=frame_id)
     options.print_all('note', surface.notes)
-    options.print_all('warning', map(str, touched))
+    options.print_all('warning', [*result.warnings, *map(str, touched)])
     results.print(_plan_lines(result), model=chosen.words)
 
 

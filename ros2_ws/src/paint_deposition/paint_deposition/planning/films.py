@@ -1,7 +1,7 @@
 """Films that plans are made from: of a motion, of single passes, and of pieces of a pass."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -33,6 +33,8 @@ COARSEST_STEP_M = 0.02
 STEPS_PER_SCALE, STEPS_PER_SIGMA = 5.0, 6.0
 # Slower poses would be gaps, at which the gun is off.
 SLOWEST_RATE_HZ = 10.0
+# A mean film this close to the target is on it; speeds this close to a limit keep it.
+NEAR = 0.01
 
 
 def simulated(
@@ -116,6 +118,23 @@ class PlannedFilm:
             f'mean film {self.statistics.mean_um:.1f} µm, sigma_n {100 * self.sigma_n:.1f} %, '
             f'{self.cycle_time_s:.1f} s'
         )
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """Where the plan is not what was asked for, a line each."""
+        request, target = self.request, self.request.target_um
+        if target and request.speed_m_per_s and abs(self.mean_um / target - 1.0) > NEAR:
+            yield (
+                f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
+                f'of {target:g} µm; leave out the speed and it is chosen for the target'
+            )
+        slowest, fastest = min(self.sprayed_speeds_m_per_s), max(self.sprayed_speeds_m_per_s)
+        least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
+        if slowest < (1.0 - NEAR) * least or fastest > (1.0 + NEAR) * most:
+            yield (
+                f'the passes run at {slowest:.3g} to {fastest:.3g} m/s, where {least:g} to '
+                f'{most:g} m/s are allowed (--speed-min, --speed-max)'
+            )
 
     def __repr__(self) -> str:
         return f'{type(self).__name__}({self.sentence})'

@@ -48,7 +48,7 @@ class PassRequest(FilmBuild):
     one_way: bool = given(False, 'Every pass in one direction; default: they alternate.')
     standoff_m: float | None = given(
         None, 'Distance of the TCP from the part [m]; default: the part lies on the model plane.',
-        '--standoff', above=0.0,
+        '--standoff', above=0.0, most=10.0,
     )  # fmt: skip
     travel_rad: float = given(
         0.0, "Direction of the first pass in the tool's x-y frame, from x to y."
@@ -121,8 +121,9 @@ class PlanRequest(Limits, PassRequest):
 
     direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')
     index_m: float | None = given(
-        None, 'Index between passes [m]; default: the most even one.', '--index', above=0.0
-    )
+        None, 'Index between passes [m]; default: the most even one.', '--index',
+        least=0.001, most=10.0,
+    )  # fmt: skip
     smoothing_radius_m: float = given(
         0.1, 'Features of the part smaller than this are not followed.', above=0.0
     )
@@ -149,6 +150,16 @@ class PlanRequest(Limits, PassRequest):
     time_weight: float = given(
         5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
     )
+
+    @model_validator(mode='after')
+    def _speed_is_allowed(self) -> 'PlanRequest':
+        speed, least, most = self.speed_m_per_s, self.speed_min_m_per_s, self.speed_max_m_per_s
+        if speed is not None and not least <= speed <= most:
+            raise PlanError(
+                f'speed_m_per_s is {speed:g}, outside speed_min_m_per_s to speed_max_m_per_s, '
+                f'{least:g} to {most:g}; give a speed within them or change them'
+            )
+        return self
 
     @model_validator(mode='after')
     def _has_a_side(self) -> 'PlanRequest':
