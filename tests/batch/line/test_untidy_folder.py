@@ -37,12 +37,15 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path, at_worker)
     (folder / f'{label}.csv').rename(folder / f'{label}.CSV')
     (folder / 'unknown_door.csv').write_text('x_m,y_m,z_m,thickness_um\n0,0,0,20\n')
     (folder / 'empty').mkdir()
+    (folder / 'week_46').mkdir()
+    shutil.copytree(folder / good, folder / 'week_46' / good)
     done = paint('line', folder, '-o', tmp_path / 'out', *at_worker, '--json')
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
-    assert [error['run'] for error in told['errors']] == [cut, twice]
+    assert [error['run'] for error in told['errors']] == [cut, twice, 'week_46/']
     assert 'paint recover' in told['errors'][0]['error']
     assert 'two recordings have its name' in told['errors'][1]['error']
+    assert 'move them up beside line.yaml' in told['errors'][2]['error']
     remarks = {one['part']: one['remark'] for one in told['remarks']}
     assert remarks[gauge].startswith('simulated only: two files of readings have its name')
     assert told['without_run'] == ['unknown_door.csv']

@@ -18,6 +18,8 @@ from paint_deposition.files.strict_yaml import read_yaml
 
 NAME = 'line.yaml'
 BAGS = ('.bag', '.mcap')
+HELD = (*BAGS, '.db3')
+DEEPER = 'a folder that holds recordings, which are left out; move them up beside line.yaml'
 TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
 
 
@@ -74,6 +76,7 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     """
     recordings: dict[str, list[Path]] = defaultdict(list)
     readings: dict[str, list[Path]] = defaultdict(list)
+    deeper: list[Run] = []
     for path in sorted(set(folder.iterdir()) - set(shared)):
         if path.name.startswith('.'):
             continue
@@ -81,11 +84,14 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
         held = [*path.glob('metadata.yaml'), *path.glob('*.mcap'), *path.glob('*.db3')]
         if path.is_dir() and held:
             recordings[path.name].append(path)
+        elif path.is_dir() and any(p.suffix in HELD for p in path.rglob('*')):
+            deeper.append(Run(f'{path.name}/', path, problem=DEEPER))
         elif path.suffix.lower() in BAGS:
             recordings[path.stem].append(path)
         elif path.suffix.lower() in TABLES:
             readings[path.stem].append(path)
     runs = [_run(name, paths, readings.pop(name, [])) for name, paths in recordings.items()]
+    runs += deeper
     if not runs:
         raise ManyError(
             f'{folder}: holds no run; put recordings there (a rosbag2 folder, .bag or .mcap) and '
