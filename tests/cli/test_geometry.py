@@ -68,8 +68,8 @@ def triggered(flow: float = 1.0, later_s: float = 0.0) -> Trajectory:
     return replace(motion, trigger_stamps_ns=stamps, trigger_flow=flow * motion.trigger_flow)
 
 
-def in_millimetres() -> Trajectory:
-    return replace(three_passes(), positions_m=1000.0 * three_passes().positions_m)
+def in_millimetres(scale: float = 1000.0) -> Trajectory:
+    return replace(three_passes(), positions_m=scale * three_passes().positions_m)
 
 
 def with_one_pass_above() -> Trajectory:
@@ -106,6 +106,7 @@ def test_a_right_geometry_is_one_line_without_a_warning(panel, tmp_path):
         (partial(shifted, 0.0, 0.0, -1.1), ['the passes miss the part', 'span x -0.70 to 0.70']),
         (partial(in_another_frame, 90.0, (0.0, 0.0, 0.0)),
          ['another frame than the mesh', "'base_link' span x 0.25 to 0.25, y -0.70 to 0.70"]),
+        (partial(in_millimetres, 0.001), ['path is 0.002 m long, the part 1.44 m', 'too small']),
         (with_one_pass_above, ['pass 1 of 4 misses the part', 'trigger']),
     ],
 )  # fmt: skip
