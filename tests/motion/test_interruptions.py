@@ -51,6 +51,13 @@ def test_a_log_that_is_in_the_file_twice_is_told_from_another_run():
     assert 'another run follows in the file' in line
 
 
+def test_poses_dropped_for_rounded_stamps_are_warned_of():
+    rounded = replace(WHOLE, stamps_ns=WHOLE.stamps_ns // 10**8 * 10**8)
+    (line,) = checked_path(rounded, 0.25)[2]
+    assert line.startswith('400 of 500 poses dropped, for they repeat the stamp before them')
+    assert checked_path(WHOLE, 0.25)[2] == ()
+
+
 def test_milliseconds_that_are_taken_for_seconds_are_suggested():
     slow = replace(WHOLE, stamps_ns=1000 * (WHOLE.stamps_ns - WHOLE.stamps_ns[0]))
     with pytest.raises(RecordingError, match=r'they are 20 s apart: if these are milliseconds'):

@@ -11,6 +11,9 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M, gap_ns, spray_path
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 
+# A recorder may repeat a stamp now and then; more than this share of the poses is a fault.
+MANY_REPEATED = 0.05
+
 
 def checked_path(
     trajectory: Trajectory, max_pose_gap_s: float, max_step_m: float = DEFAULT_MAX_STEP_M
@@ -25,7 +28,14 @@ def checked_path(
         _refuse_motion(trajectory, counts, max_pose_gap_s)
     if not np.any(path.flow > 0.0):
         _refuse_trigger(trajectory)
-    return path, counts, tuple(interruptions(path, max_pose_gap_s))
+    odd = list(interruptions(path, max_pose_gap_s))
+    if counts.repeated_stamps > MANY_REPEATED * counts.received:
+        odd.append(
+            f'{counts.repeated_stamps} of {counts.received} poses dropped, for they repeat the '
+            'stamp before them: the stamps look rounded, or poses recorded twice; record stamps '
+            'with all their digits'
+        )
+    return path, counts, tuple(odd)
 
 
 def interruptions(path: SprayPath, max_pose_gap_s: float) -> Iterator[str]:
