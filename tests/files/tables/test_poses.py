@@ -133,10 +133,10 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
 def test_what_could_be_the_trigger_is_named(tmp_path):
     rows = [f'{k / 10},{k},2,3,0,0,0,1,{word},0' for k, word in enumerate(('AUS', 'EIN', 'aus'))]
     (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw,Pistole,DO2\n' + '\n'.join(rows))
-    (note,) = read_recording(tmp_path / 'p.csv').notes
-    assert 'the gun sprays throughout (Pistole could be one, --trigger NAME)' in note
+    (warning,) = read_recording(tmp_path / 'p.csv').warnings
+    assert warning.startswith('the gun counts as always on; if Pistole is its trigger')
     read = read_recording(tmp_path / 'p.csv', state_topic='Pistole')
-    assert read.trigger_flow.tolist() == [0.0, 1.0, 0.0]
+    assert (read.trigger_flow.tolist(), read.warnings) == ([0.0, 1.0, 0.0], ())
 
 
 def test_a_workbook_is_a_log_too(tmp_path):

@@ -79,7 +79,9 @@ def _contents(
         return asdict(program), program_as_text(program)
     if is_pose_table(path):
         MotionSource(gun_signal=gun_signal).require_kind(path, 'a table of poses')
-        return _table_contents(read_pose_table(path, PoseLayout()))
+        poses = read_pose_table(path, PoseLayout())
+        options.print_all('warning', poses.warnings)
+        return _table_contents(poses)
     MotionSource(gun_signal=gun_signal).require_kind(path, 'a bag')
     summary = summarise(path, max_pose_gap_s)
     return asdict(summary), _bag_contents(summary)

@@ -64,6 +64,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     positions, unit = _positions_m(table, layout.pose_unit)
     quaternions, orientation = read_rotations(table, layout.rotation, layout.angle_unit)
     flows, trigger = _flows(table, layout.trigger)
+    warnings = () if flows is not None else _could_be_trigger(table)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
@@ -76,7 +77,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
         return Trajectory(
             stamps, positions, quaternions, trigger_stamps_ns=stamps[on],
             trigger_flow=levels[on], trigger_brush=numbered(brushes[on]),
-            notes=(f'{note}; {table.written([time])} in {time_unit}',),
+            notes=(f'{note}; {table.written([time])} in {time_unit}',), warnings=warnings,
         )  # fmt: skip
     if speed is None:
         raise RecordingError(
@@ -95,7 +96,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
             positions, quaternions, *columns, strict=True
         )
     ]
-    return replace(timed(moves, flows is not None), notes=(PROGRAMMED, note))
+    return replace(timed(moves, flows is not None), notes=(PROGRAMMED, note), warnings=warnings)
 
 
 def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
@@ -126,7 +127,7 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     else:
         raise RecordingError(f'no column is called {name}; {did_you_mean(name, texts)}')
     if trigger is None and flow is None:
-        return None, f'no trigger, the gun sprays throughout{_could_be_trigger(table)}'
+        return None, 'no trigger, the gun sprays throughout'
     if flow is not None and table.units([flow]) != {''}:
         raise RecordingError(
             f'{table.written([flow])}: the flow is relative to the calibrated one, 1 for the '
@@ -140,15 +141,17 @@ def _flows(table: PoseTable, name: str | None) -> tuple[np.ndarray | None, str]:
     return np.array(flows), f'gun by {table.written(used)}'
 
 
-def _could_be_trigger(table: PoseTable) -> str:
-    """Columns that say on and off, as a remark on what is not used; '' for none."""
+def _could_be_trigger(table: PoseTable) -> tuple[str, ...]:
+    """A warning of columns that say on and off and are not used, if there are any."""
     columns = []
     for column, heading in enumerate(table.headings):
         seen = {text.lower() for text in table.texts(column)}
         if len(seen) > 1 and seen <= {'0', '1', *SWITCHED}:
             columns.append(heading.text)
     named = ', '.join(filter(None, columns))
-    return f' ({named} could be one, --trigger NAME)' if named else ''
+    if not named:
+        return ()
+    return (f'the gun counts as always on; if {named} is its trigger, give --trigger NAME',)
 
 
 def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
