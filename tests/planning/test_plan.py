@@ -53,9 +53,7 @@ def test_film_is_what_a_simulation_of_the_motion_gives(bowed, planned):
 )
 def test_what_was_asked_for_and_is_not_reached_is_warned_of(planned, wanted, words):
     warnings = list(replace(planned, request=PlanRequest(**wanted)).warnings)
-    assert [word in line for word, line in zip(words, warnings, strict=True)] == [True] * len(
-        words
-    )
+    assert all(word in line for word, line in zip(words, warnings, strict=True))
 
 
 def test_placing_beats_the_plane_s_recommendation_and_neighbouring_indices(planned):

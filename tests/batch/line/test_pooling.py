@@ -7,7 +7,7 @@ import pytest
 
 from batch.line.synthetic import FIRST_S, HOUR_S, SIGMA_UM, parts
 from paint_deposition.batch.line.changes import Series, changes_of, series_of
-from paint_deposition.batch.line.pooling import amplitudes, pooled
+from paint_deposition.batch.line.pooling import amplitudes, off_model, pooled
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 
@@ -44,6 +44,13 @@ def test_a_misfit_that_all_parts_share_is_no_effect():
     found = pooled(parts(100, seed=2, misfit=0.03))
     assert found.causes == ()
     assert found.posterior.scales.misfit is not None
+
+
+def test_a_model_that_is_not_of_the_line_is_named():
+    line = parts(3, 1)
+    assert list(off_model(line)) == list(off_model([])) == []
+    far = [replace(part, residual_um=-0.66 * part.predicted_um) for part in line]
+    assert 'predicts 25 µm where the gauge reads 9 µm; calibrate' in next(off_model(far))
 
 
 def test_level_and_noise_are_estimated():

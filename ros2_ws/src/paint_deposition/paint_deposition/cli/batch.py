@@ -78,6 +78,7 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
     """
     require_libraries('paint line', MANY)
     from paint_deposition.batch.line.part import computed
+    from paint_deposition.batch.line.pooling import off_model
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
     from paint_deposition.batch.line.times import dated
@@ -94,6 +95,7 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
         results.write(found)
     _print_warnings([*found.errors, *found.remarks], results.output / 'line.json')
+    options.print_all('warning', off_model(found.parts))
     if unmatched:
         named = some(unmatched, MOST_WARNINGS)
         options.print_all('warning', [f'no recording has the name of {named}; left out'])

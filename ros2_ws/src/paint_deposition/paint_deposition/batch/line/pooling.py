@@ -15,7 +15,7 @@ Effects are found one after the other, by their evidence. Each set of effects is
 scales that are the most probable with it: those fitted without an effect would take it for noise.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -42,6 +42,8 @@ ACCEPTANCE = 0.99
 MOST_ACCEPTED = 3
 # Effects whose log evidence is this close to the best are not distinguished (odds of 20 to 1).
 INDISTINGUISHABLE = 3.0
+# A model whose mean film is off by more than this share of the readings is not of this line.
+OFF_MODEL = 0.3
 ONE_BRUSH = PatternVector()
 
 
@@ -93,6 +95,19 @@ def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
         for part, rows in rows_of.items()
     ]  # fmt: skip
     return sorted(found, key=lambda part: part.time_s)
+
+
+def off_model(parts: Sequence[Measured]) -> Iterator[str]:
+    """Yield a warning if the model's film is far from that of all readings."""
+    if not parts:
+        return
+    predicted = float(np.concatenate([part.predicted_um for part in parts]).mean())
+    measured = predicted + float(np.concatenate([part.residual_um for part in parts]).mean())
+    if abs(predicted - measured) > OFF_MODEL * measured:
+        yield (
+            f'the model predicts {predicted:.0f} µm where the gauge reads {measured:.0f} µm; '
+            "calibrate it for this line (percentages are of the model's film)"
+        )
 
 
 def places(parts: Sequence[Measured]) -> tuple[np.ndarray, list[np.ndarray]]:
