@@ -310,7 +310,7 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
 
     The robot's clock is ahead, and the part between has no poses.
     """
-    ahead_ns = time.time_ns() + LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
+    ahead_ns = time.time_ns() + 60 * LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
     moved = replace(WITHOUT_TRIGGER, stamps_ns=WITHOUT_TRIGGER.stamps_ns + ahead_ns)
     node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
     recorder = record(output_directory=str(tmp_path / 'films'), name='before')
