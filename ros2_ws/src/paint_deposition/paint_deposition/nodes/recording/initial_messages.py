@@ -47,6 +47,7 @@ class InitialMessages:
         self._states_of = {topic: gun[1] for gun in guns.items() for topic in gun}
         # The last pose of each gun that was forgotten.
         self._forgotten = {poses: Recorded(poses, b'', 0, 0) for poses in guns}
+        self._begin_ns = 0
         # Topics of states that this run does not have yet.
         self._due: set[str] = set()
         self._placed: list[Recorded] = []
@@ -111,9 +112,9 @@ class InitialMessages:
         self._due = set(self._guns.values())
         lasting = [*self._lasting.values(), *self._transforms, *self._placed]
         early = [pose for poses in self._guns for pose in self._motion[poses]]
+        self._begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
         states = [state for pose in early for state in self._states_in_force(pose)]
-        begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
-        return [m._replace(log_time_ns=begin_ns) for m in lasting + states] + early
+        return [m._replace(log_time_ns=self._begin_ns) for m in lasting] + states + early
 
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)
@@ -128,7 +129,8 @@ class InitialMessages:
         states = self._motion[topic]
         if states and first.stamp_ns < states[0].stamp_ns:
             states.clear()
-        return [state._replace(log_time_ns=first.log_time_ns) for state in states]
+        # Not at the time of the first message: one received before it may be taken after it.
+        return [state._replace(log_time_ns=self._begin_ns) for state in states]
 
     def _forget_motion(self, poses: str, until_ns: float) -> int:
         """Forget poses sent until then, and superseded states; the number of later poses."""
