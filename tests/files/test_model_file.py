@@ -197,7 +197,7 @@ def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):
     assert 'no such file; give a model YAML' in refusal(tmp_path / 'model.yaml')
     assert 'cannot be read' in refusal(tmp_path)
     (tmp_path / 'model.yaml').write_bytes(b'\xff\xfe\x00')
-    assert 'cannot be read as YAML' in refusal(tmp_path / 'model.yaml')
+    assert 'is no text, such as a workbook or a bag' in refusal(tmp_path / 'model.yaml')
 
 
 def test_a_failed_write_leaves_the_old_file(tmp_path: Path):

@@ -7,8 +7,8 @@ import pytest
 
 import scenes
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.interruptions import interruptions
-from paint_deposition.motion.path_builder import require_motion, spray_path
+from paint_deposition.motion.interruptions import checked_path, interruptions
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 TIMES_S = np.arange(0.0, 10.0, 0.02)
@@ -53,6 +53,5 @@ def test_a_log_that_is_in_the_file_twice_is_told_from_another_run():
 
 def test_milliseconds_that_are_taken_for_seconds_are_suggested():
     slow = replace(WHOLE, stamps_ns=1000 * (WHOLE.stamps_ns - WHOLE.stamps_ns[0]))
-    path, counts = spray_path(slow)
     with pytest.raises(RecordingError, match=r'they are 20 s apart: if these are milliseconds'):
-        require_motion(slow, path, counts, 0.25)
+        checked_path(slow, 0.25)

@@ -95,7 +95,7 @@ class LinearTrial(Trial):
     def nulls(self, fit):
         sizes = self.best.sizes
         beside = fit.with_remainder(self.usual.covariance(sizes))
-        return Nulls(fit.with_remainder(self.usual.of_parts(sizes)), beside, beside)
+        return Nulls(fit.with_remainder(self.usual.of_parts(sizes)), beside, beside, beside)
 
 
 def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> LinearTrial:

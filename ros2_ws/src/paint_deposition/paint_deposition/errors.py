@@ -2,7 +2,7 @@
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 # Names less alike than this share, as difflib measures it, are not taken for each other.
 ALIKE = 0.4
@@ -41,6 +41,12 @@ def require_above_zero(**values: float) -> None:
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0.0):
             raise PlanError(f'{name} is {value:g}; give a number above 0')
+
+
+def some(names: Sequence[str], most: int) -> str:
+    """'a, b and 3 more': so many of the names at most, for a message."""
+    more = f' and {len(names) - most} more' if len(names) > most else ''
+    return ', '.join(names[:most]) + more
 
 
 def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str:

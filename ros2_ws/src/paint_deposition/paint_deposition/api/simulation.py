@@ -16,14 +16,9 @@ from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.motion.interruptions import interruptions
+from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import (
-    DEFAULT_MAX_POSE_GAP_S,
-    require_motion,
-    require_spraying,
-    spray_path,
-)
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints
@@ -105,11 +100,9 @@ def look_at_guns(
     """
     paths = []
     for trajectory, model in zip(trajectories, models, strict=True):
-        path, counts = spray_path(trajectory, max_pose_gap_s, model.max_step_m)
-        require_motion(trajectory, path, counts, max_pose_gap_s)
-        require_spraying(trajectory, path)
-        odd = (*trajectory.warnings, *interruptions(path, max_pose_gap_s))
-        paths.append((replace(trajectory, warnings=odd), path, counts))
+        path, counts, odd = checked_path(trajectory, max_pose_gap_s, model.max_step_m)
+        warned = replace(trajectory, warnings=(*trajectory.warnings, *odd))
+        paths.append((warned, path, counts))
     surface = toward_the_guns(surface, ((p.position_m, p.rotation[:, :, 2]) for _, p, _ in paths))
     return [
         GunOnPart(

@@ -10,7 +10,7 @@ import click
 
 from paint_deposition.cli import options
 from paint_deposition.cli.progress import Progress
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import ManyError, some
 from paint_deposition.files.parquet import MANY, require_libraries
 
 if TYPE_CHECKING:
@@ -33,11 +33,9 @@ workers_options = options.grouped((
 
 @click.command('sweep')
 @click.argument('sweep', type=options.FILE)
-@options.output_option('cases.parquet, sweep.json and sweep.png')
 @workers_options
-@options.PICTURES
-@options.JSON
-def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, where: dict) -> None:
+@options.results_options('cases.parquet, sweep.json and sweep.png')
+def sweep_command(sweep: Path, results: options.Results, where: dict) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
     Each case is what `simulate` computes. Finished cases are kept in the folder `finished` of the
@@ -53,25 +51,25 @@ def sweep_command(sweep: Path, output: Path, pictures: str, as_json: bool, where
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
         options.print_all('note', job.notes)
-        finished, done, workers = _computed(computed, job.cases, job.inputs, output, show, **where)
+        finished, done, workers = _computed(
+            computed, job.cases, job.inputs, results, show, **where
+        )
         show('writing and drawing')
         found = Sweep.of(job, finished, done, workers)
         if len(found.errors) == len(job.cases):
             number, error = found.errors[0]
             raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
-        files = options.write_results(found, output, pictures=pictures)
+        results.write(found)
     odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
-    _print_warnings(odd, output / 'cases.parquet')
-    options.print_results(files, as_json, found.lines)
+    _print_warnings(odd, results.output / 'cases.parquet')
+    results.print(found.lines)
 
 
 @click.command('line')
 @click.argument('folder', type=options.FOLDER)
-@options.output_option('points.parquet, parts.parquet, line.json and line.png')
 @workers_options
-@options.PICTURES
-@options.JSON
-def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where: dict) -> None:
+@options.results_options('points.parquet, parts.parquet, line.json and line.png')
+def line_command(folder: Path, results: options.Results, where: dict) -> None:
     """Simulate and compare all runs in FOLDER, and show what they share and what changes.
 
     FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
@@ -87,29 +85,26 @@ def line_command(folder: Path, output: Path, pictures: str, as_json: bool, where
     with Progress('line') as show:
         show('reading')
         cases, file, model, unmatched = line_cases(folder)
-        finished, done, workers = _computed(computed, cases, {}, output, show, **where)
+        finished, done, workers = _computed(computed, cases, {}, results, show, **where)
         show('pooling')
         table = dated(finished.table(case.digest for case in cases))
         found = Line(folder, model, shared_files(folder, file), table, done, workers, unmatched)
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
-        files = options.write_results(found, output, pictures=pictures)
-    _print_warnings([*found.errors, *found.remarks], output / 'line.json')
+        results.write(found)
+    _print_warnings([*found.errors, *found.remarks], results.output / 'line.json')
     if unmatched:
-        more = (
-            f' and {len(unmatched) - MOST_WARNINGS} more' if len(unmatched) > MOST_WARNINGS else ''
-        )
-        named = ', '.join(unmatched[:MOST_WARNINGS])
-        options.print_all('warning', [f'no recording has the name of {named}{more}; left out'])
-    options.print_results(files, as_json, found.lines)
+        named = some(unmatched, MOST_WARNINGS)
+        options.print_all('warning', [f'no recording has the name of {named}; left out'])
+    results.print(found.lines)
 
 
 def _computed(
     work: Callable,
     cases: Sequence[Case],
     inputs: Mapping[str, Any],
-    output: Path,
+    results: options.Results,
     show: Callable[..., None],
     scheduler: str | None,
     count: int | None,
@@ -120,7 +115,7 @@ def _computed(
 
     if scheduler is not None and count is not None:
         raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
-    finished = ResultCache(output / 'finished')
+    finished = ResultCache(results.output / 'finished')
     done, workers = compute(scheduler, count, work, cases, inputs, finished, show)
     options.print_all('note', [f'workers: {workers}'])
     return finished, done, workers

@@ -27,25 +27,21 @@ from paint_deposition.planning.requests import ImproveRequest
     '--rival', 'rivals', type=options.FILE, multiple=True,
     help='Another model that explains the readings equally well; the film is optimised for all.',
 )  # fmt: skip
-@options.output_option(
-    'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
-)
 @options_of(ImproveRequest)
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
-@options.PICTURES
-@options.JSON
+@options.results_options(
+    'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
+)
 def improve_command(
     request: ImproveRequest,
     part: dict[str, Any],
     trajectory: Path,
     model_file: Path | None,
     rivals: tuple[Path, ...],
-    output: Path,
     seed: int,
     motion: dict[str, Any],
-    pictures: str,
-    as_json: bool,
+    results: options.Results,
 ) -> None:
     """Make the film of a given programme more even; its path stays as it is.
 
@@ -73,13 +69,10 @@ def improve_command(
             'part_pose': motion.get('part_pose'),
         }
         show('writing and drawing')
-        files = options.write_results(
-            result, output, made_from=made_from, part_pose=motion.get('part_pose'),
-            pictures=pictures,
-        )  # fmt: skip
+        results.write(result, made_from=made_from, part_pose=motion.get('part_pose'))
     options.print_all('note', [*result.surface.notes, *recorded.notes])
     options.print_all('warning', result.warnings)
-    options.print_results(files, as_json, _lines(result), model=chosen.words)
+    results.print(_lines(result), model=chosen.words)
 
 
 def _lines(result: pd.Improvement) -> Iterator[str]:

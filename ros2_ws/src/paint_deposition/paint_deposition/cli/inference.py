@@ -15,7 +15,7 @@ from paint_deposition.cli.model_choice import model_words
 from paint_deposition.cli.progress import Progress
 from paint_deposition.errors import PaintError
 
-OUTPUT = options.output_option('the results')
+RESULTS = options.results_options('the results')
 MODEL = options.model_option(
     "Model to start from; default: the campaign's, else that of a 50 mm bell."
 )
@@ -32,10 +32,8 @@ def _run(
     lines: Callable[[Any], Iterable[str]],
     campaign: Path,
     model_file: Path | None,
-    output: Path,
     part_pose: list[float] | None,
-    pictures: str,
-    as_json: bool,
+    results: options.Results,
     begins_with: Iterable[str] = ('model', 'posterior'),
     fitted: str = FITTED,
     words: str = '',
@@ -61,7 +59,7 @@ def _run(
         result = verb(data, progress=show, **known)
         show('writing')
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
-        files = options.write_results(result, output, pictures=pictures, **more)
+        results.write(result, **more)
     options.print_all('note', data.understood)
     if isinstance(result, pd.SideBySide):
         options.print_all('warning', next(iter(result.by_name.values())).warnings)
@@ -72,17 +70,15 @@ def _run(
     model_line = f'{fitted or FITTED} a 50 mm bell'
     if start is not None:
         model_line = f'{fitted} {model_words(chosen, start)}'.strip()
-    options.print_results(files, as_json, lines(result), words or model_line)
+    results.print(lines(result), words or model_line)
 
 
 @click.command('calibrate')
 @options.CAMPAIGN
 @MODEL
-@options.output_option('model.yaml, calibration.json and pictures')
 @options.seed_option('the starts of the fit')
 @options.PART_POSE
-@options.PICTURES
-@options.JSON
+@options.results_options('model.yaml, calibration.json and pictures')
 def calibrate_command(seed: int, **given: Any) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 
@@ -124,10 +120,8 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     help="Model to compare, taken as it is; default: the campaign's, else one fitted to it. "
     'Repeated, the models are compared with each other.',
 )  # fmt: skip
-@OUTPUT
 @options.PART_POSE
-@options.PICTURES
-@options.JSON
+@RESULTS
 def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     """Compare the model with the gauge readings of CAMPAIGN and show where it is off.
 
@@ -186,15 +180,13 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
 @click.command('diagnose')
 @options.CAMPAIGN
 @MODEL
-@OUTPUT
 @click.option(
     '--effect-file', 'effect_files', multiple=True, type=options.FILE,
     help='Python file with an effect of your own to consider as well; may be repeated.',
 )  # fmt: skip
 @SEED
 @options.PART_POSE
-@options.PICTURES
-@options.JSON
+@RESULTS
 def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
 
@@ -222,11 +214,9 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     'within its band, as an effect of your own.',
 )  # fmt: skip
 @MODEL
-@OUTPUT
 @SEED
 @options.PART_POSE
-@options.PICTURES
-@options.JSON
+@RESULTS
 def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any) -> None:
     """Add an effect to the model, refit it to CAMPAIGN and show the error before and after.
 
@@ -285,13 +275,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
 def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.effects.learned.law import LearnedLaw
-    from paint_deposition.report.words import (
-        effect_name,
-        form_words,
-        learned_words,
-        probability_words,
-        separation_words,
-    )
+    from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
     if diagnosis.p_value < 1.0:
@@ -299,13 +283,13 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     for effects in diagnosis.classes:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
-        yield f'  {label}{effects.best}: {probability_words(effects)}{others}'
+        yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
         law = diagnosis.model.effect(effects.best)
         if isinstance(law, LearnedLaw):
-            shape = ', '.join(' '.join(words).rstrip() for words in learned_words(law))
-            yield f'    {effect_name(law.id)}: {shape}'
+            shape = ', '.join(' '.join(row).rstrip() for row in words.learned_words(law))
+            yield f'    {words.effect_name(law.id)}: {shape}'
             if isinstance(law, LearnedCurve) and law.sd:
-                yield f'    {form_words(law)}'
+                yield f'    {words.form_words(law)}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
@@ -324,7 +308,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
         todo = f'spray {spray.what}, and measure {spray.readings} points'
-        yield f'next: {todo}: {separation_words(spray)}'
+        yield f'next: {todo}: {words.separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in (*diagnosis.study.notes, *diagnosis.left_over):

@@ -30,11 +30,9 @@ HARDLY = 0.15
 @options.BRUSH
 @options_of(MeasureRequest)
 @options_of(FilmBuild, into='passes')
-@options.output_option('points.csv, poses.csv, points.png and measure.json')
 @options.motion_options
 @options.MAX_POSE_GAP
-@options.PICTURES
-@options.JSON
+@options.results_options('points.csv, poses.csv, points.png and measure.json')
 def measure_command(
     request: MeasureRequest,
     passes: FilmBuild,
@@ -42,11 +40,9 @@ def measure_command(
     trajectory: Path | None,
     model_file: Path | None,
     brush: int,
-    output: Path,
     motion: dict[str, Any],
     max_pose_gap_s: float,
-    pictures: str,
-    as_json: bool,
+    results: options.Results,
 ) -> None:
     """Choose where to put the gauge on a part, so that missing effects are found soonest.
 
@@ -80,13 +76,10 @@ def measure_command(
             'model_file': str(chosen.path or ''),
         }
         show('writing and drawing')
-        files = options.write_results(
-            result, output, made_from=made_from, part_pose=motion.get('part_pose'),
-            pictures=pictures,
-        )  # fmt: skip
+        results.write(result, made_from=made_from, part_pose=motion.get('part_pose'))
     options.print_all('note', result.surface.notes)
     options.print_all('warning', warnings)
-    options.print_results(files, as_json, _lines(result), model=chosen.words)
+    results.print(_lines(result), model=chosen.words)
 
 
 def _lines(result: pd.ChosenReadings) -> Iterator[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -41,10 +42,6 @@ NOT_NEGATIVE = FiniteRange(min=0.0)
 FILE = click.Path(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
-PICTURES = click.option(
-    '--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png', show_default=True,
-    help='Format of the pictures.',
-)  # fmt: skip
 CAMPAIGN = click.argument('campaign', type=FILE)
 
 
@@ -58,17 +55,6 @@ BRUSH = click.option(
     '--brush', default=0, type=click.IntRange(min=0), show_default='the only one',
     help='Number of the brush to work with, of a model with several.',
 )  # fmt: skip
-
-
-def output_option(what: str, default: str | None = None) -> Callable:
-    """The folder for a command's results, to be named where there is no default."""
-    text = (
-        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
-        'into it are removed; other files in it are kept, unless a result has their name. Nothing '
-        'is changed before all results are complete.'
-    )
-    needed = default is None
-    return click.option('-o', '--output', type=FOLDER, required=needed, default=default, help=text)
 
 
 def seed_option(of: str) -> Callable:
@@ -103,16 +89,10 @@ MAX_POSE_GAP = click.option(
 )  # fmt: skip
 
 
-def pose_option(name: str, text: str) -> Callable:
-    """A pose, seven numbers in a list, or None."""
-    return click.option(
-        name, nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose, help=text
-    )
-
-
-PART_POSE = pose_option(
-    '--part-pose', 'Where the part stands in the frame of the poses [m, unit quaternion].'
-)
+PART_POSE = click.option(
+    '--part-pose', nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose,
+    help='Where the part stands in the frame of the poses [m, unit quaternion].',
+)  # fmt: skip
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
     click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),
@@ -152,8 +132,10 @@ MOTION = (
 )  # fmt: skip
 
 
-def grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Callable]:
-    """Give a command these options; it takes what was given as one argument."""
+def grouped(
+    options: Sequence[Callable], into: str, kind: Callable[..., Any] = dict
+) -> Callable[[Callable], Callable]:
+    """Give a command these options; it takes what was given as one argument, of a kind."""
 
     def with_options(function: Callable) -> Callable:
         return reduce(lambda taken, option: option(taken), reversed(options), function)
@@ -161,7 +143,7 @@ def grouped(options: Sequence[Callable], into: str) -> Callable[[Callable], Call
     def with_group(command: Callable) -> Callable:
         @wraps(command)
         def with_one(**given: Any) -> Any:
-            return command(**{into: {name: given.pop(name) for name in names}}, **given)
+            return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
 
         return with_options(with_one)
 
@@ -209,20 +191,46 @@ def geometry_lines(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> Ite
     return (f'{name}: {found.sentence}' for name, found in result.geometry.items())
 
 
-def write_results(result: Any, output: Path, **more: Any) -> list[Path]:
-    """Write a result to its folder, all or nothing, and return the files."""
-    with results_in(output) as folder:
-        return [output / file.name for file in pd.write(result, folder, **more)]
+@dataclass
+class Results:
+    """Where a command writes its results, and how it shows them."""
+
+    output: Path
+    pictures: str
+    as_json: bool
+    files: Sequence[Path] = ()
+
+    def write(self, result: Any, **more: Any) -> None:
+        """Write a result to the folder, all or nothing."""
+        with results_in(self.output) as folder:
+            files = pd.write(result, folder, pictures=self.pictures, **more)
+        self.files = [self.output / file.name for file in files]
+
+    def print(self, lines: Iterable[str], model: str = '') -> None:
+        """Print the file of figures as written, or else the model, these lines and the files."""
+        head = [f'model: {model}'] if model else []
+        if self.as_json:
+            figures = next(file for file in self.files if file.suffix == '.json')
+            click.echo(figures.read_text(encoding='utf-8'), nl=False)
+        else:
+            click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in self.files)]))
 
 
-def print_results(files: list[Path], as_json: bool, lines: Iterable[str], model: str = '') -> None:
-    """Print the file of figures as written, or else the model, these lines and the files."""
-    head = [f'model: {model}'] if model else []
-    if as_json:
-        figures = next(file for file in files if file.suffix == '.json')
-        click.echo(figures.read_text(encoding='utf-8'), nl=False)
-    else:
-        click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in files)]))
+def results_options(what: str, default: str | None = None) -> Callable[[Callable], Callable]:
+    """A command takes ``Results``; their folder is to be named where there is no default."""
+    text = (
+        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
+        'into it are removed; other files in it are kept, unless a result has their name. Nothing '
+        'is changed before all results are complete.'
+    )
+    options = (
+        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
+                     help=text),
+        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
+                     show_default=True, help='Format of the pictures.'),
+        JSON,
+    )  # fmt: skip
+    return grouped(options, 'results', Results)
 
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:

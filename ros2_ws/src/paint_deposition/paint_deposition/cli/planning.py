@@ -20,27 +20,18 @@ from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRe
 @options.MODEL
 @options.BRUSH
 @options_of(IndexRequest)
-@options.output_option(
+@options.results_options(
     'recommendation.json and uniformity.png; default: the working directory', '.'
 )
-@options.PICTURES
-@options.JSON
 def recommend_command(
-    request: IndexRequest,
-    model_file: Path | None,
-    brush: int,
-    output: Path,
-    pictures: str,
-    as_json: bool,
+    request: IndexRequest, model_file: Path | None, brush: int, results: options.Results
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
     chosen = chosen_model(model_file, brush=brush)
     answer = pd.recommend(chosen.model, **dict(request))
-    files = options.write_results(
-        answer, output, pictures=pictures, model=chosen.model,
-        made_from={'model_file': str(model_file or '')},
-    )  # fmt: skip
-    options.print_results(files, as_json, _recommendation_lines(answer), model=chosen.words)
+    made_from = {'model_file': str(model_file or '')}
+    results.write(answer, model=chosen.model, made_from=made_from)
+    results.print(_recommendation_lines(answer), model=chosen.words)
 
 
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
@@ -78,22 +69,18 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     help='Largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
-@options.output_option('the bag, passes.csv, passes.mod, plan.json and the film')
-@options.PICTURES
-@options.JSON
+@options.results_options('the bag, passes.csv, passes.mod, plan.json and the film')
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
     part: dict[str, Any],
     model_file: Path | None,
     brush: int,
-    output: Path,
     part_pose: list[float] | None,
     frame_id: str | None,
     faces: str,
     face_angle_deg: float,
-    pictures: str,
-    as_json: bool,
+    results: options.Results,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
     from paint_deposition.planning.clearance import contacts
@@ -122,13 +109,10 @@ def plan_command(
             'frame_id': frame_id,
             'part_pose': part_pose,
         }
-        files = options.write_results(
-            result, output, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
-            pictures=pictures,
-        )  # fmt: skip
+        results.write(result, made_from=made_from, part_pose=part_pose, frame_id=frame_id)
     options.print_all('note', surface.notes)
     options.print_all('warning', map(str, touched))
-    options.print_results(files, as_json, _plan_lines(result), model=chosen.words)
+    results.print(_plan_lines(result), model=chosen.words)
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:

@@ -32,7 +32,6 @@ from paint_deposition.cli.progress import Progress
     '--model', 'model_files', type=options.FILE, multiple=True,
     help='Deposition model, YAML, one for all guns or one for each; default: a 50 mm bell.',
 )  # fmt: skip
-@options.output_option('film.ply, film.csv, stats.json and film.png')
 @click.option(
     '--at', 'readings_file', type=options.FILE,
     help='Gauge readings, CSV or a workbook: also write predicted.csv, their columns and '
@@ -48,19 +47,16 @@ from paint_deposition.cli.progress import Progress
 @click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
 @click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
               help='Accepted difference from the target, either way [µm].')  # fmt: skip
-@options.PICTURES
-@options.JSON
+@options.results_options('film.ply, film.csv, stats.json and film.png')
 def simulate_command(
     part: dict[str, Any],
     trajectories: tuple[Path, ...],
     atomizers: tuple[str, ...],
     model_files: tuple[Path, ...],
-    output: Path,
     readings_file: Path | None,
     points_file: Path | None,
     motion: dict[str, Any],
-    pictures: str,
-    as_json: bool,
+    results: options.Results,
     **wanted: float,
 ) -> None:
     """Compute the film on a part from a recorded trajectory.
@@ -99,12 +95,12 @@ def simulate_command(
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
-        files = options.write_results(film, output, made_from=made_from, pictures=pictures)
+        results.write(film, made_from=made_from)
     options.print_all('note', film.notes)
     options.print_all('note', [readings.understood] if readings else [])
     options.print_all('warning', film.warnings)
     words = '; '.join(dict.fromkeys(model.words for model in chosen))
-    options.print_results(files, as_json, _lines(film), model=words)
+    results.print(_lines(film), model=words)
 
 
 def _lines(film: pd.Film) -> Iterator[str]:

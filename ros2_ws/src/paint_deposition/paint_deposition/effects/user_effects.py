@@ -187,7 +187,9 @@ def _problem_with_places(effect: Effect) -> str | None:
     square = np.array([[x, 0.0, z] for x in (0.0, 0.1) for z in (0.0, 0.1)])
     points = SurfacePoints(square, np.tile([0.0, -1.0, 0.0], (4, 1)))
     context = PathContext(Projection(), points.down, points.outward, points.centre_m)
-    path = _trial_path()
+    positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
+    toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
+    path, _ = spray_path(Trajectory(np.arange(4) * 20_000_000, positions_m, toward_y))
     trials: dict[str, Callable[[], Any]] = {
         'on_path': lambda: effect.on_path(path, context),
         'on_film': lambda: effect.on_film(np.full(4, 20.0), points),
@@ -204,9 +206,3 @@ def _problem_with_places(effect: Effect) -> str | None:
         elif np.shape(result) != (4,) or not np.isfinite(result).all():
             return f'has an {place} that does not return a finite film; return one value a point'
     return None
-
-
-def _trial_path() -> SprayPath:
-    positions_m = np.linspace([0.0, -0.25, 0.05], [0.03, -0.25, 0.05], 4)
-    toward_y = np.tile([-np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)], (4, 1))
-    return spray_path(Trajectory(np.arange(4) * 20_000_000, positions_m, toward_y))[0]

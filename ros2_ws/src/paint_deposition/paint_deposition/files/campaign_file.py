@@ -11,21 +11,15 @@ from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.motion_source import MotionSource, Number, OnePart, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
-from paint_deposition.motion.interruptions import interruptions
+from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import (
-    DEFAULT_MAX_POSE_GAP_S,
-    require_motion,
-    require_spraying,
-    spray_path,
-)
 from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
 
@@ -80,7 +74,7 @@ class _Gun(MotionSource):
     )
 
 
-class _Entry(_Gun):
+class _Entry(_Gun, OnePart):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
@@ -89,14 +83,6 @@ class _Entry(_Gun):
         [], description='a list of guns that painted together, each with its motion'
     )
     name: Name = ''
-    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
-    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
-    max_pose_gap_s: Number = Field(
-        DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
-    )
-    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
-        None, description='[x, y, z], the direction of gravity in the mesh frame'
-    )
     points: Text | None = Field(None, description='the name of a file of measuring points')
     columns: dict[Quantity, Text | int] = Field(
         {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
@@ -165,9 +151,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     trajectories = [read_motion(file, source) for file, source, _ in motions]
     paths = []
     for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
-        path, counts = spray_path(trajectory, entry.max_pose_gap_s)
-        require_motion(trajectory, path, counts, entry.max_pose_gap_s)
-        require_spraying(trajectory, path)
+        path, counts, odd = checked_path(trajectory, entry.max_pose_gap_s)
         if brush is not None:
             others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
             if others:
@@ -176,7 +160,7 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
                 )
             path = path.with_(brush=np.full(len(path), brush))
         paths.append(path)
-        for warning in interruptions(path, entry.max_pose_gap_s):
+        for warning in odd:
             remark('warning', name, warning)
         if counts.rejected:
             remark('note', name, f'{counts.rejected} of {counts.received} poses dropped')

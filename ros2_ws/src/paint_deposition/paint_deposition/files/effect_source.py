@@ -42,25 +42,17 @@ def source_of(effect: type[Effect]) -> bytes:
 def _source(cls: type[Effect]) -> str:
     own = inspect.getsource(cls)
     text = inspect.getsource(inspect.getmodule(cls) or cls)
-    wanted, kept = _names(ast.parse(own)), set[str]()
-    statements = [node for node in ast.parse(text).body if not isinstance(node, ast.ClassDef)]
+    wanted, kept = _names(ast.parse(own)), [own]
     # A function may use constants that stand above it.
-    for node in reversed(statements):
-        imported = isinstance(node, ast.Import | ast.ImportFrom)
-        if imported or (isinstance(node, ast.FunctionDef | ast.Assign) and wanted & _made(node)):
-            kept.add(ast.get_source_segment(text, node) or '')
+    for node in reversed(ast.parse(text).body):
+        made = {node.name} if isinstance(node, ast.FunctionDef) else set[str]()
+        if isinstance(node, ast.Assign):
+            made = made.union(*map(_names, node.targets))
+        if isinstance(node, ast.Import | ast.ImportFrom) or wanted & made:
+            kept.append(ast.get_source_segment(text, node) or '')
             wanted |= _names(node)
-    in_order = [ast.get_source_segment(text, node) or '' for node in statements]
-    return '\n\n'.join([*(each for each in in_order if each in kept), own])
+    return '\n\n'.join(reversed(kept))
 
 
 def _names(tree: ast.AST) -> set[str]:
     return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
-
-
-def _made(node: ast.FunctionDef | ast.Assign) -> set[str]:
-    return (
-        {node.name}
-        if isinstance(node, ast.FunctionDef)
-        else set().union(*map(_names, node.targets))
-    )

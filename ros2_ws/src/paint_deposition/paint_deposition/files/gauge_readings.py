@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
@@ -133,9 +134,8 @@ class MeasuringPoints:
         rows = [places.get(label, 0) for label in wanted]
         words = f'{self.words}, joined {by}'
         if unmeasured := [label for label in self.labels if label not in set(wanted)]:
-            more = ', ...' if len(unmeasured) > MOST_LABELS_SHOWN else ''
-            named = ', '.join(unmeasured[:MOST_LABELS_SHOWN])
-            words += f' ({len(unmeasured)} of them without a reading: {named}{more})'
+            named = some(unmeasured, MOST_LABELS_SHOWN)
+            words += f' ({len(unmeasured)} of them without a reading: {named})'
         normals = None if self.normals is None else self.normals[rows]
         return self.positions_m[rows], normals, np.array(wanted), words
 

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.errors import MeshError, did_you_mean
+from paint_deposition.errors import MeshError, did_you_mean, some
 
 if TYPE_CHECKING:
     from trimesh import Scene
@@ -71,7 +71,7 @@ def read_bodies(path: Path, body: str | None = None) -> Bodies:
             notes.append(f'{path.name}: of its {len(found)} bodies {body!r} was taken')
         found = {body: found[body]}
     elif len(found) > 1:
-        names = ', '.join([*found][:SHOWN_NAMES]) + (', ...' if len(found) > SHOWN_NAMES else '')
+        names = some([*found], SHOWN_NAMES)
         notes.append(
             f'{path.name}: its {len(found)} bodies were taken as one part: {names}; --body NAME '
             'takes one of them'

@@ -9,11 +9,10 @@ from paint_deposition.errors import MeshError
 from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
-from paint_deposition.part.edges import Edges
+from paint_deposition.part.edges import Edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
 from paint_deposition.part.surface import Surface
-from paint_deposition.part.welding import weld
 
 LARGEST_M = 50.0
 SMALLEST_M = 0.005
@@ -174,16 +173,12 @@ def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np
         count = np.sum((turned != faces).any(axis=1))
         notes.append(f'{count} triangles wound against their neighbours were turned round')
         faces, edges = turned, Edges.of(turned)
-    closed = not len(edges.single) and not len(edges.clashing)
-    if closed and _volume_m3(vertices_m, faces) < 0.0:
-        notes.append('the closed body was inside out and was turned round')
-        faces = faces[:, ::-1]
+    if not len(edges.single) and not len(edges.clashing):
+        a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+        if np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times its volume
+            notes.append('the closed body was inside out and was turned round')
+            faces = faces[:, ::-1]
     return np.ascontiguousarray(faces)
-
-
-def _volume_m3(vertices_m: np.ndarray, faces: np.ndarray) -> float:
-    a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-    return float(np.einsum('ij,ij->', a, np.cross(b, c))) / 6.0
 
 
 def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:

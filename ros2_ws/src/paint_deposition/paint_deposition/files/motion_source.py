@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, Field
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
@@ -23,6 +24,19 @@ def _rotation(name: str) -> str:
     if not is_rotation(name):
         raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
     return name
+
+
+class OnePart(BaseModel):
+    """How the mesh of the part is read, and the motion over it."""
+
+    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
+    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
+    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
+        None, description='[x, y, z], the direction of gravity in the mesh frame'
+    )
+    max_pose_gap_s: Number = Field(
+        DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
+    )
 
 
 class MotionSource(BaseModel, extra='forbid'):

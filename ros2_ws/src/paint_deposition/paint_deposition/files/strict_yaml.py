@@ -27,12 +27,7 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
             f'{path}: is no text, such as a workbook or a bag; give a {kind} YAML in UTF-8'
         ) from None
     except YAMLError as error:
-        raise refusal(f'{path}: cannot be read as YAML ({_problem(error)})') from None
-
-
-def _problem(error: Exception) -> str:
-    """Where and what is wrong, in one line."""
-    mark = getattr(error, 'problem_mark', None)
-    if mark is None:
-        return ' '.join(str(error).split())
-    return f'line {mark.line + 1}: {getattr(error, "problem", error)}'
+        mark, problem = getattr(error, 'problem_mark', None), ' '.join(str(error).split())
+        if mark is not None:
+            problem = f'line {mark.line + 1}: {getattr(error, "problem", error)}'
+        raise refusal(f'{path}: cannot be read as YAML ({problem})') from None

@@ -108,7 +108,11 @@ def require_one_finish(models: Mapping[str, DepositionModel]) -> None:
     Raises:
         ModelError: naming two guns and the effects on film or gauge in which they differ.
     """
-    (first, reference), *others = ((gun, _finish(model)) for gun, model in models.items())
+    finishes = {
+        gun: [e for e in model.effects if not e.is_neutral and e.acts_on_the_finished_film]
+        for gun, model in models.items()
+    }
+    (first, reference), *others = finishes.items()
     for gun, finish in others:
         if finish != reference:
             differ = ', '.join(dict.fromkeys(e.id for e in (*reference, *finish)))
@@ -116,12 +120,3 @@ def require_one_finish(models: Mapping[str, DepositionModel]) -> None:
                 f'the models of {first} and {gun} differ in what acts on the finished film, which '
                 f'they share ({differ}): give both the same values of it, in the same order'
             )
-
-
-def _finish(model: DepositionModel) -> tuple[Effect, ...]:
-    """The effects that act on the film after it has arrived, or on the gauge."""
-    return tuple(
-        effect
-        for effect in model.effects
-        if not effect.is_neutral and effect.acts_on_the_finished_film
-    )

@@ -50,12 +50,10 @@ class PaintUsed:
 
     def __add__(self, other: 'PaintUsed') -> 'PaintUsed':
         numbers = sorted({*self.spraying_s, *other.spraying_s})
+        _, *amounts = vars(self).items()
         return PaintUsed(
             {n: self.spraying_s.get(n, 0.0) + other.spraying_s.get(n, 0.0) for n in numbers},
-            self.emitted_cm3 + other.emitted_cm3,
-            self.wet_cm3 + other.wet_cm3,
-            self.mass_g + other.mass_g,
-            self.solids_cm3 + other.solids_cm3,
+            *(amount + vars(other)[name] for name, amount in amounts),
         )
 
     @property

@@ -149,24 +149,21 @@ def _aside(view: GunView, passes: list[SprayPath]) -> str:
     lines = [np.median(one.position_m @ across) for one in passes]
     ends = np.median([np.quantile(one.position_m @ along, [0, 1]) for one in passes], axis=0)
     shift, past = np.zeros(3), 0.0
-    for axis, low, high in ((across, min(lines), max(lines)), (along, *ends)):
-        part = view.surface.vertices_m @ axis
+    for way, low, high in ((across, min(lines), max(lines)), (along, *ends)):
+        part = view.surface.vertices_m @ way
         before, behind = part.min() - low, high - part.max()
         if abs(behind - before) > 2.0 * ASIDE_M and max(before, behind) > PAST_EDGE_M:
-            shift += 0.5 * (behind - before) * axis
+            shift += 0.5 * (behind - before) * way
             past = max(past, before, behind)
     if not past:
         return ''
+    axis = int(np.abs(shift).argmax())
+    direction = f'{"-" if shift[axis] < 0.0 else "+"}{"xyz"[axis]} of the mesh'
     return (
         f'the passes lie {np.linalg.norm(shift):.2f} m aside of the middle of the part, toward '
-        f'{_direction(shift)}, and run {past:.2f} m past its edge there: unless only some of the '
+        f'{direction}, and run {past:.2f} m past its edge there: unless only some of the '
         "part was to be painted, the part's pose or the TCP is shifted"
     )
-
-
-def _direction(shift: np.ndarray) -> str:
-    axis = int(np.abs(shift).argmax())
-    return f'{"-" if shift[axis] < 0.0 else "+"}{"xyz"[axis]} of the mesh'
 
 
 def _missing(view: GunView) -> str:

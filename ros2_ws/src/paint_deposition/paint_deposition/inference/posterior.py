@@ -1,6 +1,7 @@
 """What a fit knows of a model's parameters, as a section of the model file."""
 
 from collections.abc import Sequence
+from itertools import zip_longest
 from typing import Annotated
 
 import numpy as np
@@ -65,7 +66,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
             if pattern.name not in names:
                 raise ValueError(f'mean has no {pattern.name}; {REMEDY}')
         if tuple(self.covariance) != names:
-            first = next((n for n in (*names, *self.covariance) if not self._in_place(n)), '')
+            first = next(a or b for a, b in zip_longest(names, self.covariance) if a != b)
             raise ValueError(
                 f'mean and covariance differ in {first}: both need the same names in the same '
                 f'order; {REMEDY}'
@@ -90,12 +91,6 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
         except np.linalg.LinAlgError:
             raise ValueError(f'covariance is not positive definite; {REMEDY}') from None
         return self
-
-    def _in_place(self, name: str) -> bool:
-        places = [
-            list(named).index(name) for named in (self.mean, self.covariance) if name in named
-        ]
-        return len(places) == 2 and places[0] == places[1]
 
     def check_suits(self, model: DepositionModel) -> None:
         """Refuse coordinates that are none of the model's.

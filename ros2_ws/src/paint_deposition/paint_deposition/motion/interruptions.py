@@ -1,12 +1,31 @@
-"""Where a recording of a spraying gun breaks off or begins again, and what hangs on it."""
+"""What is wrong with a recorded motion: nothing moves or sprays, it breaks off or begins again."""
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import NoReturn
 
 import numpy as np
 
+from paint_deposition.errors import RecordingError
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import gap_ns
+from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M, gap_ns, spray_path
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+
+
+def checked_path(
+    trajectory: Trajectory, max_pose_gap_s: float, max_step_m: float = DEFAULT_MAX_STEP_M
+) -> tuple[SprayPath, PoseCounts, tuple[str, ...]]:
+    """``spray_path`` of a recording, what was dropped, and warnings of ``interruptions``.
+
+    Raises RecordingError, saying why, for one without a single sub-step or along which the gun
+    never sprays.
+    """
+    path, counts = spray_path(trajectory, max_pose_gap_s, max_step_m)
+    if not len(path):
+        _refuse_motion(trajectory, counts, max_pose_gap_s)
+    if not np.any(path.flow > 0.0):
+        _refuse_trigger(trajectory)
+    return path, counts, tuple(interruptions(path, max_pose_gap_s))
 
 
 def interruptions(path: SprayPath, max_pose_gap_s: float) -> Iterator[str]:
@@ -54,3 +73,43 @@ def interruptions(path: SprayPath, max_pose_gap_s: float) -> Iterator[str]:
 def _place(path: SprayPath, row: int) -> str:
     x, y, z = path.position_m[row]
     return f'({x:.2f}, {y:.2f}, {z:.2f}) m'
+
+
+def _refuse_motion(trajectory: Trajectory, counts: PoseCounts, max_pose_gap_s: float) -> NoReturn:
+    """Say what became of the poses."""
+    reasons = {
+        'not finite': counts.not_finite,
+        'without a unit quaternion': counts.not_unit_quaternions,
+        'with a repeated stamp': counts.repeated_stamps,
+        'with a backward stamp': counts.backward_stamps,
+        f'after a gap of more than {max_pose_gap_s:g} s': counts.gaps,
+    }
+    found = ', '.join(f'{count} {what}' for what, count in reasons.items() if count)
+    remedy = 'record again, or see --max-pose-gap-s'
+    if counts.gaps:
+        apart_s = 1e-9 * float(np.median(np.abs(np.diff(trajectory.stamps_ns))))
+        if apart_s <= 1e3 * max_pose_gap_s:
+            remedy = (
+                f'they are {apart_s:.3g} s apart: if these are milliseconds, give the unit in the '
+                f'heading, as in time [ms]; else {remedy}'
+            )
+    raise RecordingError(
+        f'{trajectory.source}: no two of its {counts.received} poses make a motion'
+        f'{f" ({found})" if found else ""}; {remedy}'
+    )
+
+
+def _refuse_trigger(trajectory: Trajectory) -> NoReturn:
+    stamps_ns, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow
+    remedy = 'check --state-topic; without a trigger the gun sprays whenever poses flow'
+    if not np.any(flow > 0.0):
+        raise RecordingError(
+            f'{trajectory.source}: the gun never sprays, none of the {len(flow)} messages of its '
+            f'trigger opens it; {remedy}'
+        )
+    apart_s = 1e-9 * float(stamps_ns[np.argmax(flow > 0.0)] - trajectory.stamps_ns.min())
+    raise RecordingError(
+        f'{trajectory.source}: the gun never sprays while there are poses, its trigger first '
+        f'opens {abs(apart_s):.3g} s {"after" if apart_s > 0.0 else "before"} the first of them: '
+        f'check that both are stamped by one clock; {remedy}'
+    )

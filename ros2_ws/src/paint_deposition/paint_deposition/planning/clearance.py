@@ -1,7 +1,7 @@
 """Whether gun and spray keep clear of the part along a whole motion."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -76,16 +76,13 @@ def contacts(
             float(depth[deepest]), by_gun,
         )  # fmt: skip
         if found and time_s - found[-1].end_s < ONE_CONTACT_S:
-            found[-1] = _joined(found[-1], here)
+            before = found[-1]
+            deeper = max(before, here, key=lambda contact: contact.depth_m)
+            by_gun = before.by_gun or here.by_gun
+            found[-1] = replace(deeper, begin_s=before.begin_s, end_s=here.end_s, by_gun=by_gun)
         else:
             found.append(here)
     return tuple(found)
-
-
-def _joined(before: Contact, here: Contact) -> Contact:
-    deeper = max(before, here, key=lambda contact: contact.depth_m)
-    by_gun = before.by_gun or here.by_gun
-    return Contact(before.begin_s, here.end_s, deeper.place_m, deeper.depth_m, by_gun)
 
 
 def _steps(trajectory: Trajectory) -> np.ndarray:

@@ -212,17 +212,14 @@ def _between(
     """Moves from the end of a face to the start of the next, without both."""
     speed = style.transfer_speed_m_per_s
     for retreat_m in RETRACTIONS_M:
-        between = [
-            Move(_retracted(move, retreat_m), move.quaternion_xyzw, speed, spraying=False)
-            for move in (before, after)
-        ]
+        between = []
+        for move in (before, after):
+            tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
+            back_m = move.position_m - retreat_m * tool_z
+            between.append(Move(back_m, move.quaternion_xyzw, speed, spraying=False))
         if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
             break
     return between
-
-
-def _retracted(move: Move, by_m: float) -> np.ndarray:
-    return move.position_m - by_m * Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
 
 
 def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:

@@ -4,7 +4,6 @@ Minima of the curve, how many passes cover a width, and how long they take.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
@@ -146,8 +145,12 @@ class IndexCurve:
         """Intervals of the index in the range within which sigma_n keeps to the tolerance."""
         knots = [(float(i), float(s)) for i, s in zip(self.index_m, self.sigma_n, strict=True)]
         knots = sorted(knots + [(m.index_m, m.sigma_n) for m in self.minima])
+
+        def above(index_m: float) -> float:
+            return self.parallel.sigma_n(index_m) - tolerance
+
         ends = [
-            _crossing_at(self.parallel.sigma_n, left, right, tolerance)
+            float(brentq(above, left, right, xtol=PRECISION_M))
             for (left, before), (right, after) in pairwise(knots)
             if (before <= tolerance) != (after <= tolerance)
         ]
@@ -188,10 +191,3 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
         return min(inside, key=lambda m: m.sigma_n)
     middle = 0.5 * (low + high)
     return Minimum(middle, curve.parallel.sigma_n(middle))
-
-
-def _crossing_at(
-    sigma_n: Callable[[float], float], low: float, high: float, tolerance: float
-) -> float:
-    """Where a function passes the tolerance between two places on either side of it."""
-    return float(brentq(lambda value: sigma_n(value) - tolerance, low, high, xtol=PRECISION_M))

@@ -36,10 +36,13 @@ def optimise(
     request, count = unoptimised.request, len(unoptimised.passes)
     target = request.target_um or unoptimised.mean_um
     wanted_cm3 = target * float(unoptimised.surface.vertex_areas_m2[unoptimised.painted].sum())
+    low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
+    least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
     placements = [unoptimised.placement]
     for passes in range(max(1, count - FEWER), count + MORE + 1):
-        placement = _best_placement(unoptimised, passes) if passes != count else None
-        placements += [placement] if placement else []
+        if passes != count:
+            placement = best_placement(unoptimised.line_films, (low, high), (least, most), passes)
+            placements += [placement] if placement else []
     tried = []
     for number, placement in enumerate(sorted(placements, key=lambda one: one.passes)):
 
@@ -55,13 +58,6 @@ def optimise(
     ]
     enough = min(costs) / (1.0 - WORTH_A_PASS)
     return next(one for one, cost in zip(tried, costs, strict=True) if cost <= enough)
-
-
-def _best_placement(unoptimised: Plan, passes: int) -> Placement | None:
-    """So many passes where their film at one speed is most even; None where there is no room."""
-    low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
-    least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
-    return best_placement(unoptimised.line_films, (low, high), (least, most), passes)
 
 
 def _timed_plan(
@@ -88,14 +84,9 @@ def _timed_plan(
         unoptimised.style.overspray_m, target_um,
         paint_weight=request.paint_weight * start_cm3 / wanted_cm3,
     )  # fmt: skip
+    models = [unoptimised.model]
     retimed = retime_for_evenness(
-        surface,
-        unoptimised.painted,
-        programme,
-        [unoptimised.model],
-        wanted,
-        progress,
-        explain=False,
+        surface, unoptimised.painted, programme, models, wanted, progress, explain=False
     ).programme
     found = predicted(
         surface, unoptimised.model, request, unoptimised.painted, retimed.trajectory(),

@@ -171,11 +171,7 @@ class SurfaceMap:
 
 def painted_side(surface: Surface, axes: PassAxes) -> np.ndarray:
     """(V,) bool, vertices that face the gun with nothing of the part before them."""
-    return (surface.normals @ axes.outward > STEEPEST_COSINE) & _in_front(surface, axes)
-
-
-def _in_front(surface: Surface, axes: PassAxes) -> np.ndarray:
-    """(V,) whether nothing of the part lies between the vertex and the gun's side."""
     starts = surface.vertices_m + LIFT_M * axes.outward
-    directions = np.broadcast_to(axes.outward, starts.shape)
-    return surface.first_faces(starts, np.ascontiguousarray(directions)) < 0
+    directions = np.ascontiguousarray(np.broadcast_to(axes.outward, starts.shape))
+    in_front = surface.first_faces(starts, directions) < 0
+    return (surface.normals @ axes.outward > STEEPEST_COSINE) & in_front

@@ -152,11 +152,6 @@ class ReportData:
         """For each model (P,) at the points, averaged over repeats [um]."""
         return [c.points.residual_um for c in self.comparisons]
 
-    def errors_in_words(self, rows: np.ndarray) -> str:
-        """RMSE of each model at these points of the study."""
-        errors = [f'{c.points.select(rows).rmse_um:.2f}' for c in self.comparisons]
-        return f'RMSE {" → ".join(errors)} µm'
-
     @cached_property
     def profiles(self) -> list[Profile]:
         """Along columns and rows."""

@@ -259,11 +259,6 @@ def in_print(text: str) -> str:
     return re.sub(r'(\d)-(\d)', r'\1–\2', text.replace(' um', ' µm'))
 
 
-def percent_words(probability: float) -> str:
-    """The same for a sentence."""
-    return percent(probability).replace('>', 'more than').replace('<', 'less than')
-
-
 def count_words(study: Study) -> str:
     """How much was measured, on what."""
     experiments = study.campaign.experiments
@@ -275,6 +270,12 @@ def count_words(study: Study) -> str:
     if points != readings:
         text += f' at {points} points'
     return f'{text} on {names}'
+
+
+def with_others(names: list[str]) -> str:
+    """'a (or b or c)': the likeliest of several, and those that are not distinguished from it."""
+    others = f' (or {joined(names[1:], "or")})' if names[1:] else ''
+    return f'{names[0]}{others}'
 
 
 def joined(words: list[str], last: str = 'and') -> str:

@@ -1,8 +1,7 @@
 """Parts in alarm, in words: which, in what, and what to do about it."""
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,10 +19,6 @@ class Alarm:
     parts: tuple[str, ...]  # their names, oldest first
     series: tuple[str, ...]  # names of what is beyond its limits, the one to act on first
     sentence: str
-
-    def to_dict(self) -> dict[str, Any]:
-        """All of it by name."""
-        return asdict(self)
 
 
 def alarms_of(series: Sequence[Series], names: Sequence[str]) -> list[Alarm]:

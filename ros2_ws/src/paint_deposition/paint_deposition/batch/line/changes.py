@@ -13,7 +13,7 @@ from scipy.stats import chi2, norm
 from paint_deposition.batch.line.control_charts import Charts, charts, robust_deviation
 from paint_deposition.batch.line.pooling import Measured, Pooled, amplitudes, places
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.report.words import amplitude_name, joined, unit_words
+from paint_deposition.report.words import amplitude_name, unit_words, with_others
 
 # Fewer parts make no chart.
 FEWEST = 8
@@ -187,8 +187,7 @@ class Change:
         elif self.series == 'misfit':
             what = 'the misfit of the film'
         else:
-            names = list(map(amplitude_name, self.members))
-            what = names[0] + (f' (or {joined(names[1:], "or")})' if names[1:] else '')
+            what = with_others(list(map(amplitude_name, self.members)))
         way = 'rose' if self.after > self.before else 'fell'
         moved = abs(self.after - self.before)
         size = f'{moved:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
@@ -245,7 +244,9 @@ def _merge_concurrent(found: Sequence[Change]) -> list[Change]:
 def _changes_in(series: Series, times_s: np.ndarray, penalty: float) -> list[Change]:
     from ruptures import KernelCPD
 
-    values = _clip_spikes(series.standard)
+    # Each is limited to a range about the median of its neighbours.
+    middle = median_filter(series.standard, SPIKE_WINDOW, mode='nearest')
+    values = np.clip(series.standard, middle - SPIKE_SIGMAS, middle + SPIKE_SIGMAS)
     if len(values) < 2 * SHORTEST_SEGMENT:
         return []
     ends = KernelCPD(kernel='linear', min_size=SHORTEST_SEGMENT).fit(values).predict(pen=penalty)
@@ -263,12 +264,6 @@ def _changes_in(series: Series, times_s: np.ndarray, penalty: float) -> list[Cha
 
 def _scatter(values: np.ndarray) -> float:
     return float(np.sum((values - values.mean()) ** 2))
-
-
-def _clip_spikes(values: np.ndarray) -> np.ndarray:
-    """The values, each limited to a range about the median of its neighbours."""
-    middle = median_filter(values, SPIKE_WINDOW, mode='nearest')
-    return np.clip(values, middle - SPIKE_SIGMAS, middle + SPIKE_SIGMAS)
 
 
 def _drift_errors(values: np.ndarray, times_s: np.ndarray) -> np.ndarray:

@@ -16,7 +16,7 @@ scales that are the most probable with it: those fitted without an effect would 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from typing import Any
@@ -27,7 +27,7 @@ from scipy.special import logsumexp
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.report.words import effect_name, joined, parameter_words, unit_words
+from paint_deposition.report.words import effect_name, parameter_words, unit_words, with_others
 
 # Readings within a cell of this size are at one place of the part.
 PLACE_SIZE_M = 0.05
@@ -266,17 +266,12 @@ class Cause:
     @property
     def sentence(self) -> str:
         """The cause in a line."""
-        names = list(map(effect_name, self.members))
-        others = f' (or {joined(names[1:], "or")})' if names[1:] else ''
+        name = with_others(list(map(effect_name, self.members)))
         size = f'{self.value:.3g} ± {self.sd:.2g} {unit_words(self.unit)}'.rstrip()
         return (
-            f'{names[0]}{others}: {parameter_words(self.parameter, self.unit)} {size}; '
+            f'{name}: {parameter_words(self.parameter, self.unit)} {size}; '
             f'{self.all_parts:.1f} standard deviations over all parts'
         )
-
-    def to_dict(self) -> dict[str, Any]:
-        """All figures by name."""
-        return asdict(self)
 
 
 @dataclass(frozen=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -164,10 +164,10 @@ class Line:
                 'level_sd_percent': 100.0 * scales.level,
                 'noise_factor': scales.noise,
                 'misfit_share': scales.misfit[0] if scales.misfit else 0.0,
-                'causes': [cause.to_dict() for cause in found.causes] if found else [],
+                'causes': [asdict(cause) for cause in found.causes] if found else [],
             },
             'charts': [self._chart(one) for one in self.series],
-            'alarms': [alarm.to_dict() for alarm in self.alarms],
+            'alarms': [asdict(alarm) for alarm in self.alarms],
             'false_alarms': {'one_in_parts': RUN_LENGTH},
             'changes': [change.to_dict() for change in self.changes],
             'errors': [{'run': name, 'error': error} for name, error in self.errors],

@@ -4,7 +4,6 @@ from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
 
 from pydantic import Field
 
@@ -12,32 +11,23 @@ from paint_deposition.batch.cases import Case, code_digest, digest_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.motion_source import MotionSource, Number, OnePart, Text
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
 NAME = 'line.yaml'
 BAGS = ('.bag', '.mcap')
 TABLES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods', '.parquet')
 
 
-class LineFile(MotionSource, extra='forbid'):
+class LineFile(MotionSource, OnePart, extra='forbid'):
     """What all runs of a line share; paths are relative to the folder."""
 
     mesh: Text = Field(description='the name of a mesh file')
     model: Text = Field(description='the name of a model file, calibrated for this line')
     points: Text | None = Field(None, description='the name of a file of measuring points')
-    mesh_scale: Number = Field(1.0, gt=0.0, description='metres per unit of the mesh')
-    body: Text | None = Field(None, description='the name of the one body to take of the mesh')
-    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = Field(
-        None, description='[x, y, z], the direction of gravity in the mesh frame'
-    )
     max_edge_length_m: Number = Field(0.02, gt=0.0, description='longest edge of the mesh [m]')
-    max_pose_gap_s: Number = Field(
-        DEFAULT_MAX_POSE_GAP_S, gt=0.0, description='longest gap between poses in a stroke [s]'
-    )
 
 
 @dataclass(frozen=True)
@@ -87,7 +77,9 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
     for path in sorted(set(folder.iterdir()) - set(shared)):
         if path.name.startswith('.'):
             continue
-        if path.is_dir() and _is_bag(path):
+        # One that was cut off has no metadata.
+        held = [*path.glob('metadata.yaml'), *path.glob('*.mcap'), *path.glob('*.db3')]
+        if path.is_dir() and held:
             recordings[path.name].append(path)
         elif path.suffix.lower() in BAGS:
             recordings[path.stem].append(path)
@@ -100,13 +92,6 @@ def runs_in(folder: Path, shared: Iterable[Path] = ()) -> tuple[list[Run], list[
             'their readings beside them, under the same name'
         )
     return runs, [path.name for paths in readings.values() for path in paths]
-
-
-def _is_bag(folder: Path) -> bool:
-    """Whether it holds a bag, one that was cut off and has no metadata included."""
-    return any(
-        ((folder / 'metadata.yaml').is_file(), *folder.glob('*.mcap'), *folder.glob('*.db3'))
-    )
 
 
 def _run(name: str, recordings: list[Path], readings: list[Path]) -> Run:

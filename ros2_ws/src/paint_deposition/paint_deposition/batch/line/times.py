@@ -19,26 +19,25 @@ def dated(table: pa.Table) -> pa.Table:
 
     if 'named_s' not in table.column_names:
         return table
-    columns = ('part', 'time_s', 'named_s', 'remark')
-    rows = list(zip(*(table[name].to_pylist() for name in columns), strict=True))
-    names_at: dict[float, dict[str, float | None]] = defaultdict(dict)
-    for part, time_s, named_s, _ in rows:
-        if time_s is not None:
-            names_at[time_s][part] = named_s
-    times, remarks = [], []
-    for _, time_s, named_s, remark in rows:
-        together = names_at[time_s]
-        line = ''
-        if len(together) > 1 and None not in together.values() and len({*together.values()}) > 1:
-            line = f'{len(together)} recordings begin at one time; dated by their names'
-            time_s = named_s
-        elif len(together) > 1:
-            line = (
-                f'{len(together)} recordings begin at one time, so the order of their parts is '
-                'not known; put the date into their names, such as 2026-11-12_0730'
+    rows = table.select(['part', 'time_s', 'named_s', 'remark']).to_pylist()
+    names_at: dict[float | None, dict[str, float | None]] = defaultdict(dict)
+    for row in rows:
+        names_at[row['time_s']][row['part']] = row['named_s']
+    for row in rows:
+        together = names_at[row['time_s']]
+        if row['time_s'] is None or len(together) < 2:
+            continue
+        line = f'{len(together)} recordings begin at one time'
+        if None not in together.values() and len({*together.values()}) > 1:
+            line += '; dated by their names'
+            row['time_s'] = row['named_s']
+        else:
+            line += (
+                ', so the order of their parts is not known; put the date into their names, such '
+                'as 2026-11-12_0730'
             )
-        times.append(time_s)
-        remarks.append('; '.join(filter(None, [remark, line])) if line else remark)
-    table = table.drop_columns(['named_s', 'time_s', 'remark'])
-    table = table.append_column('time_s', pa.array(times, pa.float64()))
-    return table.append_column('remark', pa.array(remarks, pa.string()))
+        row['remark'] = '; '.join(filter(None, [row['remark'], line]))
+    for name, kind in (('time_s', pa.float64()), ('remark', pa.string())):
+        column = pa.array([row[name] for row in rows], kind)
+        table = table.drop_columns([name]).append_column(name, column)
+    return table.drop_columns(['named_s'])

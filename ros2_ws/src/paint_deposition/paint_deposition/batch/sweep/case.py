@@ -35,29 +35,19 @@ def computed(
         surface: the part. trajectory: the motion; None: passes are planned.
         readings: places at which the gauge is predicted, or None.
     """
-    try:
-        figures = _painted(parameters, surface, trajectory, readings)
-    except PaintError as error:
-        figures = {'error': str(error)}
-    return {name: [value] for name, value in figures.items()}
-
-
-def _painted(
-    parameters: Mapping[str, Any],
-    surface: Surface,
-    trajectory: Trajectory | None,
-    readings: Readings | None,
-) -> dict[str, Any]:
     model: DepositionModel = parameters['model']
     figures: dict[str, Any] = {}
-    if trajectory is None:
-        planned = plan(surface, model, **parameters['passes'])
-        trajectory = planned.trajectory
-        figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
-    film = simulate(
-        surface, varied_motion(trajectory, **parameters['motion']), model, readings=readings,
-        target_um=parameters['target_um'], tolerance_um=parameters['tolerance_um'],
-    )  # fmt: skip
+    try:
+        if trajectory is None:
+            planned = plan(surface, model, **parameters['passes'])
+            trajectory = planned.trajectory
+            figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
+        film = simulate(
+            surface, varied_motion(trajectory, **parameters['motion']), model, readings=readings,
+            target_um=parameters['target_um'], tolerance_um=parameters['tolerance_um'],
+        )  # fmt: skip
+    except PaintError as error:
+        return {'error': [str(error)]}
     statistics = film.statistics
     figures |= {
         **statistics.to_dict(),
@@ -68,7 +58,7 @@ def _painted(
     }
     if film.predicted_um is not None:
         figures[PREDICTED] = film.predicted_um.tolist()
-    return figures
+    return {name: [value] for name, value in figures.items()}
 
 
 def varied_motion(

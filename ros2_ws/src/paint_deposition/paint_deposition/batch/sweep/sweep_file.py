@@ -48,15 +48,13 @@ class Distribution(BaseModel, extra='forbid'):
 
 
 def _grid(given: dict[str, Any]) -> dict[str, list[Any]]:
-    return {name: _values(name, values) for name, values in given.items()}
-
-
-def _values(name: str, given: Any) -> list[Any]:
-    if isinstance(given, dict):
-        return _validated(Steps, name, given, LIST_WORDS).values()
-    if not isinstance(given, list) or not given:
-        raise ValueError(f'{name} is {given!r}; expected {LIST_WORDS}')
-    return given
+    values = dict(given)
+    for name, listed in given.items():
+        if isinstance(listed, dict):
+            values[name] = _validated(Steps, name, listed, LIST_WORDS).values()
+        elif not isinstance(listed, list) or not listed:
+            raise ValueError(f'{name} is {listed!r}; expected {LIST_WORDS}')
+    return values
 
 
 def _distributions(given: dict[str, Any]) -> dict[str, Distribution]:

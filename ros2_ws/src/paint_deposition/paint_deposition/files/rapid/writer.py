@@ -2,32 +2,15 @@
 
 from collections.abc import Sequence
 from itertools import pairwise
+from pathlib import Path
 
 from paint_deposition.errors import PlanError
+from paint_deposition.files.templates import filled
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
-MODULE = r"""MODULE PaintPasses
-  ! Poses of the TCP of tBell in wobjPart, both taught on the robot.
-  ! doGun opens the gun. Millimetres, mm/s; axis configurations are free.
-{about}{data}
-  VAR triggdata gunOn;
-  VAR triggdata gunOff;{flow_data}
-
-  PROC main()
-    ConfJ\Off;
-    ConfL\Off;
-    TriggIO gunOn,0\Start\DOp:=doGun,1;
-    TriggIO gunOff,0\Start\DOp:=doGun,0;{flow_events}
-    SetDO doGun,0;
-{moves}
-    SetDO doGun,0;
-  ENDPROC
-ENDMODULE
-"""
-FRAMES = r'tBell\WObj:=wobjPart'
-ANY_AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
+TEMPLATE = Path(__file__).parent / 'templates' / 'passes.mod.j2'
 
 
 def module_text(
@@ -47,15 +30,10 @@ def module_text(
         if not 0.0 < speed < 10.0:
             raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
     poses = [_pose([*move.position_m, *move.quaternion_xyzw]) for move in moves]
-    data = [f'  CONST robtarget p{k}:={pose[:-1]},{ANY_AXES}];' for k, pose in enumerate(poses, 1)]
-    data += [
-        f'  CONST speeddata {name}:=[{speed * 1e3:.3f},500,5000,1000];'
-        for speed, name in speeds.items()
-    ]
     levels = sorted({_flow(move) for move in moves if move.spraying})
     flows = {v: f'flow{k}' for k, v in enumerate(levels, start=1)} if levels != [1.0] else {}
     brushes = sorted({move.brush for move in moves if move.spraying} - {ONLY_BRUSH})
-    run = [f'    MoveJ p1,{speeds[_speed(moves[0])]},fine,{FRAMES};']
+    run = [('MoveJ', speeds[_speed(moves[0])], '', 'fine')]
     for number, (before, move) in enumerate(pairwise(moves), start=2):
         instruction, trigger = 'MoveL', ''
         if _gun(move) != _gun(before):
@@ -66,23 +44,14 @@ def module_text(
                 events = ''.join(f'\\T{k}:={name}' for k, name in enumerate(also, start=2))
                 trigger = f'gunOn{events},'
         zone = 'fine' if number == len(moves) else 'z10'
-        speed_name = speeds[_speed(move)]
-        run.append(f'    {instruction} p{number},{speed_name},{trigger}{zone},{FRAMES};')
-    about = ''.join(f'  ! {comment}\n' for comment in comments)
-    if part is not None:
-        at = _pose(part.values)
-        about += f'  PERS wobjdata wobjPart:=[FALSE,TRUE,"",{at},[[0,0,0],[1,0,0,0]]];\n'
+        run.append((instruction, speeds[_speed(move)], trigger, zone))
     outputs = {name: f'AOp:=aoFlow,{flow:.4f}' for flow, name in flows.items()}
     outputs |= {f'brush{number}': f'GOp:=goBrush,{number}' for number in brushes}
-    return MODULE.format(
-        about=about,
-        data='\n'.join(data),
-        moves='\n'.join(run),
-        flow_data=''.join(f'\n  VAR triggdata {name};' for name in outputs),
-        flow_events=''.join(
-            f'\n    TriggEquip {name},0\\Start,0\\{output};' for name, output in outputs.items()
-        ),
-    )
+    at = _pose(part.values) if part else ''
+    return filled(
+        TEMPLATE, comments=comments, part=at, poses=poses, speeds=speeds, outputs=outputs,
+        moves=run,
+    )  # fmt: skip
 
 
 def _gun(move: Move) -> tuple[float, int] | None:

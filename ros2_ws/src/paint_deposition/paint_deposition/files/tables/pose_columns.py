@@ -10,13 +10,7 @@ import numpy as np
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.headings import TIMES, Heading
 from paint_deposition.files.tables.sheets import text_of
-from paint_deposition.files.tables.table import (
-    Table,
-    find_table,
-    headings_in,
-    is_comment,
-    with_units_below,
-)
+from paint_deposition.files.tables.table import Table, find_table, headings_in, rows_below
 
 # No run is longer: the unit is another one.
 LONGEST_RUN_S = 1e6
@@ -52,9 +46,7 @@ class PoseTable(Table):
             )
         headings = headings_in(sheet.rows[header])
         names = [column_name(heading) for heading in headings]
-        below = [k for k in range(header + 1, len(sheet.rows)) if not is_comment(sheet.rows[k])]
-        if below and (known := with_units_below(headings, sheet.rows[below[0]])):
-            headings, below = known, below[1:]
+        headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
             path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
         ).select(below)

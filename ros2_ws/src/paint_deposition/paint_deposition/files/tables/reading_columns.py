@@ -4,7 +4,7 @@ Columns are known by the project's own names, by a few usual English and German 
 the user names them, see ``Layout``.
 """
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -93,10 +93,6 @@ def _quantity(heading: Heading) -> str | None:
     if (words and words[-1].endswith('dicke')) or QUANTITY.get(' '.join(words)) == 'thickness':
         return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
     return QUANTITY.get(' '.join(words))
-
-
-def has_place(at: Collection[str]) -> bool:
-    return {*AXES} <= {*at} or {*ON_FACE} <= {*at}
 
 
 def not_found(sheet: Sheet, films: bool, layout: Layout) -> str:

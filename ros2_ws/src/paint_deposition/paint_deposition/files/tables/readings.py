@@ -54,23 +54,17 @@ class ReadingTable:
 
         def known(headings: list[Heading]) -> int:
             at = known_columns.columns_of(headings, layout)
-            return len(at) if ('thickness' in at if films else known_columns.has_place(at)) else 0
+            needed = (('thickness',),) if films else (AXES, ON_FACE)
+            return len(at) if any({*names} <= {*at} for names in needed) else 0
 
-        sheet, header = cells_of.find_table(
-            path,
-            ReadingsError,
-            known,
-            layout.sheet,
-            max(numbers) if numbered else 0,
-        )
+        least = max(numbers) if numbered else 0
+        sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet, least)
         first = 0 if numbered or header is None else header + 1
         headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        rows = [k for k in range(first, len(sheet.rows)) if not cells_of.is_comment(sheet.rows[k])]
-        if rows and 'unit' not in known_columns.columns_of(headings, layout):
-            below = cells_of.with_units_below(headings, sheet.rows[rows[0]])
-            headings, rows = (below, rows[1:]) if below else (headings, rows)
+        units_too = 'unit' not in known_columns.columns_of(headings, layout)
+        headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
         at = known_columns.columns_of(headings, layout)
         if header is None and not (numbered and known(headings)):
             raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')

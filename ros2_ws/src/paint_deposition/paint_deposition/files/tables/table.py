@@ -8,7 +8,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, some
 from paint_deposition.files.tables.headings import Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
@@ -205,21 +205,23 @@ def headings_in(row: list[Cell]) -> list[Heading]:
     return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
 
 
-def with_units_below(headings: list[Heading], row: list[Cell]) -> list[Heading] | None:
-    """The headings with the units that a row below them holds, None where it is no such row."""
-    units = [unit_of(text_of(cell)) for cell in row]
-    if not any(units) or any(map(is_value, row)):
-        return None
+def rows_below(
+    sheet: Sheet, headings: list[Heading], first: int, units_too: bool = True
+) -> tuple[list[Heading], list[int]]:
+    """Rows from ``first`` on without comments; a row of units, if any, goes to the headings."""
+    rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
+    cells = sheet.rows[rows[0]] if rows and units_too else []
+    units = [unit_of(text_of(cell)) for cell in cells]
+    if not any(units) or any(map(is_value, cells)):
+        return headings, rows
     pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
-    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs]
+    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs], rows[1:]
 
 
 def shown(headings: Sequence[Heading]) -> str:
     """The headings of a table in brackets, for a message."""
     named = [repr(heading.text) for heading in headings if heading.text]
-    if len(named) > MOST_HEADINGS_SHOWN:
-        named[MOST_HEADINGS_SHOWN:] = [f'and {len(named) - MOST_HEADINGS_SHOWN} more']
-    return f'(columns: {", ".join(named) or "none"})'
+    return f'(columns: {some(named, MOST_HEADINGS_SHOWN) or "none"})'
 
 
 def is_comment(row: list[Cell]) -> bool:

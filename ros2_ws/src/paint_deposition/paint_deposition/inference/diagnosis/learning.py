@@ -5,12 +5,12 @@ and kept only if they improve the prediction of readings left out.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from paint_deposition.inference.diagnosis.evidence import NullModel, Principal
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, Explanation
+from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, PLACE, Explanation
 from paint_deposition.inference.diagnosis.model_space import SIZES
 
 MOST_LAWS = 2
@@ -26,13 +26,17 @@ class Nulls:
     # For a correction of an accepted law: the same with the footprint, without what the laws may
     # be off by.
     correction: NullModel
+    # For a map: all of it, with what nature usually leaves over of parts and settings; the most
+    # probable may be what is unknown.
+    place: NullModel
     any_form: NullModel  # for all others: all of it
 
     def of(self, explanation: Explanation) -> NullModel:
         """That for an explanation."""
         if explanation.corrects:
             return self.correction
-        return self.footprint if explanation.learns == FOOTPRINT else self.any_form
+        kinds = {FOOTPRINT: self.footprint, PLACE: self.place}
+        return kinds.get(explanation.learns, self.any_form)
 
     def beside(self, columns: np.ndarray) -> 'Nulls':
         """The same where some directions (P, n) may vary, too."""
@@ -43,7 +47,7 @@ class Nulls:
         return self._each(lambda null: null.select(rows))
 
     def _each(self, change: Callable[[NullModel], NullModel]) -> 'Nulls':
-        return Nulls(change(self.footprint), change(self.correction), change(self.any_form))
+        return Nulls(*(change(getattr(self, each.name)) for each in fields(self)))
 
 
 def choose_laws(

@@ -198,6 +198,11 @@ class Remainder:
             replace(s, log_prior=s.log_prior - float(total[s.is_beyond_nature])) for s in found
         ]
 
+    def usual(self, sizes: Sizes) -> Sizes:
+        """The same with settings and parts as sprays usually differ."""
+        part = USUAL_PART[0] if sizes.part else 0.0
+        return replace(sizes, setting=USUAL_SETTING[0], part=part)
+
     def covariance(self, sizes: Sizes) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
         return self.of_footprint(sizes) + self.of_parts(sizes)

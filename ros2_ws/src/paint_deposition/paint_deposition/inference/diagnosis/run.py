@@ -47,8 +47,9 @@ LEARNING_STEPS, SETTLED = 8, 0.5
 # A point that gets less than this share of the mean film was hardly reached by the path.
 REACHED = 0.02
 MOST_UNREACHED = 0.1
-# Standard deviations above the prediction from which the gauge found paint.
-PAINTED = 3.0
+# Standard deviations above the prediction from which the gauge found paint, and the share of the
+# mean film: so much may be the tail of a footprint.
+PAINTED, TAIL = 3.0, 0.2
 # Probability of residuals this small: below it the noise is overstated, or the readings were
 # made up.
 TOO_GOOD = 1e-4
@@ -263,7 +264,7 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 def trouble_with(study: Study, fit: Fit) -> str:
     """Why the fit cannot be right, or nothing."""
     mean = float(np.mean(study.measured_um))
-    painted = fit.residual > PAINTED
+    painted = (fit.residual > PAINTED) & (study.measured_um > TAIL * mean)
     bare = float(np.mean(painted & (fit.predicted_um < REACHED * mean)))
     freedom = len(study) - len(fit.vector)
     if freedom < 5:

@@ -82,11 +82,15 @@ class Trial:
         Args:
             fit: of the model with the set.
         """
-        sizes, plain = self.best.sizes, self.run.plain(fit)
-        correction = plain.with_remainder(self.remainder.covariance(sizes))
+        sizes, plain, left_over = self.best.sizes, self.run.plain(fit), self.remainder
         off = law_errors(self.run.study, fit, self.names, self.usual.model)
-        footprint = plain.with_remainder(self.remainder.of_parts(sizes)).beside(off)
-        return Nulls(footprint, correction, correction.beside(off) if off.size else correction)
+        correction = plain.with_remainder(left_over.covariance(sizes))
+        return Nulls(
+            plain.with_remainder(left_over.of_parts(sizes)).beside(off),
+            correction,
+            plain.with_remainder(left_over.covariance(left_over.usual(sizes))).beside(off),
+            correction.beside(off),
+        )
 
     @cached_property
     def log_weight(self) -> float:

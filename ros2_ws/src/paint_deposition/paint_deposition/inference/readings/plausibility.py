@@ -4,7 +4,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, ReadingsError
+from paint_deposition.errors import ModelError, ReadingsError, some
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.inference.readings.campaign import Campaign
@@ -146,8 +146,7 @@ def zeros_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
     rows = (readings.thickness_um == 0.0) & (expected_um > THINNEST_FILM_UM)
     if readings.zero_is_film or not rows.any():
         return ''
-    points = list(dict.fromkeys(readings.point[rows].tolist()))
-    named = ', '.join(points[:MOST_NAMED]) + (', ...' if len(points) > MOST_NAMED else '')
+    named = some(list(dict.fromkeys(readings.point[rows].tolist())), MOST_NAMED)
     low, high = expected_um[rows].min(), expected_um[rows].max()
     return (
         f'{np.count_nonzero(rows)} of {len(readings)} readings are 0 where the model expects '

@@ -57,7 +57,8 @@ def replay_messages(
 
     `poses` are those of a bag that has no topic of poses: `pose_topic` is ''.
     """
-    names = [*filter(None, [pose_topic, states and states.name]), *transforms]
+    own = pose_topic, states.name if states else ''
+    names = [*(name for name in own if name), *transforms]
     as_state, logged = _state_converter(bag, states), attrgetter('log_time_ns')
     messages = merge(bag.messages(names) if names else (), poses, key=logged)
     for _, simultaneous in groupby(messages, key=logged):

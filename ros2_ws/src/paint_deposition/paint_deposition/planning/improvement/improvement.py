@@ -32,6 +32,8 @@ SAMPLES = 60
 # Smaller shifts of a trigger are left out of the sentence [m].
 LEAST_SHIFT_M = 0.002
 LEAST_PASS_M = 0.05
+# Of an improvement, by their names in improvement.json.
+FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 'sentence')
 
 
 @dataclass(frozen=True)
@@ -258,16 +260,12 @@ class Improvement:
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
             **both,
-            'target_um': self.target_um,
-            'tolerance': self.tolerance,
+            **{name: getattr(self, name) for name in FIGURES},
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
-            'sigma_n_of_path': self.sigma_n_of_path,
             'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
-            'program_difference': self.program_difference,
             'passes': [change.to_dict() for change in self.changes],
             'request': self.request.model_dump(),
-            'sentence': self.sentence,
             'warnings': list(self.warnings),
         }
 

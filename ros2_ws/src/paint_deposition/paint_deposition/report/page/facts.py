@@ -2,7 +2,7 @@
 
 from itertools import pairwise
 
-from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step, percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.tables import class_rows
@@ -29,9 +29,7 @@ def effect_meanings(rows: list[dict]) -> str:
 
 
 def with_confounded(row: dict) -> str:
-    if not row['others']:
-        return row['name']
-    return f'{row["name"]} (or {words.joined(row["others"], "or")})'
+    return words.with_others([row['name'], *row['others']])
 
 
 def accepted_words(rows: list[dict]) -> str:
@@ -41,7 +39,8 @@ def accepted_words(rows: list[dict]) -> str:
         if words.is_learned(row['id']):
             continue
         names = words.joined([row['name'], *row['others']], 'or')
-        probability = words.percent_words(row['found'].probability)
+        probability = percent(row['found'].probability)
+        probability = probability.replace('>', 'more than').replace('<', 'less than')
         text = f'{words.capital(names)} with a probability of {probability}'
         if row['others']:
             text += '; these readings leave open which of them it is'

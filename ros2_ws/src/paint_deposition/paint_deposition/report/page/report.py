@@ -6,7 +6,6 @@ from collections.abc import Callable
 from datetime import datetime
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -14,26 +13,16 @@ from matplotlib.figure import Figure
 from paint_deposition import __version__
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.files.atomic import write_text
+from paint_deposition.files.json_files import plain
 from paint_deposition.files.version import git_version
 from paint_deposition.film.statistics import CPK_MEANS
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page import charts, tables
+from paint_deposition.report.page import charts, learned, tables
 from paint_deposition.report.page.headline import headline, key_figures
-from paint_deposition.report.page.learned import (
-    footprint_figure,
-    learned_figure,
-    map_figure,
-    profile_figure,
-)
-from paint_deposition.report.page.tables import film_rows, point_rows, shares_in_words
+from paint_deposition.report.pictures import comparison
 from paint_deposition.report.pictures.chart import DOTS_PER_INCH
-from paint_deposition.report.pictures.comparison import (
-    part_figures,
-    profile_figures,
-    profile_legend,
-)
 
 TEMPLATES = Path(__file__).parent / 'templates'
 SPRAYS_SHOWN = 5
@@ -66,28 +55,29 @@ def report_html(data: ReportData) -> str:
         'capital': words.capital,
         'film': lambda value: '' if np.isnan(value) else words.fixed(value, 1),
         'step': words.step_words,
-        'shares': shares_in_words,
+        'shares': tables.shares_in_words,
     }
     environment.filters.update(filters)
     drawn = [
         charts.parity_figure(data),
         charts.covariate_figure(data),
         charts.unknown_figure(data),
-        learned_figure(data),
-        map_figure(data),
-        profile_figure(data),
-        footprint_figure(data),
+        learned.learned_figure(data),
+        learned.map_figure(data),
+        learned.profile_figure(data),
+        learned.footprint_figure(data),
     ]
     figures = [figure for figure in drawn if figure]
-    places, sprays = data.proposals
+    content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
+    (places, sprays), git = data.proposals, git_version()
     return environment.get_template('report.html.j2').render(
         data=data,
         headline=headline(data),
         key_figures=key_figures(data),
         head=list(data.study.campaign.head.items()),
-        film=film_rows(data),
+        film=tables.film_rows(data),
         cpk=CPK_MEANS,
-        points=point_rows(data),
+        points=tables.point_rows(data),
         counts=words.count_words(data.study),
         classes=tables.class_rows(data),
         effects=tables.effect_rows(data),
@@ -102,13 +92,19 @@ def report_html(data: ReportData) -> str:
         places=places,
         sprays=sprays[:SPRAYS_SHOWN],
         separates=words.capital(words.competing_explanations(sprays[0])) if sprays else '',
-        provenance=_provenance(),
+        provenance=[
+            ('Made', datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z')),
+            ('paint_deposition', f'{__version__} ({git})' if git else __version__),
+        ],
         lined=all(len(p.line_m) for p in data.profiles),
         figures=[figure['name'] for figure in figures],
-        content=_as_json(figures),
-        parts=[list(map(_embedded, part_figures(data, k))) for k in range(len(data.experiments))],
-        profiles=list(map(_embedded, profile_figures(data))),
-        profile_legend=profile_legend(data),
+        content=content.replace('<', '\\u003c'),  # it stands inside a script element
+        parts=[
+            list(map(_embedded, comparison.part_figures(data, k)))
+            for k in range(len(data.experiments))
+        ],
+        profiles=list(map(_embedded, comparison.profile_figures(data))),
+        profile_legend=comparison.profile_legend(data),
         style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
@@ -120,23 +116,3 @@ def _embedded(figure: Figure) -> str:
     content = BytesIO()
     figure.savefig(content, format='png', dpi=DOTS_PER_INCH, facecolor='white')
     return f'data:image/png;base64,{b64encode(content.getvalue()).decode("ascii")}'
-
-
-def _provenance() -> list[tuple[str, str]]:
-    git = git_version()
-    return [
-        ('Made', datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z')),
-        ('paint_deposition', f'{__version__} ({git})' if git else __version__),
-    ]
-
-
-def _as_json(content: Any) -> str:
-    """JSON that may stand inside a script element."""
-    text = json.dumps(content, default=_encoded, separators=(',', ':'), allow_nan=False)
-    return text.replace('<', '\\u003c')
-
-
-def _encoded(value: Any) -> Any:
-    if isinstance(value, np.ndarray | np.generic):
-        return value.tolist()
-    raise TypeError(f'{type(value).__name__} cannot be written into the report')

@@ -52,7 +52,8 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
         part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
         shown_um = np.clip(residual_um[rows], -largest, largest)
         colours = scale.rgba(shown_um, np.ones(count, dtype=bool)) / 255.0
-        axes.scatter(*places.T, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
+        x, y = places.T
+        axes.scatter(x, y, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
         colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
         figures.append(figure)
     film_um = data.painted[index][-1].film_um
@@ -154,7 +155,8 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
     """Draw readings with the gauge's noise, and the models' film."""
     quiet(axes, f'{profile.axis} [mm]', 'film [µm]', size=TEXT_PT)
     of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
-    title = f'{of}{profile.label}:  {data.errors_in_words(profile.rows)}'
+    errors = [f'{c.points.select(profile.rows).rmse_um:.2f}' for c in data.comparisons]
+    title = f'{of}{profile.label}:  RMSE {" → ".join(errors)} µm'
     title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(title))
     axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
     at_mm, line_mm = MM * profile.position_m, MM * profile.line_m

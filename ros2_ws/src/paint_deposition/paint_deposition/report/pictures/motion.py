@@ -83,7 +83,9 @@ def _draw(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: fl
                 str(number + 1), line[0], fontsize=7.5, color='white', ha='center', va='center',
                 bbox={'boxstyle': 'circle,pad=0.2', 'facecolor': colours[rows[0]], 'linewidth': 0},
             )  # fmt: skip
-    shown = _evenly(spray, AXES_APART * size_m)
+    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), AXES_APART * size_m
+    evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
+    shown = np.unique(np.searchsorted(travel, evenly_m))
     start = spray.position_m[shown]
     ends = start + AXIS_SHARE * size_m * spray.rotation[shown, :, 2]
     axes.add_collection(
@@ -118,12 +120,6 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
             color=INK,
         )  # fmt: skip
     axes.update_datalim(flat)
-
-
-def _evenly(spray: SprayPath, apart_m: float) -> np.ndarray:
-    """Rows of the path about so far apart along it."""
-    travel = np.cumsum(spray.dwell_s * spray.speed_m_per_s)
-    return np.unique(np.searchsorted(travel, np.arange(0.5 * apart_m, travel[-1], apart_m)))
 
 
 def _key() -> list[Line2D]:

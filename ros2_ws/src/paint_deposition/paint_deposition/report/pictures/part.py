@@ -47,8 +47,10 @@ class PartPicture:
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
         above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
         seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
-        edges = flat[_borders(faces[seen])]
-        return PartPicture(view, flat, faces, seen, edges)
+        # Creases, where patches share no vertex, and rims have one triangle only.
+        edges, of_face = edges_of(faces[seen])
+        edges = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
+        return PartPicture(view, flat, faces, seen, flat[edges])
 
     @property
     def low_m(self) -> np.ndarray:
@@ -130,12 +132,6 @@ def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     axes.add_collection(
         TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True), autolim=False
     )
-
-
-def _borders(faces: np.ndarray) -> np.ndarray:
-    """(E, 2) edges with one triangle only: creases, where patches share no vertex, and rims."""
-    edges, of_face = edges_of(faces)
-    return edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
 
 
 def draw_tool_path(

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.motion.path import SprayPath
 from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement
 from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
 from paint_deposition.planning.recommendation import Recommendation
@@ -121,7 +120,8 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     films = zip(axes, result.paths, (result.before, result.after), strict=True)
     for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
         part.dress(one, low, high)
-        _draw_film(one, part, scale, driven, laid)
+        part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
+        draw_tool_path(one, driven, part.view, low, high)
         one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
     colour_bar(top, axes, 'film [µm]', scale)
@@ -155,14 +155,6 @@ def _scale(result: Improvement) -> ColourScale:
     reach = min(max(math.ceil(reach / STEP) * STEP, 2.0 * STEP), 0.95)
     film = np.concatenate([result.before.film_um, result.after.film_um])
     return film_scale(film, target * (1.0 - reach), target * (1.0 + reach))
-
-
-def _draw_film(
-    axes: Axes, part: PartPicture, scale: ColourScale, path: SprayPath, laid: FilmSummary
-) -> None:
-    part.draw(axes, scale.rgba(laid.film_um, laid.film_um > 1.0))
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    draw_tool_path(axes, path, part.view, low, high)
 
 
 def _title(name: str, laid: FilmSummary) -> str:

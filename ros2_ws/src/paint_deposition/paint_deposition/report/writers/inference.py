@@ -40,23 +40,13 @@ def _write_calibration(
     return [model_file, figures, *write_calibration_pictures(folder, result, pictures)]
 
 
-@written.register
-def _write_comparison(result: Comparison, folder: Path, pictures: str = 'png') -> list[Path]:
+@written.register(Comparison)
+@written.register(SideBySide)
+def _write_comparison(
+    result: Comparison | SideBySide, folder: Path, pictures: str = 'png'
+) -> list[Path]:
     figures = result.to_dict()
     return _write_results(folder, 'comparison.json', figures, ReportData.of(result), pictures)
-
-
-@written.register
-def _write_side_by_side(result: SideBySide, folder: Path, pictures: str = 'png') -> list[Path]:
-    data = ReportData.of(result)
-    models = {name: comparison.model for name, comparison in result.by_name.items()}
-    figures = folder / 'comparison.json'
-    write_json(figures, result.to_dict() | _provenance(data.study, models))
-    files = [figures, save_picture(comparison_figure(data), folder / f'comparison.{pictures}')]
-    for name, comparison in result.by_name.items():
-        files.append(folder / f'residuals_{file_name(name)}.csv')
-        write_table(files[-1], _residual_rows(comparison))
-    return [*files, write_report(folder / 'report.html', data)]
 
 
 @written.register
@@ -85,13 +75,16 @@ def _provenance(
 def _write_results(
     folder: Path, name: str, figures: dict[str, Any], data: ReportData, pictures: str
 ) -> list[Path]:
-    """Figures, the last model's residuals as a table, picture and report."""
-    last = data.comparisons[-1]
-    files = [folder / name, folder / 'residuals.csv']
-    write_json(files[0], figures | _provenance(last.study, last.model))
-    write_table(files[1], _residual_rows(last))
+    """Figures, picture, report, and residuals: of the last model, or of each side by side."""
+    beside = dict(zip(data.names, data.comparisons, strict=True)) if data.names else {}
+    models = {name: comparison.model for name, comparison in beside.items()}
+    residuals = {f'residuals_{file_name(name)}.csv': one for name, one in beside.items()}
+    residuals = residuals or {'residuals.csv': data.comparisons[-1]}
+    write_json(folder / name, figures | _provenance(data.study, models or data.model))
+    for file, comparison in residuals.items():
+        write_table(folder / file, _residual_rows(comparison))
     return [
-        *files,
+        *(folder / file for file in (name, *residuals)),
         save_picture(comparison_figure(data), folder / f'comparison.{pictures}'),
         write_report(folder / 'report.html', data),
     ]
