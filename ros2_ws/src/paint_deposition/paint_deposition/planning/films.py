@@ -130,7 +130,8 @@ class PlannedFilm:
             )
         slowest, fastest = min(self.sprayed_speeds_m_per_s), max(self.sprayed_speeds_m_per_s)
         least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
-        if slowest < (1.0 - NEAR) * least or fastest > (1.0 + NEAR) * most:
+        outside = slowest < (1.0 - NEAR) * least or fastest > (1.0 + NEAR) * most
+        if outside and not request.optimise:  # which keeps them
             yield (
                 f'the passes run at {slowest:.3g} to {fastest:.3g} m/s, where {least:g} to '
                 f'{most:g} m/s are allowed (--speed-min, --speed-max)'
