@@ -39,9 +39,10 @@ class FiniteRange(Finite, click.FloatRange):
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            if param is not None and str(param.name).endswith('_m'):
-                error.message = f'{error.message.rstrip(".")}, in metres'
-            raise
+            if param is None or not str(param.name).endswith('_m'):
+                raise
+            words = f'{error.message.rstrip(".")}, in metres'
+            raise click.BadParameter(words, ctx, param) from None
 
 
 class File(click.Path):
