@@ -134,10 +134,6 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
         (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), "'--index'"),
         (('--mesh', 'door.stl', '--speed', 0.3, '--index', 577), '<=10.0, in metres'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--standoff', 250), '<=10.0, in metres'),
-        (
-            ('--mesh', 'door.stl', '--target-um', 20, '--speed', 0.3, '--speed-max', 0.2),
-            'speed_m_per_s is 0.3, outside speed_min_m_per_s to speed_max_m_per_s, 0.1 to 0.2;',
-        ),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 'nan', 0), 'nan is not finite'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--outward', 0, 0, 0), 'give a direction'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--down', 'nan', 0, 0), 'nan is not finite'),

@@ -152,16 +152,6 @@ class PlanRequest(Limits, PassRequest):
     )
 
     @model_validator(mode='after')
-    def _speed_is_allowed(self) -> 'PlanRequest':
-        speed, least, most = self.speed_m_per_s, self.speed_min_m_per_s, self.speed_max_m_per_s
-        if speed is not None and not least <= speed <= most:
-            raise PlanError(
-                f'speed_m_per_s is {speed:g}, outside speed_min_m_per_s to speed_max_m_per_s, '
-                f'{least:g} to {most:g}; give a speed within them or change them'
-            )
-        return self
-
-    @model_validator(mode='after')
     def _has_a_side(self) -> 'PlanRequest':
         if self.outward is not None and not any(self.outward):
             raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
