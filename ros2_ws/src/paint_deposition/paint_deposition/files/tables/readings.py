@@ -66,8 +66,10 @@ class ReadingTable:
         units_too = 'unit' not in known_columns.columns_of(headings, layout)
         headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
         at = known_columns.columns_of(headings, layout)
-        if header is None and not (numbered and known(headings)):
-            raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')
+        if not known(headings) or (header is None and not numbered):
+            named = [] if header is None else headings
+            why = known_columns.not_found(sheet, named, films, layout)
+            raise ReadingsError(f'{path}: {why}')
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
         _refuse_rivals(table, at)
@@ -139,9 +141,9 @@ class ReadingTable:
         values = np.column_stack([self.numbers(quantity) for quantity in quantities])
         given = self.layout.unit.get('position')
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
-        units = {given} if given else {heading.unit_m for heading in headings}
+        units = {given} if given else {h.unit_m or h.unit or None for h in headings}
         if len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
-            found = ' and '.join(UNIT_NAMES[unit] if unit else 'no unit' for unit in units)
+            found = ' and '.join(UNIT_NAMES.get(u, repr(u)) if u else 'no unit' for u in units)
             raise self.table.error(
                 f'{", ".join(quantities)} are in {found}; give all in one of m, mm, cm, inch'
             )
