@@ -12,7 +12,7 @@ from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
-from paint_deposition.files.tables.readings import ReadingTable
+from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
@@ -70,6 +70,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
+        GUESSED in place_words,
     )  # fmt: skip
     require_repeats_close(readings)
     return readings

@@ -96,7 +96,10 @@ def _quantity(heading: Heading) -> str | None:
 
 
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
-    """Why a file has no such table, and what to do; no ``headings`` are those of the widest row."""
+    """Why a file has no such table, and what to do.
+
+    Without ``headings`` those of its widest row count.
+    """
     if not sheet.rows:
         return 'there is nothing to read in it; give a table with a heading over each column'
     headings = headings or headings_in(widest(sheet))
@@ -107,7 +110,11 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
         return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
     if films:
         bare = [replace(heading, unit='') for heading in headings]
-        foreign = [h for h, b in zip(headings, bare, strict=True) if _quantity(b) == 'thickness']
+        foreign = [
+            heading
+            for heading, plain in zip(headings, bare, strict=True)
+            if _quantity(heading) != 'thickness' == _quantity(plain)
+        ]
         likely = [h.text for h in bare if _quantity(replace(h, words=h.words[-1:])) == 'thickness']
         remedy = 'call it thickness_um, or give its heading or number'
         if foreign:

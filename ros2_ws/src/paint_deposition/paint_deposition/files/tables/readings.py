@@ -18,6 +18,7 @@ from paint_deposition.files.tables.table import Table, is_nothing, is_value
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
+GUESSED = 'no unit is given'
 STATISTIC = re.compile(
     r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
     r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
@@ -151,7 +152,7 @@ class ReadingTable:
         if unit is None:
             largest = float(np.nanmax(np.abs(values), initial=0.0))
             unit = 1e-3 if largest > LARGEST_PART_M else 1.0
-            how = f' (no unit is given; the largest is {largest:.4g})'
+            how = f' ({GUESSED}; the largest is {largest:.4g})'
         # A division by 1000 comes nearer to the text than a product with 0.001.
         metric = unit in (1.0, 1e-2, 1e-3)
         metres = values / round(1.0 / unit) if metric else values * unit
@@ -169,7 +170,7 @@ class ReadingTable:
         unit = unit or self.film_unit_m
         headings = ', '.join(f"'{self.table.headings[k].text}'" for k in films)
         source = '' if headings == "'thickness_um'" else f' from {headings}'
-        how = '' if unit else ' (no unit is given)'
+        how = '' if unit else f' ({GUESSED})'
         factor = round((unit or 1e-6) * 1e6, 9)
         words = f'thickness in {UNIT_NAMES[unit or 1e-6]}{how}{source}'
         return values[row, which] * factor, row, words
