@@ -142,9 +142,11 @@ class ReadingTable:
         values = np.column_stack([self.numbers(quantity) for quantity in quantities])
         given = self.layout.unit.get('position')
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
-        units = {given} if given else {h.unit_m or h.unit or None for h in headings}
-        if len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
-            found = ' and '.join(UNIT_NAMES.get(u, repr(u)) if u else 'no unit' for u in units)
+        units = {given} if given else {heading.unit_m for heading in headings}
+        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
+        if unknown or len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
+            named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
+            found = ' and '.join(named)
             raise self.table.error(
                 f'{", ".join(quantities)} are in {found}; give all in one of m, mm, cm, inch'
             )
