@@ -268,6 +268,8 @@ class Cell(RuleBasedStateMachine):
                 request.transition.label = label
                 name = f'{RECORDER}/change_state'
                 assert self.call(ChangeState, name, transition=request.transition).success
+                if label == 'deactivate':
+                    self.wait_until(lambda: not self.robot.has_subscribers(2))
             if self.is_whole:
                 self.check(run, of)
             self.wait_until(lambda: self.robot.has_subscribers(2))
@@ -280,7 +282,7 @@ class Cell(RuleBasedStateMachine):
         code = self.recorder.wait()
         assert code == (-9 if signal == 'kill' else 0), self.recorder.err
         assert 'Traceback' not in self.recorder.err
-        if signal == 'kill' and of.received:
+        if signal == 'kill':
             run = recover(run, run.with_name(f'{run.name}_recovered')).folder
         if self.is_whole:
             self.check(run, of)

@@ -2,6 +2,7 @@
 
 import json
 import shutil
+import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -305,21 +306,28 @@ def test_a_change_that_fails_leaves_pose_and_poses_to_the_part(simulator, robot,
 def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
     simulator, robot, painted, asked, record, wider, wait_until, tmp_path
 ):
-    """Two states are sent early, and half the poses before the part is announced."""
+    """Two states are sent early, and half the poses before the part is announced.
+
+    The robot's clock is ahead, and the part between has no poses.
+    """
+    ahead_ns = time.time_ns() + 60 * LATER_NS - WITHOUT_TRIGGER.stamps_ns[0]
+    moved = replace(WITHOUT_TRIGGER, stamps_ns=WITHOUT_TRIGGER.stamps_ns + ahead_ns)
     node = simulator(max_edge_length_m=0.015, part_parent_frame='cell')
     recorder = record(output_directory=str(tmp_path / 'films'), name='before')
     source = robot(node, recorder)
-    half = len(WITHOUT_TRIGGER) // 2
-    stamps = WITHOUT_TRIGGER.stamps_ns
+    half = len(moved) // 2
+    stamps = moved.stamps_ns
     for row, flow in ((0, 1.0), (half + 50, 0.0), (half + 90, 0.5)):
         source.send_state(stamps[row], flow)
-    source.send(WITHOUT_TRIGGER, slice(0, half))
+    source.send(moved, slice(0, half))
     film, points, surface = painted(node, half), node.points, node.surface
+    between = asked(serial='0')
+    wait_until(between.done, what='the part between')
     future = asked(serial='1', mesh_file=wider, part_pose=[0.0] * 6 + [1.0])
     wait_until(lambda: node.parts.waiting, what='the request')
-    source.send(WITHOUT_TRIGGER, slice(half, None), frame_id='cell')
+    source.send(moved, slice(half, None), frame_id='cell')
     wait_until(future.done, what='the change')
-    second = painted(node, len(WITHOUT_TRIGGER) - half)
+    second = painted(node, len(moved) - half)
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == half, what='the run')
     recorder.close()
     before = SimpleNamespace(points=points, surface=surface)

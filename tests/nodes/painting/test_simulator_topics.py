@@ -179,3 +179,13 @@ def test_two_guns_on_one_topic_are_reported(simulator, ros_context, spin, onlook
             gun.send_pose(stamp, position, MOTION.quaternions_xyzw[row])
     wait_until(lambda: viewer.reports(POSES, 'steps faster than a robot', b'\x01'))
     wait_until(lambda: node.inputs[0].jumps.count > 40)
+
+
+def test_poses_that_the_queue_cannot_hold_are_counted(simulator, robot, painted):
+    node = simulator(pose_queue_depth=10)
+    source, motion = robot(node), two_passes(poses=101)
+    source.send(motion, slice(0, 1))
+    painted(node, 1)
+    source.send(motion, slice(1, None))
+    painted(node, 11)
+    assert node.inputs[0].messages_lost == 90

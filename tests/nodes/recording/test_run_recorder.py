@@ -3,20 +3,22 @@
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import ThicknessStats
+from paint_msgs.msg import Part, ThicknessStats
 from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
 from files.recorded import START_NS, straight_pass
-from nodes.cell import parameters
+from nodes.cell import FACING_PANEL, Robot, parameters
 from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import header
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -131,3 +133,25 @@ def test_bad_input_is_reported_at_the_start(record):
     ):
         with pytest.raises(PaintError, match=says):
             record(**values)
+
+
+def test_of_two_states_with_one_stamp_the_newer_is_in_force(ros_context, record, spin, onlooker,
+                                                            wait_until, tmp_path):  # fmt: skip
+    """One is of the part before; the other is of this part, and taken after its first pose."""
+    recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
+    spin(robot)
+    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
+    wait_until(lambda: robot.has_subscribers(1), what='the recorder')
+    robot.send_state(START_NS, 1.0)
+    robot.send_pose(START_NS, *place)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
+    parts.publish(Part(run='1', header=header('part', START_NS)))
+    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
+    robot.send_state(START_NS, 0.5)
+    robot.send_pose(START_NS + 1, *place)
+    robot.send_pose(START_NS + 2, *place)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='the poses')
+    wait_until(lambda: recorder.run.counts.get('/atomizer/state') == 2, what='the state')
+    recorder.close()
+    motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
+    assert motion.trigger_flow[-1] == 0.5

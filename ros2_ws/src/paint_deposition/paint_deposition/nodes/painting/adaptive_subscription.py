@@ -5,7 +5,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from rclpy.callback_groups import CallbackGroup
-from rclpy.event_handler import SubscriptionEventCallbacks
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
@@ -42,7 +41,7 @@ class AdaptiveSubscription:
         depth: of the queue.
 
     Attributes:
-        lost: messages that the middleware reported as lost.
+        lost: messages missing after the first, by the publishers' sequence numbers.
     """
 
     def __init__(
@@ -59,6 +58,7 @@ class AdaptiveSubscription:
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._latched = latched
         self._group = PolledCallbackGroup()
+        self._numbers: dict[bytes, int] = {}
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED_MESSAGES)
         self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         # At once as the publishers that are known: they would report one that does not match.
@@ -95,11 +95,7 @@ class AdaptiveSubscription:
         return self._node.create_subscription(
             self._message, self._topic, self._on_message, self._profile,
             callback_group=self._group,
-            event_callbacks=SubscriptionEventCallbacks(message_lost=self._count_lost),
         )  # fmt: skip
-
-    def _count_lost(self, event: Any) -> None:
-        self.lost += event.total_count_change
 
     def _drain(self, subscription: Subscription) -> None:
         handle = subscription.handle
@@ -108,9 +104,14 @@ class AdaptiveSubscription:
                 self._on_message(*taken)
 
     def _on_message(self, message: Any, info: Mapping[str, Any]) -> None:
-        publisher = info.get('publisher_gid') or {'data': b''}
+        publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
+        # Some middleware does not number messages.
+        number = info.get('publication_sequence_number') or 0
+        before = self._numbers.get(publisher, number)
+        self.lost += max(number - before - 1, 0)
+        self._numbers[publisher] = max(number, before)
         # Publisher and time identify a message.
-        identity = info['source_timestamp'], bytes(publisher['data'])
+        identity = info['source_timestamp'], publisher
         if identity in self._taken:
             return
         if self._latched and identity[0]:

@@ -45,7 +45,9 @@ class InitialMessages:
             topic: deque(maxlen=REMEMBERED_MESSAGES) for gun in guns.items() for topic in gun
         }
         self._states_of = {topic: gun[1] for gun in guns.items() for topic in gun}
-        self._newest_pose_ns = dict.fromkeys(guns, 0)
+        # The last pose of each gun that was forgotten.
+        self._forgotten = {poses: Recorded(poses, b'', 0, 0) for poses in guns}
+        self._begin_ns = 0
         # Topics of states that this run does not have yet.
         self._due: set[str] = set()
         self._placed: list[Recorded] = []
@@ -87,8 +89,10 @@ class InitialMessages:
         """
         last_ns = stamp_ns(part.header)
         # Other guns may stamp by other clocks, and stamps start anew where a bag is replayed.
-        remembered = [pose for poses in self._guns for pose in self._motion[poses]]
-        cut_ns = max((p.sent_ns for p in remembered if p.stamp_ns == last_ns), default=last_ns)
+        known = [p for gun in self._guns for p in (self._forgotten[gun], *self._motion[gun])]
+        # Without the last pose, its stamp may be of a clock ahead; what followed is kept.
+        unknown_ns = min(last_ns, sent_ns)
+        cut_ns = max((p.sent_ns for p in known if p.stamp_ns == last_ns), default=unknown_ns)
         early = {poses: self._forget_motion(poses, cut_ns) for poses in self._guns}
         # A simulator says where a part stands after it has said that the part is there.
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
@@ -108,9 +112,9 @@ class InitialMessages:
         self._due = set(self._guns.values())
         lasting = [*self._lasting.values(), *self._transforms, *self._placed]
         early = [pose for poses in self._guns for pose in self._motion[poses]]
+        self._begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
         states = [state for pose in early for state in self._states_in_force(pose)]
-        begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
-        return [m._replace(log_time_ns=begin_ns) for m in lasting + states] + early
+        return [m._replace(log_time_ns=self._begin_ns) for m in lasting] + states + early
 
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)
@@ -125,14 +129,15 @@ class InitialMessages:
         states = self._motion[topic]
         if states and first.stamp_ns < states[0].stamp_ns:
             states.clear()
-        return [state._replace(log_time_ns=first.log_time_ns) for state in states]
+        # Not at the time of the first message: one received before it may be taken after it.
+        return [state._replace(log_time_ns=self._begin_ns) for state in states]
 
     def _forget_motion(self, poses: str, until_ns: float) -> int:
         """Forget poses sent until then, and superseded states; the number of later poses."""
         remembered = self._motion[poses]
         while remembered and remembered[0].sent_ns <= until_ns:
-            self._newest_pose_ns[poses] = remembered.popleft().stamp_ns
-        states, newest_ns = self._motion[self._guns[poses]], self._newest_pose_ns[poses]
+            self._forgotten[poses] = remembered.popleft()
+        states, newest_ns = self._motion[self._guns[poses]], self._forgotten[poses].stamp_ns
         passed = [row for row, state in enumerate(states) if state.stamp_ns <= newest_ns]
         for _ in range(passed[-1] if passed else 0):
             states.popleft()

@@ -48,6 +48,8 @@ POSES_PER_REPORT = 50
 POSE_QUEUE_DEPTH = 5000
 QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
+# The answer of a process that ends at once may be lost, and its client would wait for ever.
+ANSWER_S = 1.0
 
 
 class RunRecorder(ManagedNode):
@@ -229,7 +231,7 @@ class RunRecorder(ManagedNode):
     def _stop(self) -> tuple[bool, str]:
         if self.active:
             self.trigger_deactivate()
-        self.finish()
+        self.create_steady_timer(ANSWER_S, self.finish)
         if not self.runs:
             return True, 'nothing was recorded: the recorder was never activated'
         return self.run.complete, self.summary()
