@@ -56,6 +56,10 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
             r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
+        (
+            ['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'],
+            "x, y, z are in 'ell'; give all in one",
+        ),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
         (['x,y,z,base_um', '0,0,0,1'], r"'base_um'\); call it thickness_um, or give its heading"),

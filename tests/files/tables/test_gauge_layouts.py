@@ -201,10 +201,28 @@ IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
         ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
     ],
 )  # fmt: skip
-def test_a_missing_reading_keeps_its_number(file, text, measured):
-    readings = read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
+@pytest.mark.parametrize('names', ['{}', 'P00{}'])
+def test_a_missing_reading_keeps_its_number(file, text, measured, names):
+    listed = 'no,x_m,y_m,z_m\n' + ''.join(f'{names.format(k)},0.{k},0,0\n' for k in range(1, 7))
+    path, points = file('b.csv', text), file('points.csv', listed)
+    if names != '{}' and '2,21\n4' in text:
+        # A gauge's count with a gap is no order: it may have left out any point.
+        with pytest.raises(ReadingsError, match=r"called '1' to '5', and .* 'P001' to 'P006'"):
+            read_readings(path, points)
+        return
+    readings = read_readings(path, points)
     assert readings.positions_m[:, 0].tolist() == [k / 10 for k in measured]
-    assert readings.point.tolist() == [str(k) for k in measured]
+    assert readings.point.tolist() == [names.format(k) for k in measured]
+
+
+@pytest.mark.parametrize('heading', ['DFT [mil]', 'Thickness mil', 'Schichtdicke (mils)'])
+@pytest.mark.parametrize('mark', '.,')
+def test_a_lone_heading_keeps_its_unit(file, heading, mark):
+    text = f'{heading}\n0.8\n0.9\nn/a\n\n0.7\n1.1\n1.0\nStandard Deviation 0.1\n'
+    readings = read_readings(file('b.txt', text.replace('.', mark)), file('p.csv', IN_ORDER))
+    assert readings.thickness_um == pytest.approx(25.4 * np.array([0.8, 0.9, 0.7, 1.1, 1.0]))
+    assert 'one column, UTF-8' in readings.understood
+    assert 'in mil from' in readings.understood
 
 
 @pytest.mark.parametrize(
@@ -242,6 +260,7 @@ def test_points_that_are_not_listed_are_named_all_at_once(file):
     ('heading', 'um'),
     [
         ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
+        ('DFT (thou)', 25.4), ('DFT in micrometers', 1.0), ('Dicke [Mikrometer]', 1.0),
     ],
 )  # fmt: skip
 def test_headings_of_the_film_in_english_and_german(file, heading, um):
@@ -342,6 +361,7 @@ REFUSED_CELLS = {
         (PLACED.replace('\n', '\r'), 'utf-8'),
         (PLACED.replace(' [mm]', '').replace(' [µm]', '').replace('\n', '\n;mm;mm;mm;mil\n', 1)
          .replace('21,5', '0,84646').replace('22,1', '0,87008'), 'utf-8'),
+        (PLACED.replace(' [µm]', '').replace('\n', '\n-;mm;mm;mm;Mikrometer\n', 1), 'utf-8'),
     ],
 )  # fmt: skip
 def test_encodings_and_units_below_headings(file, text, encoding):
@@ -374,6 +394,13 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
         ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
         ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
+        ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
+        ('point,DFT (ell)\nP,1\n', {}, "thickness .*; 'DFT .ell.' is in 'ell': give it in µm"),
+        (
+            'Point;Primer thickness;Total thickness\nA;1;2\n',
+            {},
+            "it may be 'Primer thickness' or 'Total thickness': name one with columns: {thick",
+        ),
     ],
 )
 def test_tables_without_places_that_could_mislead_are_refused(file, text, columns, message):

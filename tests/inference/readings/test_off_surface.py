@@ -6,6 +6,7 @@ import pytest
 from booth import panel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 
@@ -39,6 +40,22 @@ def test_the_cause_is_named_with_both_boxes(positions_m, words):
 def test_a_small_cluster_of_readings_is_none_of_these():
     """Three repeats beside each other on a large part are readings, not a mistake."""
     assert len(placed(PLACES_M[0] + 0.001 * PLACES_M[:3])) == 3
+
+
+@pytest.mark.parametrize(
+    ('factor', 'guessed', 'words'),
+    [
+        (0.1, True, 'in cm, too: say unit: {position: cm}, or mm'),
+        (1 / 25.4, True, 'in cm and in inch, too: say unit: {position: inch}, or mm'),
+        (0.1, False, ''),
+        (1.0, True, ''),
+    ],
+)
+def test_a_guessed_unit_is_doubted_where_another_fits(factor, guessed, words):
+    readings = Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
+    doubt = unit_in_doubt(panel(), readings)
+    assert words in doubt
+    assert bool(doubt) == bool(words)
 
 
 def test_how_far_points_were_moved_is_measured_along_the_normal():

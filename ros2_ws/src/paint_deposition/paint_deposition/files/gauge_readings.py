@@ -12,7 +12,7 @@ from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
-from paint_deposition.files.tables.readings import ReadingTable
+from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
@@ -70,6 +70,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
+        GUESSED in place_words,
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -126,9 +127,15 @@ class MeasuringPoints:
         """
         wanted, by = self._wanted_by(readings)
         places = {label: row for row, label in enumerate(self.labels)}
+        known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
+        if any(wanted) and places.keys().isdisjoint(wanted):
+            raise readings.table.error(
+                f"the readings are called '{wanted[0]}' to '{wanted[-1]}', and there is no such "
+                f'point in {self.path.name} ({known}); name them alike, or leave the labels of '
+                'the readings out where they are in the order of the points'
+            )
         for row, label in enumerate(wanted):
             if label not in places:
-                known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
                 missing = f"no point '{label}' in {self.path.name} ({known})"
                 readings.table.complain(row, missing if label else NO_LABEL)
         rows = [places.get(label, 0) for label in wanted]
@@ -156,6 +163,8 @@ class MeasuringPoints:
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
         for wanted, count in orders:
             if count == len(self.labels):
+                if not {*wanted} <= {*self.labels}:
+                    wanted = [self.labels[int(number) - 1] for number in wanted]
                 return wanted, 'by the order of the readings'
         raise readings.table.error(
             f'{orders[0][1]} readings in order for the {len(self.labels)} points in '

@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 # Metres in a unit of length, and the same for times, angles and speeds, by the ways to write it.
 LENGTHS = {
-    'm': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'μm': 1e-6, 'micron': 1e-6, 'microns': 1e-6,
-    'mil': 25.4e-6, 'mils': 25.4e-6, 'inch': 25.4e-3, 'in': 25.4e-3, 'zoll': 25.4e-3,
+    'm': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'inch': 25.4e-3, 'in': 25.4e-3, 'zoll': 25.4e-3,
+    **dict.fromkeys(('um', 'μm', 'micron', 'microns', 'mikrometer', 'micrometer'), 1e-6),
+    **dict.fromkeys(('micrometers', 'micrometre', 'micrometres'), 1e-6),
+    **dict.fromkeys(('mil', 'mils', 'thou'), 25.4e-6),
 }  # fmt: skip
 TIMES = {'s': 1.0, 'sec': 1.0, 'ms': 1e-3, 'us': 1e-6, 'μs': 1e-6, 'ns': 1e-9}
 ANGLES = {'rad': 1.0, 'deg': 0.0174532925199432957, '°': 0.0174532925199432957}
@@ -58,9 +60,8 @@ def length_of(text: str) -> float | None:
 
 
 def unit_of(text: str) -> str:
-    """A known unit that stands alone, '' for another text."""
-    text = _small(text).strip(' .[]()')
-    return text if text in UNITS else ''
+    """What stands in a row of units, as a heading has its unit."""
+    return _small(text).strip(' .[]()-–—')
 
 
 def _small(text: str) -> str:

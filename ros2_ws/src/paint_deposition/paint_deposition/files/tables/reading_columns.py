@@ -5,7 +5,7 @@ the user names them, see ``Layout``.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from paint_deposition.errors import did_you_mean
@@ -95,19 +95,35 @@ def _quantity(heading: Heading) -> str | None:
     return QUANTITY.get(' '.join(words))
 
 
-def not_found(sheet: Sheet, films: bool, layout: Layout) -> str:
-    """Why a file has no such table, and what to do."""
+def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
+    """Why a file has no such table, and what to do.
+
+    Without ``headings`` those of its widest row count.
+    """
     if not sheet.rows:
         return 'there is nothing to read in it; give a table with a heading over each column'
-    headings = headings_in(widest(sheet))
+    headings = headings or headings_in(widest(sheet))
     texts = [heading.text for heading in headings]
     named = {q: name for q, name in layout.columns.items() if isinstance(name, str)}
     for quantity, name in ((q, name) for q, name in named.items() if name not in texts):
         remedy = did_you_mean(name, filter(None, texts), 'copy the heading')
         return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
     if films:
+        bare = [replace(heading, unit='') for heading in headings]
+        foreign = [
+            heading
+            for heading, plain in zip(headings, bare, strict=True)
+            if _quantity(heading) != 'thickness' == _quantity(plain)
+        ]
+        likely = [h.text for h in bare if _quantity(replace(h, words=h.words[-1:])) == 'thickness']
+        remedy = 'call it thickness_um, or give its heading or number'
+        if foreign:
+            remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
+            remedy += ', or say unit: {thickness: ...} and name it'
+        elif likely:
+            remedy = f'it may be {" or ".join(map(repr, likely))}: name one'
         return (
-            f'no column is known as the thickness {shown(headings)}; call it thickness_um, or '
-            'give its heading or number with columns: {thickness: ...} in the campaign'
+            f'no column is known as the thickness {shown(headings)}; {remedy} '
+            'with columns: {thickness: ...} in the campaign'
         )
     return f'no columns are known as x, y, z, or from_left, height {shown(headings)}; rename them'

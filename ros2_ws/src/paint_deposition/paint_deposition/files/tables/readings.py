@@ -18,6 +18,7 @@ from paint_deposition.files.tables.table import Table, is_nothing, is_value
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
+GUESSED = 'no unit is given'
 STATISTIC = re.compile(
     r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
     r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
@@ -66,8 +67,10 @@ class ReadingTable:
         units_too = 'unit' not in known_columns.columns_of(headings, layout)
         headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
         at = known_columns.columns_of(headings, layout)
-        if header is None and not (numbered and known(headings)):
-            raise ReadingsError(f'{path}: {known_columns.not_found(sheet, films, layout)}')
+        if not known(headings) or (header is None and not numbered):
+            named = [] if header is None else headings
+            why = known_columns.not_found(sheet, named, films, layout)
+            raise ReadingsError(f'{path}: {why}')
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         table = table.select(rows)
         _refuse_rivals(table, at)
@@ -140,8 +143,10 @@ class ReadingTable:
         given = self.layout.unit.get('position')
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
         units = {given} if given else {heading.unit_m for heading in headings}
-        if len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
-            found = ' and '.join(UNIT_NAMES[unit] if unit else 'no unit' for unit in units)
+        unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
+        if unknown or len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
+            named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
+            found = ' and '.join(named)
             raise self.table.error(
                 f'{", ".join(quantities)} are in {found}; give all in one of m, mm, cm, inch'
             )
@@ -149,7 +154,7 @@ class ReadingTable:
         if unit is None:
             largest = float(np.nanmax(np.abs(values), initial=0.0))
             unit = 1e-3 if largest > LARGEST_PART_M else 1.0
-            how = f' (no unit is given; the largest is {largest:.4g})'
+            how = f' ({GUESSED}; the largest is {largest:.4g})'
         # A division by 1000 comes nearer to the text than a product with 0.001.
         metric = unit in (1.0, 1e-2, 1e-3)
         metres = values / round(1.0 / unit) if metric else values * unit
@@ -167,7 +172,7 @@ class ReadingTable:
         unit = unit or self.film_unit_m
         headings = ', '.join(f"'{self.table.headings[k].text}'" for k in films)
         source = '' if headings == "'thickness_um'" else f' from {headings}'
-        how = '' if unit else ' (no unit is given)'
+        how = '' if unit else f' ({GUESSED})'
         factor = round((unit or 1e-6) * 1e6, 9)
         words = f'thickness in {UNIT_NAMES[unit or 1e-6]}{how}{source}'
         return values[row, which] * factor, row, words

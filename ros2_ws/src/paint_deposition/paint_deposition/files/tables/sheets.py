@@ -44,7 +44,7 @@ class Sheet:
 
 
 def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
-    """The sheets of a workbook, or a text once for each separator that is in it and by blanks.
+    """The sheets of a workbook, or a text once for each separator in it, by blanks and by lines.
 
     A file that is neither raises ``refusal``.
     """
@@ -96,8 +96,11 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
         except csv.Error as error:
             raise ValueError(f'CSV text (line {reader.line_num}: {error})') from None
         sheets.append(Sheet.of(rows, f'{name}, {encoding}'))
-    by_blanks = enumerate((list[Cell](line.split()) for line in text.splitlines()), 1)
-    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}')]
+    lines = text.splitlines()
+    by_blanks = enumerate((list[Cell](line.split()) for line in lines), 1)
+    by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
+    whole = Sheet.of(by_lines, f'one column, {encoding}')
+    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError, some
-from paint_deposition.files.tables.headings import Heading, unit_of
+from paint_deposition.files.tables.headings import UNITS, Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
 # A heading further down than this is none.
@@ -179,7 +179,8 @@ def find_table(
     for one in sheets:
         above = one.rows[:MOST_LINES_ABOVE]
         ranks = [(known(headings_in(row)), not is_comment(row)) for row in above]
-        if (best := max(ranks, default=(0, False)))[0]:
+        best = max(ranks, default=(0, False))
+        if best[0] and _is_split_alike(one.rows, ranks.index(best)):
             found.append((one, ranks.index(best)))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
@@ -192,6 +193,16 @@ def find_table(
     if columns and wide_enough:
         return wide_enough[0], None
     return max(sheets, key=lambda s: len(widest(s))), None
+
+
+def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
+    """Whether numbers below headings of several cells stand in several cells, too.
+
+    Else the headings are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
+    """
+    below = rows[header + 1 : header + 1 + MOST_LINES_ABOVE]
+    counts = [len(row) > 1 for row in below if re.search(r'\d', ''.join(map(text_of, row)))]
+    return len(rows[header]) == 1 or 2 * sum(counts) >= len(counts)
 
 
 def widest(sheet: Sheet) -> list[Cell]:
@@ -212,7 +223,7 @@ def rows_below(
     rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
     cells = sheet.rows[rows[0]] if rows and units_too else []
     units = [unit_of(text_of(cell)) for cell in cells]
-    if not any(units) or any(map(is_value, cells)):
+    if not UNITS.keys() & {*units} or any(map(is_value, cells)):
         return headings, rows
     pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
     return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs], rows[1:]

@@ -20,6 +20,9 @@ OTHER_UNITS = {
 NEAR_M = 0.02
 # Readings span at least this share of the part's longest side, or a spot of it was measured.
 LEAST_SPAN = 0.1
+# Units taken for mm, by the same factor, where readings span less than this share of the part.
+TAKEN_FOR_MM = {10.0: 'cm', 25.4: 'inch'}
+SMALL_SPAN = 0.25
 # Readings that span less than this share are metres taken for millimetres, if they fit so.
 SPOT = 0.01
 # Boxes whose sides agree this well are the same part at another place.
@@ -46,6 +49,28 @@ def refuse_off_surface(
     if clustered and _fits(surface, 1000.0 * places_m):
         hint = _hint(surface, places_m)
         raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
+
+
+def unit_in_doubt(surface: Surface, readings: Readings) -> str:
+    """A warning of positions in a guessed unit that fit the part in another; '' for none."""
+    places_m, part_m = readings.positions_m, np.ptp(surface.vertices_m, axis=0)
+    small = np.ptp(places_m, axis=0) < SMALL_SPAN * part_m
+    # The part may have no extent across its surface.
+    if not readings.unit_is_guessed or not np.all(small | (part_m < NEAR_M)):
+        return ''
+    units = [
+        unit
+        for factor, unit in TAKEN_FOR_MM.items()
+        if surface.locate(factor * places_m).distance_m.max() < MAX_DISTANCE_M
+    ]
+    if not units:
+        return ''
+    return (
+        f'the readings span {_box_words(places_m)} m and the part '
+        f'{_box_words(surface.vertices_m)} m; no unit of their positions is given, and they fit '
+        f'in {" and in ".join(units)}, too: say unit: {{position: {units[-1]}}}, or mm if it is '
+        'right'
+    )
 
 
 def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:

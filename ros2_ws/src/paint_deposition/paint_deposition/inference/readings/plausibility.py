@@ -9,6 +9,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 
 # The pattern has seven parameters, and a fit needs a few points more.
@@ -162,7 +163,7 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         model: its pattern and projection count, its effects do not.
 
     Returns:
-        Warnings of readings that say otherwise, see ``zeros_in_doubt``.
+        Warnings of readings that say otherwise, see ``zeros_in_doubt``, and their unit.
     """
     doubts = []
     plain = model.model_copy(update={'effects': ()})
@@ -174,8 +175,9 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
-            doubt = zeros_in_doubt(one.readings, painted.raw_um[one.means.owner])
-            doubts += [f'{one.name}: {doubt}'] * bool(doubt)
+            zeros = zeros_in_doubt(one.readings, painted.raw_um[one.means.owner])
+            unit = unit_in_doubt(one.surface, one.readings)
+            doubts += [f'{one.name}: {doubt}' for doubt in (unit, zeros) if doubt]
             continue
         cause = 'the gun never sprays'
         if np.any(one.path.flow > 0.0):

@@ -26,6 +26,7 @@ class Readings:
         session: (N,) labels of the gauge session; '' where none.
         understood: how their file was read, in one line for the user; '' for none.
         zero_is_film: whether the user says that a reading of 0 is one.
+        unit_is_guessed: whether nobody said what the unit of the positions is.
     """
 
     positions_m: np.ndarray
@@ -38,6 +39,7 @@ class Readings:
     session: np.ndarray = field(default_factory=lambda: np.array(''))
     understood: str = ''
     zero_is_film: bool = False
+    unit_is_guessed: bool = False
 
     def __post_init__(self) -> None:
         sessions = np.broadcast_to(self.session, len(self.thickness_um))
