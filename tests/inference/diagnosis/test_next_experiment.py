@@ -17,7 +17,7 @@ from paint_deposition.inference.diagnosis.next_experiment import (
 )
 from paint_deposition.inference.diagnosis.remainder import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_along
+from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_along
 from paint_deposition.inference.diagnosis.sprays import MENU, together
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.inference.fitting.forward import Forward
@@ -88,7 +88,7 @@ def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit)
     # Its amplitudes are not free: what they need of their prior is separation, too.
     assert predicted.precision == pytest.approx(1.0 / 9.0)
     basis = footprint_along(study.rays(fit.model), fit.model.patterns)
-    random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0])
+    random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0] * RADII)
     law = random.learned(1e-3 * predicted.amounts)
     film_um = [
         Forward(study.campaign, (law,)).predict_um(

@@ -10,6 +10,7 @@ from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.remainder import (
+    FINE_RADII,
     FOOTPRINTS,
     LENGTHS,
     SIDEWAYS,
@@ -17,7 +18,7 @@ from paint_deposition.inference.diagnosis.remainder import (
     Remainder,
     painted_alike,
 )
-from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_basis
+from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
 from paint_deposition.inference.diagnosis.sprays import MENU
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -130,9 +131,9 @@ def mean_flux(radius_m: np.ndarray, power: tuple[float, float] = (1.0, 1.0)) -> 
 
 @pytest.fixture(scope='module')
 def knots_m(alone) -> np.ndarray:
-    """(RADII,) radii at which the deviations of the footprint are given."""
-    basis = footprint_basis(alone[0], MODEL)
-    return np.linspace(0.0, basis.settings['reach_m'], RADII)
+    """(FINE_RADII,) radii at which the deviations of the footprint are given."""
+    basis = footprint_basis(alone[0], MODEL, FINE_RADII)
+    return np.linspace(0.0, basis.settings['reach_m'], FINE_RADII)
 
 
 def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_flux(
@@ -141,7 +142,7 @@ def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_f
     flux = mean_flux(knots_m)
     for size, of_peak in zip(FOOTPRINTS, alone[1].footprint.of_peak, strict=True):
         # The pattern hardly moves the second harmonics.
-        sd = np.sqrt(np.sum(of_peak.reshape(RADII, WAVES, -1)[:, 3:] ** 2, axis=2))
+        sd = np.sqrt(np.sum(of_peak.reshape(FINE_RADII, WAVES, -1)[:, 3:] ** 2, axis=2))
         expected = np.minimum(size, flux)[:, np.newaxis]
         assert sd == pytest.approx(np.repeat(expected, 2, axis=1), rel=0.05, abs=0.15 * size)
         assert sd[flux.argmax()] == pytest.approx(size, rel=0.05)
@@ -149,9 +150,9 @@ def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_f
 
 
 def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
-    tails = alone[1].footprint.of_peak[0].reshape(RADII, WAVES, -1)[:, :, :2]
+    tails = alone[1].footprint.of_peak[0].reshape(FINE_RADII, WAVES, -1)[:, :, :2]
     for of_peak in alone[1].footprint.of_peak:
-        assert np.array_equal(of_peak.reshape(RADII, WAVES, -1)[:, :, :2], tails)
+        assert np.array_equal(of_peak.reshape(FINE_RADII, WAVES, -1)[:, :, :2], tails)
     assert not tails[:, 1:].any()
     step = 1e-4
     for k, power in enumerate(((1.0 + step, 1.0), (1.0, 1.0 + step))):

@@ -19,6 +19,7 @@ from paint_deposition.inference.diagnosis.remainder import Footprints
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity, sensitivity
 from paint_deposition.inference.diagnosis.smooth_laws import (
     NEGLIGIBLE,
+    RADII,
     RandomLaw,
     curve_basis,
     map_bases,
@@ -152,7 +153,7 @@ def of_footprint(study: Study, fit: Fit, worth: float = WORTH_LEARNING) -> list[
     """
     if fit.model.effect(LearnedFootprint.id) is not None:
         return []
-    laws = Footprints.of(study, fit).laws
+    laws = Footprints.of(study, fit, RADII).laws
     return [replace(of_random(study, law.centred, 1.0 / len(laws)), worth=worth) for law in laws]
 
 

@@ -19,7 +19,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import HARMONICS, WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.smooth_laws import (
-    RADII,
     RandomLaw,
     beside_pattern,
     flux_around,
@@ -44,8 +43,8 @@ PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
 BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
-# footprint in steps of its radius.
-LENGTHS, FOOTPRINT_LENGTHS = (0.1, 0.2, 0.6), (1.0, 3.0)
+# footprint in shares of its radius, which has so many knots; a fan ends sharply.
+LENGTHS, FOOTPRINT_LENGTHS, FINE_RADII = (0.1, 0.2, 0.6), (0.1, 0.3), 20
 # The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
 TAILS = 0.5
 # The flux is off by this share of itself at the most, as a standard deviation.
@@ -84,7 +83,7 @@ class Footprints:
 
     columns: tuple[np.ndarray, ...]  # for each size (P, n), of the readings over the noise
     laws: tuple[RandomLaw, ...]  # for each, as shares of the flux at K knots
-    # (RADII,) distance of the knots, and the mean flux there over the peak's.
+    # (radii,) distance of the knots, and the mean flux there over the peak's.
     radius_m: np.ndarray
     flux: np.ndarray
 
@@ -100,17 +99,17 @@ class Footprints:
         return tuple(flux * law.at_knots for law in self.laws)
 
     @staticmethod
-    def of(study: Study, fit: Fit) -> 'Footprints':
+    def of(study: Study, fit: Fit, radii: int = FINE_RADII) -> 'Footprints':
         """What is left of them when the pattern has followed.
 
         The tails are kept as they are: the pattern follows them far from where it was fitted.
         """
-        basis = footprint_basis(study, fit.model)
+        basis = footprint_basis(study, fit.model, radii)
         reach_m = basis.settings['reach_m']
-        flux, tails = _flux_and_tails(fit.model.patterns, reach_m)
+        flux, tails = _flux_and_tails(fit.model.patterns, reach_m, radii)
         at_knots = np.repeat(flux, WAVES)[:, np.newaxis]
         fields = np.hstack([
-            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length).at_knots
+            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length * radii).at_knots
             for length in FOOTPRINT_LENGTHS
         ])  # fmt: skip
         pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
@@ -118,13 +117,13 @@ class Footprints:
         columns, laws = [], []
         for size in FOOTPRINTS:
             of_wave = np.where(HARMONICS % 2, min(size, SIDES), size)
-            off = np.tile(of_wave, RADII)[:, np.newaxis]
+            off = np.tile(of_wave, radii)[:, np.newaxis]
             free = np.minimum(off / at_knots, MOST_OF_FLUX) * fields
             beside, followed = beside_pattern(basis, free, study, fit)
             change = of_film @ free - pattern @ followed
             columns.append(np.hstack([of_film @ (TAILS * tails), change]))
             laws.append(RandomLaw(basis, np.hstack([TAILS * tails, beside])))
-        radius_m = np.linspace(0.0, reach_m, RADII)
+        radius_m = np.linspace(0.0, reach_m, radii)
         return Footprints(tuple(columns), tuple(laws), radius_m, flux)
 
 
@@ -223,17 +222,17 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
 
 
 def _flux_and_tails(
-    patterns: Sequence[PlanarPattern], reach_m: float
+    patterns: Sequence[PlanarPattern], reach_m: float, radii: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of a footprint (RADII,) mean flux over the peak's, and at its K knots (K, 2) its changes.
+    """Of a footprint (radii,) mean flux over the peak's, and at its K knots (K, 2) its changes.
 
     The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
     exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.
     """
-    radius = np.linspace(0.0, reach_m, RADII)
-    flux, tails = np.zeros(RADII), np.zeros((RADII, 2))
+    radius = np.linspace(0.0, reach_m, radii)
+    flux, tails = np.zeros(radii), np.zeros((radii, 2))
     for p in patterns:
-        flux += flux_around(p, reach_m).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
+        flux += flux_around(p, reach_m, radii).mean(axis=0) / p.peak_flux_um_per_s / len(patterns)
         ring, centre = (1.0 - p.K2) * p.g1(radius, 0.0), p.K2 * p.g2(radius, 0.0)
         u = np.stack([
             (radius - p.r_m) ** 2 / (2.0 * p.sigma1_m**2), radius**2 / (2.0 * p.sigma2_m**2)

@@ -18,7 +18,7 @@ from paint_deposition.inference.diagnosis.explanations import (
 from paint_deposition.inference.diagnosis.remainder import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, sensitivity
 from paint_deposition.inference.diagnosis.separation import Predicted
-from paint_deposition.inference.diagnosis.smooth_laws import footprint_along
+from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_along
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
@@ -130,7 +130,7 @@ class Rivals:
         """What an explanation predicts, its amounts being 0."""
         if rival.name == FOOTPRINT:
             basis = footprint_along(rays, self.fit.model.patterns)
-            random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0])
+            random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0] * RADII)
             return _shapeless(random.change_um / sigma_um[:, np.newaxis])
         values = (
             Covariate(same[0].name, np.concatenate([part.values for part in same]))

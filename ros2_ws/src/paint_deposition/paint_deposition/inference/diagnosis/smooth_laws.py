@@ -210,12 +210,14 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
     ]
 
 
-def footprint_basis(study: Study, model: DepositionModel) -> Basis:
+def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) -> Basis:
     """Deviations of the pattern from eq. (1) at the points of a study."""
-    return footprint_along(study.rays(model), model.patterns)
+    return footprint_along(study.rays(model), model.patterns, radii)
 
 
-def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) -> Basis:
+def footprint_along(
+    parts: Sequence[Rays], patterns: Sequence[PlanarPattern], radii: int = RADII
+) -> Basis:
     """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
 
     Each harmonic of the angle is a random function of the radius by itself, the same for all
@@ -223,23 +225,24 @@ def footprint_along(parts: Sequence[Rays], patterns: Sequence[PlanarPattern]) ->
 
     Args:
         parts: rays of each part. patterns: those that they come from.
+        radii: how many knots from the middle to the end of the pattern.
     """
     reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
     for rays in parts:
-        radius = np.hypot(rays.x_m, rays.y_m) / reach * (RADII - 1)
+        radius = np.hypot(rays.x_m, rays.y_m) / reach * (radii - 1)
         angle = waves(rays.x_m, rays.y_m)
-        films.append(np.stack([hat_sums(rays.share * wave, radius, RADII) for wave in angle]))
-    film_um = np.concatenate(films, axis=1)  # WAVES, P, RADII
-    radius, wave = np.indices((RADII, WAVES))
+        films.append(np.stack([hat_sums(rays.share * wave, radius, radii) for wave in angle]))
+    film_um = np.concatenate(films, axis=1)  # WAVES, P, radii
+    radius, wave = np.indices((radii, WAVES))
     places = np.column_stack([radius.ravel(), FAR * wave.ravel()]).astype(float)
     change = film_um.transpose(1, 2, 0).reshape(film_um.shape[1], -1)
     return Basis(LearnedFootprint, {'reach_m': float(reach)}, change, places, 1.0)
 
 
-def flux_around(pattern: PlanarPattern, reach_m: float) -> np.ndarray:
-    """(angles, RADII) flux of a pattern [um/s], from its middle to this distance."""
-    radius, angle = np.linspace(0.0, reach_m, RADII), ANGLES[:, np.newaxis]
+def flux_around(pattern: PlanarPattern, reach_m: float, radii: int) -> np.ndarray:
+    """(angles, radii) flux of a pattern [um/s], from its middle to this distance."""
+    radius, angle = np.linspace(0.0, reach_m, radii), ANGLES[:, np.newaxis]
     return pattern.flux_um_per_s(radius * np.cos(angle), radius * np.sin(angle))
 
 
@@ -257,12 +260,13 @@ def beside_pattern(
     Returns:
         (K, n) the deviations, and (k, n) by how much the pattern's entries follow each.
     """
+    radii, reach_m = len(basis.knots) // WAVES, basis.settings['reach_m']
     harmonics = waves(np.cos(ANGLES), np.sin(ANGLES)) / len(ANGLES)
     harmonics[1:] *= 2.0
 
     def log_flux(vector: np.ndarray) -> np.ndarray:
         patterns = fit.parameters.decode(vector).patterns
-        around = [np.log(flux_around(p, basis.settings['reach_m']) + NO_FLUX) for p in patterns]
+        around = [np.log(flux_around(p, reach_m, radii) + NO_FLUX) for p in patterns]
         return (harmonics @ np.mean(around, axis=0)).T.ravel()
 
     here, count = log_flux(fit.vector), len(fit.parameters.pattern)
