@@ -22,7 +22,7 @@ def file_name(effect: type[Effect]) -> str:
     return f'{effect.id}.py'
 
 
-def source_of(effect: type[Effect]) -> bytes:
+def source_of(effect: type[Effect]) -> str:
     """The class with the imports, functions and constants that it uses, as a file of its own.
 
     Raises:
@@ -30,13 +30,13 @@ def source_of(effect: type[Effect]) -> bytes:
     """
     remedy = f'put {effect.__name__} in a file of its own and load that with load_effect_file'
     try:
-        content = _source(effect).encode()
-        effect_of(Path(file_name(effect)), content)
+        text = _source(effect)
+        effect_of(Path(file_name(effect)), text.encode())
     except (OSError, TypeError, SyntaxError):
         raise ModelError(f'the source of effect {effect.id!r} is not known: {remedy}') from None
     except ModelError as error:
         raise ModelError(f'{error}; {remedy}') from None
-    return content
+    return text
 
 
 def _source(cls: type[Effect]) -> str:

@@ -109,7 +109,7 @@ def write_model(
         'history': list(history or ()),
     }
     for own in filter(needs_file, map(type, model.effects)):
-        write_text(path.with_name(file_name(own)), source_of(own).decode())
+        write_text(path.with_name(file_name(own)), source_of(own))
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 

@@ -89,10 +89,11 @@ def _effect(effect: Effect, folder: Path) -> CommentedMap:
         about = f'{effect.over} [{effect.unit}]'
         text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
         return text
-    source = 'file' if effect.file or needs_file(type(effect)) else 'id'
-    name = effect.id if source == 'id' else file_name(type(effect))
+    source, name = 'id', effect.id
     if effect.file:
-        name = _relative(effect.file, folder)
+        source, name = 'file', _relative(effect.file, folder)
+    elif needs_file(type(effect)):
+        source, name = 'file', file_name(type(effect))
     text = _fields(effect, **{source: name})
     text.yaml_add_eol_comment(effect.family, source, COMMENT_COLUMN)
     return text

@@ -64,7 +64,7 @@ def interruptions(path: SprayPath, max_pose_gap_s: float) -> Iterator[str]:
             'gaps, or see --max-pose-gap-s (max_pose_gap_s in a campaign)'
         )
     (back,) = np.nonzero(np.diff(path.stamp_ns) < 0)
-    for before, row in pairwise([0, *(back + 1), len(path)][1:]):
+    for before, row in pairwise([*(back + 1), len(path)]):
         again = path.select(slice(before, row))
         share = again.spraying_time_s / path.spraying_time_s
         first = path.select(slice(0, len(again)))

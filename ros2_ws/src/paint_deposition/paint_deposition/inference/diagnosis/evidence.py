@@ -76,7 +76,9 @@ class NullModel:
         return NullModel.of(np.hstack([directions, nuisance]), raw, remainder)
 
     def beside(self, more: np.ndarray) -> 'NullModel':
-        """The same where some more directions (P, n) may vary."""
+        """The same where some more directions (P, n), if any, may vary."""
+        if not more.size:
+            return self
         return NullModel.of(np.hstack([self.columns, more]), self.raw, self.remainder)
 
     def with_remainder(self, remainder: np.ndarray) -> 'NullModel':
