@@ -22,7 +22,7 @@ from paint_deposition.nodes import executables
 PACKAGE = 'paint_deposition'
 NODES = (
     'atomizer_source', 'bag_player', 'deposition_simulator', 'index_planner', 'model_comparison',
-    'run_recorder',
+    'run_recorder', 'web_view',
 )  # fmt: skip
 SOURCES = Path(__file__).resolve().parent.parent / 'ros2_ws' / 'src'
 
@@ -136,7 +136,7 @@ def launched(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_launch_file_describes_every_node():
-    nodes = wanted(bag='run', record='runs', measurements='readings.csv', urdf='arm.urdf')
+    nodes = wanted(bag='run', record='runs', measurements='readings.csv', urdf='arm.urdf', page='true')
     assert set(nodes) == set(NODES)
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))
@@ -150,7 +150,7 @@ def test_launch_file_describes_every_node():
         ({}, 1),
         ({'record': 'runs'}, 2),
         ({'measurements': "painter's.csv"}, 2),
-        ({'record': '1', 'measurements': 'readings.csv'}, 3),
+        ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
     ],
 )

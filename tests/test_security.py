@@ -15,6 +15,7 @@ from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.viewing.web_view import WebView
 from robot_arm import urdf
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
@@ -29,6 +30,7 @@ NODES = {
     'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
     'atomizer_source': (AtomizerSource, {}),
     'run_recorder': (RunRecorder, {'name': 'run'}),
+    'web_view': (WebView, {'port': 0}),
 }
 # Where tf2 is installed, and with use_sim_time.
 NOT_ALWAYS = {'/tf', '/tf_static', '/tf2_frames', '/clock'}

@@ -28,6 +28,7 @@ COMMANDS = {
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
     'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
+    'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
 }

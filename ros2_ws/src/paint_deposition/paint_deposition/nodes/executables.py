@@ -43,3 +43,4 @@ deposition_simulator = partial(_run, 'deposition_simulator', 'painting', 'Deposi
 index_planner = partial(_run, 'index_planner', 'planning', 'IndexPlanner')
 model_comparison = partial(_run, 'model_comparison', 'comparison', 'ModelComparison')
 run_recorder = partial(_run, 'run_recorder', 'recording', 'RunRecorder')
+web_view = partial(_run, 'web_view', 'viewing', 'WebView')

@@ -1,0 +1,150 @@
+"""A recorded run, painted again on the live page."""
+
+import time
+from collections.abc import Sequence
+from threading import Event
+
+import numpy as np
+
+from paint_deposition.api.simulation import look_at_guns, require_brushes
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.motion_files import GunMotion
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_statistics
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.part.surface import Surface
+from paint_deposition.report.live.scene import Scene
+
+# The film is shown so often, and a motion without pauses is painted in steps so long [s].
+PERIOD_S = 0.2
+STEP_S = 1.0
+
+
+class Replay:
+    """Paints a recorded motion into a scene, as the simulator does a live one.
+
+    Args:
+        surface: the part; it is turned round if the gun looks at its back.
+        motions: of each gun, in the frame of the part.
+        models: of each gun.
+        rate: speed relative to the recording; 0: as fast as it can be painted.
+        target_um, tolerance_um: the film wanted and what it may differ [um].
+
+    Attributes:
+        scene: what is shown.
+        warnings: what is odd about the motion.
+
+    Raises:
+        PaintError: as for ``simulate``.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        motions: Sequence[GunMotion],
+        models: Sequence[DepositionModel],
+        *,
+        rate: float = 1.0,
+        max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+        target_um: float = 0.0,
+        tolerance_um: float = 0.0,
+    ) -> None:
+        # Brushes between calibrated ones only for the look: live films make them as they come.
+        pairs = [
+            with_interpolated_brushes(m.trajectory, model)
+            for m, model in zip(motions, models, strict=True)
+        ]
+        for pair in pairs:
+            require_brushes(*pair)
+        trajectories, looked_with = zip(*pairs, strict=True)
+        seen = look_at_guns(surface, trajectories, looked_with, max_pose_gap_s=max_pose_gap_s)
+        self.warnings = tuple(
+            w for gun in seen for w in (*gun.trajectory.warnings, *gun.geometry.warnings)
+        )
+        self._surface, self._points = seen[0].surface, seen[0].surface.points()
+        self._motions, self._models, self._rate = motions, models, rate
+        self._gap_s, self._target = max_pose_gap_s, (target_um, tolerance_um)
+        # A stream that was restarted is painted in the order in which it was recorded.
+        self._times_ns = [np.maximum.accumulate(m.trajectory.stamps_ns) for m in motions]
+        self._start_ns = min(int(times[0]) for times in self._times_ns)
+        self._end_ns = max(int(times[-1]) for times in self._times_ns)
+        self._paused, self._again = Event(), Event()
+        self.scene = Scene()
+        self.scene.show_part(self._surface)
+
+    def command(self, name: str) -> None:
+        """Do what the page asks for: 'pause', or go on; or 'again' from the start."""
+        if name == 'again':
+            self._again.set()
+            self._paused.clear()
+        elif self._paused.is_set():
+            self._paused.clear()
+        else:
+            self._paused.set()
+
+    def run(self, stop: Event) -> None:
+        """Paint, again whenever that is asked for, until ``stop`` is set."""
+        while not stop.is_set():
+            self._again.clear()
+            self._paint(stop)
+            while not (stop.is_set() or self._again.is_set()):
+                stop.wait(PERIOD_S)
+
+    def _paint(self, stop: Event) -> None:
+        self.scene.begin_again()
+        films = LiveFilms(tuple(self._unpainted(model) for model in self._models))
+        self._show(films, 0.0)
+        shown_ns = now_ns = self._start_ns - 1
+        began_s = time.monotonic()
+        while now_ns < self._end_ns and not (stop.is_set() or self._again.is_set()):
+            if self._paused.is_set():
+                stop.wait(PERIOD_S)
+                began_s += PERIOD_S
+                continue
+            if self._rate:
+                stop.wait(PERIOD_S)
+                elapsed_s = (time.monotonic() - began_s) * self._rate
+            else:
+                elapsed_s = (now_ns - self._start_ns) * 1e-9 + STEP_S
+            now_ns = min(self._start_ns + round(elapsed_s * 1e9), self._end_ns)
+            for number, film in enumerate(films.guns):
+                self._feed(number, film, shown_ns, now_ns)
+            shown_ns = now_ns
+            self._show(films, (now_ns - self._start_ns) * 1e-9)
+
+    def _unpainted(self, model: DepositionModel) -> LiveFilm:
+        return LiveFilm(
+            self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
+        )
+
+    def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
+        """Pass on what a gun did in this time, its trigger first."""
+        motion = self._motions[number].trajectory
+        if after_ns < self._start_ns:  # changes from before the first pose are in force too
+            after_ns = -(2**62)
+        for row, (stamp_ns, flow, brush) in enumerate(motion.triggers):
+            if after_ns < stamp_ns <= until_ns:
+                film.add_trigger(TriggerChange(stamp_ns, flow, brush, motion.set_points_of(row)))
+        first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
+        batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
+        batch = batch.select(slice(int(first), int(end)))
+        film.add_poses(batch)
+        flow = 1.0 if film.flow is None else film.flow
+        for position, z_axis in zip(*batch.finite_axes(), strict=True):
+            self.scene.move_gun(self._motions[number].name, position, z_axis, flow)
+
+    def _show(self, films: LiveFilms, time_s: float) -> None:
+        film, (target_um, tolerance_um) = films.snapshot(), self._target
+        film_um = film.film_um
+        figures = film_statistics(
+            film_um, self._surface.vertex_areas_m2, film.emitted_cm3,
+            target_um=target_um, target_tolerance_um=tolerance_um,
+        )  # fmt: skip
+        scale = film_scale(film_um)
+        self.scene.show_scale(scale, DEFAULT_PAINTED_ABOVE_UM, target_um, tolerance_um)
+        self.scene.show_film(film_um)
+        self.scene.add_figures(time_s, figures)
