@@ -1,5 +1,6 @@
 """Node `web_view`: the film as it is painted, on a page for browsers."""
 
+import contextlib
 import time
 from functools import partial
 from pathlib import Path
