@@ -30,7 +30,7 @@ NODES = {
     'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
     'atomizer_source': (AtomizerSource, {}),
     'run_recorder': (RunRecorder, {'name': 'run'}),
-    'web_view': (WebView, {'port': 0}),
+    'web_view': (WebView, PANEL | {'port': 0}),
 }
 # Where tf2 is installed, and with use_sim_time.
 NOT_ALWAYS = {'/tf', '/tf_static', '/tf2_frames', '/clock'}

@@ -16,7 +16,7 @@ from paint_deposition.cli.main import run
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import GunMotion, read_recording
-from paint_deposition.report.live.scene import Scene, Seen
+from paint_deposition.report.live.scene import STEP_UM, Scene, Seen
 from paint_deposition.report.live.server import Page
 from paint_deposition.report.writers.write import write
 from small_campaign import small_campaign
@@ -97,7 +97,7 @@ def test_only_what_changed_travels_and_whoever_comes_late_gets_all(scene, door):
     assert early.look(scene).kinds == []
     late.look(scene)
     for onlooker in (early, late):
-        np.testing.assert_allclose(onlooker.film_um, film_um, rtol=2**-11)
+        np.testing.assert_allclose(onlooker.film_um, film_um, rtol=2**-11, atol=STEP_UM / 2)
         assert [row[4] for row in onlooker.rows['track']] == [0.0, 1.0, 0.0, 1.0]
     scene.begin_again()
     assert early.look(scene).rows['track'] == []
@@ -181,6 +181,7 @@ def test_results_show_each_part_with_each_model(tmp_path):
     ('words', 'reason'),
     [
         (['watch'], 'give RUN, or --live'),
+        (['watch', '--live'], 'give --mesh'),
         (['watch', 'nowhere'], 'give --mesh'),
         (['watch', 'nowhere', '--tolerance-um', '2'], 'no --target-um'),
     ],

@@ -8,6 +8,7 @@ from nodes.cell import parameters, two_passes, write_panel
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.nodes.runtime.node import WARN
 from paint_deposition.nodes.viewing.web_view import WebView
+from paint_deposition.report.live.scene import STEP_UM
 from paint_deposition.report.live.server import Page
 
 # Of a vertex the colour that is drawn, without gun and passes in front of it.
@@ -52,7 +53,9 @@ def test_browsers_see_the_film_of_the_simulator(
 
     def shows(tab, film_um) -> bool:
         shown = np.array(tab.evaluate('Array.from(page.view.film ?? [])'))
-        return len(shown) == len(film_um) and np.allclose(shown, film_um, rtol=2**-10)
+        return len(shown) == len(film_um) and np.allclose(
+            shown, film_um, rtol=2**-11, atol=STEP_UM / 2
+        )
 
     with Chromium(tmp_path / 'browser') as browser:
         early = browser.tab(viewer.page.url)

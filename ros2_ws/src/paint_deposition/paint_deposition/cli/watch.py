@@ -66,6 +66,8 @@ def watch_command(
         raise click.UsageError('give RUN, or --live for what a simulator paints now')
     if given['tolerance_um'] and not given['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
+    if live and not part['path']:
+        raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
     at = {'host': host, 'port': port, 'token': token}
     if live:
         _start_node({

@@ -69,8 +69,7 @@ WEB_VIEW = dict(
 class WebView(PaintNode):
     """Serves the live page with what the simulator publishes; it computes no film itself.
 
-    The part is read from its mesh, as the simulator does; without `mesh_file` it is the one that
-    the simulator names on `part`.
+    The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
     """
 
     PARAMETERS = WEB_VIEW
@@ -104,12 +103,12 @@ class WebView(PaintNode):
         self.scene = Scene()
         self._frame = PartFrame(self, self.values['frame_id'])
         self._flow: dict[str, float] = {}
-        self._start_ns: int | None = None
+        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
+        self._newest_ns, self._time_s = 0, 0.0
         self._rmse_um = float('nan')
-        self._mesh_file, self._mesh_ids, self._problem = '', set[str](), ''
+        self._problem = ''
         self._sent = 0, time.monotonic()
-        if self.values['mesh_file']:
-            self._show_part(self.values['mesh_file'])
+        self._show_part(self.values['mesh_file'])
         values = self.values
         self.page = Page([self.scene], values['host'], values['port'], values['token'])
         self.get_logger().info(f'the page is at {self.page.url}')
@@ -127,10 +126,11 @@ class WebView(PaintNode):
         # The simulator may find that the guns paint its other side.
         self._mesh_file, self._mesh_ids = mesh_file, {surface.mesh_id, turned(surface).mesh_id}
         self.scene.show_part(surface)
+        self.scene.tell('about', text=Path(mesh_file).name)
         self._show_scale(np.empty(0))
 
     def _take_part(self, part: Part) -> None:
-        self._start_ns = None
+        self._newest_ns, self._time_s = 0, 0.0
         if part.mesh_file == self._mesh_file:
             self.scene.begin_again()
         else:
@@ -139,12 +139,10 @@ class WebView(PaintNode):
             except PaintError as error:
                 self._say(str(error))
                 return
-        name = f'{part.serial} on ' if part.serial else ''
-        self.scene.tell('about', text=name + Path(part.mesh_file).name)
+        serial = f'{part.serial}, ' if part.serial else ''
+        self.scene.tell('about', text=serial + Path(part.mesh_file).name)
 
     def _take_field(self, field: ThicknessField) -> None:
-        if not self._mesh_ids:
-            return  # the part is still to be named
         if field.mesh_id not in self._mesh_ids:
             self._say(
                 f'the film that comes is not on {self._mesh_file} as it is read here; give '
@@ -164,18 +162,18 @@ class WebView(PaintNode):
 
     def _take_stats(self, stats: ThicknessStats) -> None:
         now_ns = stamp_ns(stats.header)
-        if now_ns:
-            self._start_ns = self._start_ns or now_ns
-            time_s = (now_ns - self._start_ns) * 1e-9
-            self.scene.add_figures(time_s, stats, self._rmse_um)
+        if now_ns:  # there was a pose
+            self._time_s += max(now_ns - (self._newest_ns or now_ns), 0) * 1e-9
+            self._newest_ns = now_ns
+            self.scene.add_figures(self._time_s, stats, self._rmse_um)
 
     def _take_comparison(self, stats: ComparisonStats) -> None:
         self._rmse_um = stats.rmse_um
 
     def _say(self, problem: str) -> None:
-        """Tell what keeps the film from being shown, once; '' is nothing."""
-        if problem and problem != self._problem:
-            self.get_logger().error(problem)
+        """Tell what keeps the film from being shown; '' is nothing."""
+        if problem:
+            self.get_logger().error(problem, once=True)
         self._problem = problem
         self.scene.tell('message', text=problem)
 

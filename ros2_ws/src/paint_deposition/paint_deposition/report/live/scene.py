@@ -16,6 +16,8 @@ FIGURES = (
     'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
+# Steps in which the film is shown, finer than a gauge's: less is no change that travels.
+STEP_UM = 1.0 / 32.0
 # A gun that has moved by so much leaves another point of its track [m].
 TRACK_STEP_M = 0.01
 # Rows of a series beyond which its older half is forgotten: hours of figures, 500 m of a track.
@@ -49,8 +51,8 @@ class Seen:
 class Scene:
     """A part with its film, guns, history and readings; any thread may change and send it.
 
-    A film travels as 16-bit floats, good to 0.05 %, and of these only those that a browser does
-    not have: a slow one gets fewer messages and ends with the same film.
+    A film travels as 16-bit floats, good to 0.016 µm or 0.05 %, and of these only those that a
+    browser does not have: a slow one gets fewer messages and ends with the same film.
     """
 
     def __init__(self, part: str = '', model: str = '') -> None:
@@ -103,7 +105,7 @@ class Scene:
     def show_film(self, film_um: np.ndarray) -> None:
         """Show a film (V,) at the vertices of the part [um]."""
         with self._lock:
-            self._film = film_um.astype(np.float16).view(np.uint16)
+            self._film = (np.rint(film_um / STEP_UM) * STEP_UM).astype(np.float16).view(np.uint16)
 
     def add_figures(self, time_s: float, figures: Any, rmse_um: float = np.nan) -> None:
         """Add to the history: the attributes ``FIGURES`` of statistics, and the residual's RMS."""

@@ -39,20 +39,22 @@ export function filmChart(element, rms) {
       ...(rms ? [{ label: 'RMS of readings', stroke: COLOURS.other, width: 2, value: number(2, 'µm') }] : []),
     ],
   });
-  return Object.assign(chart, { rms });
+  return Object.assign(chart, { extra: rms });
 }
 
-export function sharesChart(element) {
+// Shares of the area: painted and, of that, within the target where there is one.
+export function sharesChart(element, within) {
   const percent = number(1, '%');
-  return new Chart(element, {
+  const chart = new Chart(element, {
     scales: { x: { time: false }, y: { range: [0, 100] } },
     axes: [time, axis('area [%]')],
     series: [
       { label: 'time', value: number(1, 's') },
       { label: 'painted', stroke: COLOURS.mean, width: 2, value: percent },
-      { label: 'of it within target', stroke: COLOURS.target, width: 2, value: percent },
+      ...(within ? [{ label: 'of it within target', stroke: COLOURS.target, width: 2, value: percent }] : []),
     ],
   });
+  return Object.assign(chart, { extra: within });
 }
 
 export function parityChart(element) {

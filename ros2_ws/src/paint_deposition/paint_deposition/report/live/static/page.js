@@ -193,7 +193,8 @@ function showHistory() {
   ];
   if (scale?.target) {
     const band = scale.tolerance ? `${scale.target} ± ${scale.tolerance}` : `${scale.target}`;
-    figures.unshift(['target', `${band}<small> µm</small>`], ['within target', text(100 * within, 1, '%')]);
+    if (Number.isFinite(within)) figures.unshift(['within target', text(100 * within, 1, '%')]);
+    figures.unshift(['target', `${band}<small> µm</small>`]);
   }
   if (Number.isFinite(capture)) figures.push(['share caught', text(100 * capture, 1, '%')]);
   if (Number.isFinite(rmse)) figures.push(['RMS of readings', text(rmse, 2, 'µm')]);
@@ -201,16 +202,17 @@ function showHistory() {
   find('history').hidden = history.length < 2;
   if (history.length < 2) return;
   charts.film ??= filmChart(find('film'), Number.isFinite(rmse));
-  charts.shares ??= sharesChart(find('shares'));
+  charts.shares ??= sharesChart(find('shares'), Number.isFinite(within));
   const column = (name, of = (value) => value) => history.map((row) => {
     const value = of(row[COLUMNS.indexOf(name)], row);
     return Number.isFinite(value) ? value : null;
   });
   charts.film.show(
     column('time'), column('mean'), column('sd', (sd, row) => row[1] + sd), column('sd', (sd, row) => row[1] - sd),
-    history.map(() => scale?.target || null), ...(charts.film.rms ? [column('rmse')] : []),
+    history.map(() => scale?.target || null), ...(charts.film.extra ? [column('rmse')] : []),
   );
-  charts.shares.show(column('time'), column('coverage', (value) => 100 * value), column('within', (value) => 100 * value));
+  const percent = (name) => column(name, (value) => 100 * value);
+  charts.shares.show(column('time'), percent('coverage'), ...(charts.shares.extra ? [percent('within')] : []));
 }
 
 function showReadings() {

@@ -10,6 +10,7 @@ import {
 const TABLE = 256; // colours of a palette, before those for under, over and bare
 const CONE_M = 0.25; // from the TCP to the model plane
 const NEAR_READING_M = 0.012;
+const JUMP_M = 0.2; // a gun that is so much further on was not seen on its way
 const SPRAYED = new Color('#17212b');
 const MOVED = new Color('#a9b4be');
 
@@ -179,7 +180,7 @@ export class PartView {
       const [gun, x, y, z, spraying] = rows.subarray(row, row + 5);
       const before = this.lastOf.get(gun);
       this.lastOf.set(gun, [x, y, z, spraying]);
-      if (!before) continue;
+      if (!before || Math.hypot(x - before[0], y - before[1], z - before[2]) > JUMP_M) continue;
       const at = 6 * this.segments++;
       if (at + 6 > position.array.length) {
         const doubled = [position, color].map(({ array }) => {
