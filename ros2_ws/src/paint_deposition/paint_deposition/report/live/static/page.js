@@ -14,6 +14,7 @@ globalThis.page = { view, state };
 
 const text = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits)}<small> ${unit}</small>` : '–');
 const element = (tag, content, className = '') => Object.assign(document.createElement(tag), { innerHTML: content, className });
+const signed = (value, digits) => `${value < 0 ? '−' : value > 0 ? '+' : ''}${Math.abs(value).toFixed(digits)}`;
 const escaped = (words) => new Option(words).innerHTML;
 const press = (button, on) => button.setAttribute('aria-pressed', on);
 
@@ -140,15 +141,16 @@ function showColours() {
   }
   ramp.putImageData(pixels, 0, 0);
   find('unit').textContent = against ? 'film − target [µm]' : 'film [µm]';
-  const step = roundStep((high - low) / 5);
-  const digits = Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
+  // Against a target the steps are its tolerance.
+  const step = against ? span / 2 : roundStep((high - low) / 5);
+  const digits = Number.isInteger(step) ? 0 : Math.max(1, -Math.floor(Math.log10(step) + 1e-9));
   const ticks = [];
   for (let k = Math.ceil(low / step - 1e-6); k * step <= high * (1 + 1e-6); k++) ticks.push([k * step, '']);
   const goal = against ? 0 : scale.target;
   if (goal && goal < high) ticks.push([goal, ' target']);
   const near = (value) => goal && !against && Math.abs(value - goal) < 0.06 * (high - low);
   find('ticks').replaceChildren(...ticks.filter(([value, words]) => words || !near(value)).map(([value, words]) => {
-    const tick = element('li', `– ${value.toFixed(digits)}${words}`, words && 'goal');
+    const tick = element('li', `– ${against ? signed(value, digits) : value.toFixed(digits)}${words}`, words && 'goal');
     tick.style.bottom = `${(100 * (value - low)) / (high - low)}%`;
     return tick;
   }));
@@ -166,8 +168,8 @@ function showKeys() {
   const last = state.history.at(-1);
   const colour = (palette, row) => `rgb(${scale.palettes.subarray(4 * (palette * 259 + row), 4 * (palette * 259 + row) + 3)})`;
   const keys = [['bare metal, below ' + scale.bare + ' µm', colour(0, 258)]];
-  if (against || scale.low > scale.bare) keys.push(['thinner', colour(+against, 256)]);
-  if (against || (last && last[4] > scale.high)) keys.push(['thicker', colour(+against, 257)]);
+  if (against || scale.low > scale.bare) keys.push(['thinner still', colour(+against, 256)]);
+  if (against || (last && last[4] > scale.high)) keys.push(['thicker still', colour(+against, 257)]);
   if (readings) {
     const span = readings.span.toFixed(1);
     keys.push([`reading ${span} µm thinner than predicted`, colour(1, 0)], [`${span} µm thicker`, colour(1, 255)]);
@@ -243,11 +245,11 @@ function showProbe() {
   const { film, reading } = view.probe(place);
   const { scale, readings } = state;
   const lines = [`<b>${film.toFixed(1)} µm</b>`];
-  if (scale?.target) lines.push(`${(film - scale.target).toFixed(1)} µm from the target<br>`);
+  if (scale?.target) lines.push(`${signed(film - scale.target, 1)} µm from the target<br>`);
   if (reading !== null) {
     const [measured, predicted] = [readings.measured[reading], readings.predicted[reading]];
     lines.push(`reading ${escaped(readings.names[reading])}: measured ${measured.toFixed(1)}, predicted ${predicted.toFixed(1)}<br>`
-      + `residual ${(measured - predicted).toFixed(1)} µm<br>`);
+      + `residual ${signed(measured - predicted, 1)} µm<br>`);
   }
   lines.push(`x ${place.point.x.toFixed(3)}, y ${place.point.y.toFixed(3)}, z ${place.point.z.toFixed(3)} m`);
   const probe = find('probe');
