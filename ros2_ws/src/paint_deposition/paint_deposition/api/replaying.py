@@ -16,6 +16,7 @@ from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_statistics
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.live.scene import Scene
 
@@ -72,6 +73,7 @@ class Replay:
         self._times_ns = [np.maximum.accumulate(m.trajectory.stamps_ns) for m in motions]
         self._start_ns = min(int(times[0]) for times in self._times_ns)
         self._end_ns = max(int(times[-1]) for times in self._times_ns)
+        self._flows = [_flow_at_poses(motion.trajectory) for motion in motions]
         self._paused, self._again = Event(), Event()
         self.scene = Scene()
         self.scene.show_part(self._surface)
@@ -80,11 +82,11 @@ class Replay:
         """Do what the page asks for: 'pause', or go on; or 'again' from the start."""
         if name == 'again':
             self._again.set()
-            self._paused.clear()
-        elif self._paused.is_set():
+        if name == 'again' or self._paused.is_set():
             self._paused.clear()
         else:
             self._paused.set()
+        self.scene.tell('replay', paused=self._paused.is_set())
 
     def run(self, stop: Event) -> None:
         """Paint, again whenever that is asked for, until ``stop`` is set."""
@@ -96,7 +98,7 @@ class Replay:
 
     def _paint(self, stop: Event) -> None:
         self.scene.begin_again()
-        films = LiveFilms(tuple(self._unpainted(model) for model in self._models))
+        films = LiveFilms(tuple(map(self._unpainted, self._motions, self._models)))
         self._show(films, 0.0)
         shown_ns = now_ns = self._start_ns - 1
         began_s = time.monotonic()
@@ -116,26 +118,26 @@ class Replay:
             shown_ns = now_ns
             self._show(films, (now_ns - self._start_ns) * 1e-9)
 
-    def _unpainted(self, model: DepositionModel) -> LiveFilm:
-        return LiveFilm(
+    def _unpainted(self, motion: GunMotion, model: DepositionModel) -> LiveFilm:
+        """A film that knows when the gun will be switched, as it is offline."""
+        film = LiveFilm(
             self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
         )
+        recorded = motion.trajectory
+        for row, (stamp_ns, flow, brush) in enumerate(recorded.triggers):
+            film.add_trigger(TriggerChange(stamp_ns, flow, brush, recorded.set_points_of(row)))
+        return film
 
     def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
-        """Pass on what a gun did in this time, its trigger first."""
-        motion = self._motions[number].trajectory
-        if after_ns < self._start_ns:  # changes from before the first pose are in force too
-            after_ns = -(2**62)
-        for row, (stamp_ns, flow, brush) in enumerate(motion.triggers):
-            if after_ns < stamp_ns <= until_ns:
-                film.add_trigger(TriggerChange(stamp_ns, flow, brush, motion.set_points_of(row)))
+        """Pass on the poses of a gun in this time."""
+        motion, flow = self._motions[number].trajectory, self._flows[number]
         first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
+        rows = slice(int(first), int(end))
         batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
-        batch = batch.select(slice(int(first), int(end)))
-        film.add_poses(batch)
-        flow = 1.0 if film.flow is None else film.flow
-        for position, z_axis in zip(*batch.finite_axes(), strict=True):
-            self.scene.move_gun(self._motions[number].name, position, z_axis, flow)
+        film.add_poses(batch.select(rows))
+        for row in range(*rows.indices(len(motion))):
+            for position, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
+                self.scene.move_gun(self._motions[number].name, position, z_axis, flow[row])
 
     def _show(self, films: LiveFilms, time_s: float) -> None:
         film, (target_um, tolerance_um) = films.snapshot(), self._target
@@ -148,3 +150,11 @@ class Replay:
         self.scene.show_scale(scale, DEFAULT_PAINTED_ABOVE_UM, target_um, tolerance_um)
         self.scene.show_film(film_um)
         self.scene.add_figures(time_s, figures)
+
+
+def _flow_at_poses(motion: Trajectory) -> np.ndarray:
+    """(N,) relative flow at each pose; 1 without a trigger."""
+    if not len(motion.trigger_flow):
+        return np.ones(len(motion))
+    passed = np.searchsorted(motion.trigger_stamps_ns, motion.stamps_ns, side='right')
+    return np.concatenate([[0.0], motion.trigger_flow])[passed]

@@ -64,6 +64,7 @@ const receive = {
     find('about').textContent = words;
     document.title = `${words} – film`;
   },
+  replay({ paused }) { find('replay').firstElementChild.textContent = paused ? 'go on' : 'pause'; },
   message({ text: words }) {
     find('message').textContent = words;
     find('message').hidden = !words;
@@ -114,10 +115,7 @@ find('colours').onclick = ({ target }) => {
 };
 find('replay').onclick = ({ target }) => {
   const { command } = target.dataset;
-  if (!command) return;
-  send({ command });
-  const pause = find('replay').firstElementChild;
-  pause.textContent = command === 'pause' && pause.textContent === 'pause' ? 'go on' : 'pause';
+  if (command) send({ command });
 };
 find('front').onclick = () => view.lookAtFront();
 find('track').onclick = ({ target }) => {
