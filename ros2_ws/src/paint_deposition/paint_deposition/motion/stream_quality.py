@@ -62,14 +62,21 @@ class StreamQuality:
             1e9 / float(np.median(forward_ns)) if len(forward_ns) else 0.0, lag, lag_range,
         )  # fmt: skip
 
-    def faults(self, name: str) -> Iterator[str]:
+    def faults(self, name: str) -> list[str]:
         """What makes the stream of this name blur or distort a film, with the remedy."""
+        return [*self.repeats(name), *self.slowness(name)]
+
+    def repeats(self, name: str) -> Iterator[str]:
+        """The fault of a driver that sends samples again, if it is one."""
         if self.repeated_samples > MANY_REPEATED * self.poses:
             yield (
                 f'{name}: {self.repeated_samples} of {self.poses} samples repeat the one before '
                 'them under a new stamp, as of a driver that asks more often than the robot '
                 f'answers; they are dropped, and {self.new_rate_hz:.3g} a second are left'
             )
+
+    def slowness(self, name: str) -> Iterator[str]:
+        """The fault of too few samples, if it is one."""
         if 0.0 < self.new_rate_hz < LEAST_HZ * (1.0 - 1e-3):
             yield (
                 f'{name}: only {self.new_rate_hz:.3g} samples a second: between them the gun '

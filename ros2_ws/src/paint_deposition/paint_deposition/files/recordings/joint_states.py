@@ -208,8 +208,7 @@ class _Columns:
         """Stamps (N,), log times (N,) and values (N, K), and what is wrong with them."""
         stamps, logged = np.array(self.stamps_ns, np.int64), np.array(self.log_times_ns, np.int64)
         values = np.array(self.values, dtype=float)
-        quality = StreamQuality.of(stamps, values)
-        faults = list(quality.faults(self.topic)) if quality.repeated_samples else []
+        faults = list(StreamQuality.of(stamps, values).repeats(self.topic))
         new = RepeatedSamples().are_new(stamps, values)
         new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
         return stamps[new], logged[new], values[new], faults

@@ -41,7 +41,8 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
     if not name:
         candidates = bag.topics_of(POSE_TYPE) or pose_topics(bag)
         if len(candidates) != 1:
-            listed = listed_topics(candidates, 'PoseStamped')
+            others = bool(candidates) and candidates[0].type != POSE_TYPE
+            listed = listed_topics(candidates, 'pose' if others else 'PoseStamped')
             raise RecordingError(f'{bag.path}: name a pose topic; {listed}{_other_motion(bag)}')
         name = candidates[0].name
     topic = bag.choose(_element(name)[0], tuple(POSES), 'pose')
@@ -74,7 +75,7 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
     topic = choose_pose_topic(bag, name)
     number = _element(name or '')[1]
     stamps, log_times, rows = [], [], []
-    frames: Counter[str] = Counter()
+    frames: Counter[tuple[str, str]] = Counter()
     for _, log_time_ns, message in bag.decoded([topic.name]):
         pose = POSES[topic.type](message)
         if topic.type == ARRAY_TYPE:
@@ -84,14 +85,15 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
         log_times.append(log_time_ns)
         rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
         body = message.child_frame_id if topic.type == PART_POSE_TYPE else ''
-        frames[' to '.join(filter(None, (message.header.frame_id.lstrip('/'), body)))] += 1
+        frames[message.header.frame_id.lstrip('/'), body] += 1
     if len(rows) != topic.message_count:
         raise RecordingError(
             f'{bag.path} lists {topic.message_count} messages on {topic.name} and holds '
             f'{len(rows)}; run: paint recover {bag.path}'
         )
     if len(frames) > 1:
-        found = ', '.join(f"'{frame}' ({count})" for frame, count in sorted(frames.items()))
+        named = ((' to '.join(filter(None, its)), count) for its, count in sorted(frames.items()))
+        found = ', '.join(f"'{frame}' ({count})" for frame, count in named)
         raise RecordingError(f'{topic.name} in {bag.path} mixes frames {found}; record one frame')
     if len(stamps) > 1 and len(set(stamps)) == 1:
         raise RecordingError(
@@ -100,7 +102,7 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
         )
     values = np.array(rows, dtype=float)
     positions, quaternions = map(np.ascontiguousarray, np.split(values, [3], axis=1))
-    frame_id = next(iter(frames), '').partition(' to ')[0]
+    ((frame_id, _),) = frames
     trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, frame_id)
     return trajectory, np.array(log_times, np.int64), topic.name
 
