@@ -32,11 +32,12 @@ SOURCE = fixed_while_running(
     ),
     external_joints=NodeParameter(
         [], "Names of the external axes, in the controller's order; empty: left out [names]",
-        constraints='names, or none', allows=lambda value: True, element=str,
+        element=str,
     ),
     external_scales=NodeParameter(
         [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
-        constraints='one for each external axis', allows=lambda value: all(v > 0 for v in value),
+        constraints='above 0, one for each external axis',
+        allows=lambda value: all(scale > 0.0 for scale in value or ()),
         element=float,
     ),
     lag_s=NodeParameter(

@@ -193,10 +193,11 @@ class SignalSource(PaintNode):
         }
         lag = f'{1e3 * np.median(self._lags_s):.1f}' if self._lags_s else 'no time is sent'
         delay_s, starts = self._starts.delay_s()
+        late = f'{1e3 * delay_s:.1f}, of {starts} starts' if starts else 'no start from rest yet'
         values = received | {
             'from the time of the server to arrival [ms]': lag,
             'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
-            'opening after the start of motion [ms]': f'{1e3 * delay_s:.1f}, of {starts} starts',
+            'opening after the start of motion [ms]': late,
         }
         if self._problem:
             return Status(ERROR, self._problem, values)
