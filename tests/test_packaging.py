@@ -136,7 +136,8 @@ def launched(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_launch_file_describes_every_node():
-    nodes = wanted(bag='run', record='runs', measurements='readings.csv', urdf='arm.urdf', page='true')
+    given = {'bag': 'run', 'record': 'runs', 'measurements': 'readings.csv', 'urdf': 'arm.urdf'}
+    nodes = wanted(**given, page='true')
     assert set(nodes) == set(NODES)
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))

@@ -110,8 +110,7 @@ def test_a_run_is_painted_as_simulate_paints_it(door):
     replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], **wanted)
     shown = []
     replay.scene.show_film = shown.append
-    stop = Event()
-    replay._paint(stop)
+    replay.paint(Event())
     np.testing.assert_array_equal(shown[-1], film.film_um)
     assert not shown[0].any()
     history = Onlooker().look(replay.scene).rows['history']

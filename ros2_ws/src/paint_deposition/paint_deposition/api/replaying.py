@@ -92,11 +92,12 @@ class Replay:
         """Paint, again whenever that is asked for, until ``stop`` is set."""
         while not stop.is_set():
             self._again.clear()
-            self._paint(stop)
+            self.paint(stop)
             while not (stop.is_set() or self._again.is_set()):
                 stop.wait(PERIOD_S)
 
-    def _paint(self, stop: Event) -> None:
+    def paint(self, stop: Event) -> None:
+        """Paint once, until the end or until that is no longer wanted."""
         self.scene.begin_again()
         films = LiveFilms(tuple(map(self._unpainted, self._motions, self._models)))
         self._show(films, 0.0)
