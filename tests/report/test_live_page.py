@@ -130,7 +130,7 @@ def test_a_page_with_a_token_is_for_those_who_have_it(serve):
     page = serve(token='secret')
     bare = page.url.split('?')[0]
     assert page.url == f'{bare}?token=secret'
-    assert status(page.url) == status(bare, Cookie='token=secret') == 200
+    assert status(page.url) == status(bare, Cookie=f'{page.cookie}=secret') == 200
     for path in ('', 'part.js', 'scene', '?token=wrong', 'scene?token=secre'):
         assert status(bare + path) == 403
     # Only the upgrade is missing.
@@ -181,7 +181,8 @@ def test_results_show_each_part_with_each_model(tmp_path):
     [
         (['watch'], 'give RUN, or --live'),
         (['watch', '--live'], 'give --mesh'),
-        (['watch', 'nowhere'], 'give --mesh'),
+        (['watch', 'nowhere'], 'is not there; give a recorded run'),
+        (['watch', '.', '--port', '0'], 'does not name the mesh'),
         (['watch', 'nowhere', '--tolerance-um', '2'], 'no --target-um'),
     ],
 )

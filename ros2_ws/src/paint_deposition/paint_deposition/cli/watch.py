@@ -104,6 +104,8 @@ def _replay(
     from paint_deposition.files.refusals import checked
 
     show('reading')
+    if not run.exists():
+        raise click.UsageError(f'{run} is not there; give a recorded run or a folder of results')
     recorded = custom_data(run)
     if recorded and not motion['state_topic']:
         with open_bag(run) as bag:

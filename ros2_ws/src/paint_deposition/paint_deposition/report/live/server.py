@@ -37,7 +37,7 @@ class Page:
         command: called, in that thread, with 'pause' or 'again' of a page that can be replayed.
 
     Attributes:
-        url: with the token, for a browser.
+        url: with the token, for a browser; cookie: in which it keeps the token.
         browsers: that are connected. bytes_sent: to all of them so far.
 
     Raises:
@@ -65,7 +65,10 @@ class Page:
             ) from None
         shown = host if host not in ('', '0.0.0.0', '::') else socket.gethostname()
         at = f'[{shown}]' if ':' in shown else shown
-        self.url = f'http://{at}:{sockets[0].getsockname()[1]}/'
+        at_port = sockets[0].getsockname()[1]
+        # Pages on other ports of a machine share its cookies.
+        self.cookie = f'token_{at_port}'
+        self.url = f'http://{at}:{at_port}/'
         self.url += f'?token={token}' if token else ''
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
@@ -106,11 +109,11 @@ class _Guarded(RequestHandler):
     def prepare(self) -> None:
         self.page = self.settings['page']
         token, named = self.page.token, self.get_argument('token', '')
-        given = named or self.get_cookie('token') or ''
+        given = named or self.get_cookie(self.page.cookie) or ''
         if token and not hmac.compare_digest(given.encode(), token.encode()):
             self._refuse('the token is missing or wrong: use the address with ?token=')
         elif token and named:
-            self.set_cookie('token', token, httponly=True, samesite='Strict')
+            self.set_cookie(self.page.cookie, token, httponly=True, samesite='Strict')
         elif not token and self.request.host_name.strip('[]') not in THIS_MACHINE:
             # Another site's name that leads here, by which its scripts could read the page.
             self._refuse('open the page as 127.0.0.1 or localhost')
