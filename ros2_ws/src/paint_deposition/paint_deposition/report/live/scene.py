@@ -60,7 +60,7 @@ class Scene:
         self._lock = Lock()
         # Messages by kind, each of which takes the place of the last.
         self._blocks: dict[str, bytes] = {}
-        self._film = np.empty(0, np.uint16)
+        self._film: np.ndarray = np.empty(0, np.uint16)
         self._rows: dict[str, list[Sequence[float]]] = {}
         # Of each gun: number, last point of its track, whether it sprayed there.
         self._guns: dict[str, tuple[int, np.ndarray | None, bool]] = {}
