@@ -114,7 +114,7 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
 
 def _written_film(folder: Path) -> Scene:
     """The film that a command wrote, with its figures."""
-    mesh = trimesh.load(folder / FILM, process=False, force='mesh')
+    mesh = trimesh.load_mesh(folder / FILM, process=False)
     film_um = mesh.metadata['_ply_raw']['vertex']['data']['thickness_um']
     written = folder / 'stats.json'
     figures = _read(written) if written.is_file() else {}

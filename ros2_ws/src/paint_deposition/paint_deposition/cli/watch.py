@@ -68,7 +68,7 @@ def watch_command(
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     if live and not part['path']:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
-    at = {'host': host, 'port': port, 'token': token}
+    at: dict[str, Any] = {'host': host, 'port': port, 'token': token}
     if live:
         _start_node({
             'mesh_file': part['path'], 'mesh_scale': part['scale'],

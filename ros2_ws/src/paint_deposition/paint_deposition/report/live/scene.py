@@ -85,7 +85,7 @@ class Scene:
         """Forget tracks and history; the next film takes the place of this one."""
         with self._lock:
             self._rows, self._guns, self._shown = {}, {}, {}
-            self._blocks.pop('guns', None)
+            self._set('guns', frame('guns', guns=[]))
 
     def tell(
         self, kind: str, arrays: Mapping[str, np.ndarray] | None = None, **values: Any

@@ -30,7 +30,10 @@ const receive = {
     showChoices();
     if (state.scene) choose(state.scene);
   },
-  part(part) { view.showPart(part); },
+  part(part) {
+    view.showPart(part);
+    view.showGuns([]);
+  },
   scale(scale) {
     state.scale = scale;
     find('colours').hidden = !scale.target;
