@@ -53,9 +53,7 @@ class Arm:
         turned = np.where(slides, 0.0, along)
         return position, axes, np.concatenate([moved, turned], axis=-1).swapaxes(-1, -2)
 
-    def _chain(
-        self, values: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    def _chain(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Tip as in ``tips``; axes (..., J, 3) and places (..., J, 3) of the joints."""
         shape = values.shape[:-1]
         position, turn = np.zeros((*shape, 3)), np.broadcast_to(np.eye(3), (*shape, 3, 3))
@@ -80,3 +78,21 @@ def _turns(axis: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sin, cos = np.sin(angle_rad)[..., None, None], np.cos(angle_rad)[..., None, None]
     return np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross)
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """What drives a motion: the joints over time.
+
+    Attributes:
+        joints: names of the J joints.
+        slides: (J,) bool, whether the joint is in m, not rad.
+        seconds: (M,) since the first pose.
+        values, speeds: (M, J) [rad or m, and per second].
+    """
+
+    joints: tuple[str, ...]
+    slides: np.ndarray
+    seconds: np.ndarray
+    values: np.ndarray
+    speeds: np.ndarray

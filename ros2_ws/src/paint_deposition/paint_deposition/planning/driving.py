@@ -6,47 +6,25 @@ from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.optimize import linprog
-from scipy.sparse import coo_array, vstack
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
-from paint_deposition.motion.arm import Arm
+from paint_deposition.motion.arm import Arm, JointMotion
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.configurations import REACHED, follow, settled, starts
+from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
+from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
 
 # Joints are looked at this often along the planned motion [s].
 STEP_S = 0.02
 # The way is chosen over poses that lie so far apart.
 APART_M, APART_RAD = 0.02, math.radians(3.0)
+# Poses of a motion that is only tried.
+TRIED = 150
 # A joint of which nothing more is known reaches its full speed in this time [s].
 FULL_SPEED_S = 0.25
-# Speeds and accelerations keep this share below the limits where they are looked at.
-MARGIN = 0.03
 # Ways that come nearer to the limit of a joint than this share of its range are avoided.
 NEAR_LIMIT = 0.05
-# Below this share of the planned speed the robot stands in a singularity.
-SLOWEST = 0.02
-# Smaller losses of speed are not told.
-TOLD = 0.005
-
-
-@dataclass(frozen=True)
-class PassLimit:
-    """The joint that keeps a pass from its planned speed."""
-
-    number: int  # of the pass, from 1
-    share: float  # of the planned speed that is left
-    joint: str
-    of_speed: bool  # whether its speed limits, not its acceleration
-
-    def __str__(self) -> str:
-        what = 'speed' if self.of_speed else 'acceleration'
-        return (
-            f'pass {self.number} runs at {100 * self.share:.0f} % of the planned speed, which the '
-            f'{what} of {self.joint} allows'
-        )
 
 
 @dataclass(frozen=True)
@@ -75,6 +53,23 @@ class Drive:
         nearest = int(np.argmin(share))
         return float(share[nearest]), self.arm.joints[nearest]
 
+    @property
+    def joint_motion(self) -> JointMotion:
+        """The joints over time, with their speeds."""
+        speeds = CubicSpline(self.seconds, self.joints)(self.seconds, 1)
+        arm = self.arm
+        return JointMotion(arm.joints, arm.slides, self.seconds, self.joints, speeds)
+
+    @property
+    def sentence(self) -> str:
+        """How the robot drives it, in a sentence."""
+        room, joint = self.to_limit
+        slow = f'with {len(self.limits)} of its passes slowed down' if self.limits else 'as planned'
+        return (
+            f'driven {slow}; {joint} comes within {100 * room:.0f} % of its range of a limit; '
+            f'nearest singularity {self.least_singular_value:.2g} m/s per rad/s'
+        )
+
     def to_dict(self) -> dict[str, Any]:
         """The figures by name."""
         room, joint = self.to_limit
@@ -98,6 +93,16 @@ class RobotCell:
     part: Rigid
     acceleration: float | None = None
 
+    def __post_init__(self) -> None:
+        unknown = [
+            n for n, v in zip(self.arm.joints, self.arm.fastest, strict=True) if v == math.inf
+        ]
+        if unknown:
+            raise PlanError(
+                f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
+                '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
+            )
+
     def drive(self, trajectory: Trajectory, free_roll: bool) -> Drive:
         """The joints that drive a motion in the frame of the part.
 
@@ -109,15 +114,14 @@ class RobotCell:
             PlanError: the robot does not reach all poses.
         """
         arm, begin_ns = self.arm, int(trajectory.stamps_ns[0])
-        clock_s = 1e-9 * (trajectory.stamps_ns - begin_ns)
-        times_s = np.linspace(0.0, clock_s[-1], max(4, math.ceil(clock_s[-1] / STEP_S) + 1))
+        times_s = _times(trajectory)
         positions, turns = self.poses(trajectory, times_s)
         joints, roll_rad = _joints(arm, positions, turns, times_s, free_roll)
         most = arm.fastest / FULL_SPEED_S
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
-        pace = _Pace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
-        opening = _openings(trajectory, clock_s, times_s)
+        pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
+        opening = _openings(trajectory, times_s)
         shares = pace.shares(opening)
         steps_s = 2.0 * np.diff(times_s) / (shares[1:] + shares[:-1])
         seconds = np.append(0.0, np.cumsum(steps_s))
@@ -138,6 +142,35 @@ class RobotCell:
         limits = pace.limits(opening, shares)
         return Drive(arm, slowed, seconds, joints, limits, float(values[:, -1].min()))
 
+    def allowed_speeds(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+        """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
+        at which a joint runs at its greatest speed.
+        """
+        times_s = _times(trajectory)
+        positions, turns = self.poses(trajectory, times_s)
+        joints, _ = _joints(self.arm, positions, turns, times_s, False)
+        steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+        share = np.abs(np.diff(joints, axis=0)) / (1.0 - MARGIN) / self.arm.fastest
+        speed = steps_m / np.maximum(share.max(axis=1), 1e-9)
+        travel = np.append(0.0, np.cumsum(steps_m))
+        moving = steps_m > 1e-6
+        return 0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]
+
+    def tried(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
+        """How far a motion is followed, at which share of its speed, and with what room.
+
+        Of the whole, at the slowest moment, and of a joint's range; 0 where not all is reached.
+        Accelerations are not looked at.
+        """
+        times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
+        positions, turns = self.poses(trajectory, times_s)
+        _, ways = _ways(self.arm, positions, turns, free_roll)
+        if not len(ways.whole):
+            return float(ways.reached.max(initial=0)) / TRIED, 0.0, 0.0
+        joints = ways.joints[_best(self.arm, ways, times_s)]
+        speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
+        return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
+
     def poses(self, trajectory: Trajectory, times_s: np.ndarray) -> tuple[np.ndarray, Rotation]:
         """Positions (N, 3) and turns of the tool in the robot's base at times (N,)."""
         clock_s = 1e-9 * (trajectory.stamps_ns - trajectory.stamps_ns[0])
@@ -156,9 +189,7 @@ def _joints(
     rows = _apart(positions_m, turns)
     way, roll_rad = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll)
     axes = (turns * _roll(roll_rad)).as_matrix()
-    joints, error = settled(
-        arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes
-    )
+    joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
     if error.max() > REACHED:
         raise PlanError(
             f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m in '
@@ -184,15 +215,12 @@ def _best_way(
     arm: Arm, positions_m: np.ndarray, turns: Rotation, times_s: np.ndarray, free_roll: bool
 ) -> tuple[np.ndarray, float]:
     """(N, J), of all ways through the poses the one that is driven the fastest, and its roll."""
-    begin = starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    begin, ways = _ways(arm, positions_m, turns, free_roll)
     if not begin:
         raise PlanError(
             f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
             'check --part-pose, or let paint place look where the part may stand'
         )
-    axes = np.stack([(turns * _roll(one.roll_rad)).as_matrix() for one in begin])
-    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
-    ways = follow(arm, np.array([one.joints for one in begin]), positions, axes)
     if not len(ways.whole):
         far = int(ways.reached.max())
         raise PlanError(
@@ -200,100 +228,46 @@ def _best_way(
             f'beyond {_words(positions_m[far])} m in its base, in none of {len(begin)} '
             'configurations; let paint place look where the part may stand'
         )
+    best = _best(arm, ways, times_s)
+    return ways.joints[best], begin[best].roll_rad
+
+
+def _ways(
+    arm: Arm, positions_m: np.ndarray, turns: Rotation, free_roll: bool
+) -> tuple[list[Start], Ways]:
+    begin = starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    axes = np.reshape([(turns * _roll(one.roll_rad)).as_matrix() for one in begin],
+                      (len(begin), len(positions_m), 3, 3))  # fmt: skip
+    joints = np.reshape([one.joints for one in begin], (len(begin), len(arm)))
+    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
+    return begin, follow(arm, joints, positions, axes)
+
+
+def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
+    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
     joints = ways.joints[ways.whole]
-    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis]
-    late = np.maximum((speeds / arm.fastest).max(axis=2), 1.0)
+    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
+    late = np.maximum(speeds.max(axis=2), 1.0)
     near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / NEAR_LIMIT, 0.0)
-    best = np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)) / arm.fastest.mean())
-    return joints[best], begin[ways.whole[best]].roll_rad
+    return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
 
 
-def _openings(trajectory: Trajectory, clock_s: np.ndarray, times_s: np.ndarray) -> np.ndarray:
+def _times(trajectory: Trajectory) -> np.ndarray:
+    """(N,) times at which the joints are looked at [s]."""
+    count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
+    return np.linspace(0.0, trajectory.duration_s, count)
+
+
+def _openings(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
     """(N,) number of the opening of the gun in which each time lies, -1 for none."""
     found = np.full(len(times_s), -1)
     stamps_s = 1e-9 * (trajectory.trigger_stamps_ns - trajectory.stamps_ns[0])
-    ends_s, number = np.append(stamps_s, clock_s[-1]), 0
+    ends_s, number = np.append(stamps_s, times_s[-1]), 0
     for k, flow in enumerate(trajectory.trigger_flow):
         if flow > 0.0:
             found[(times_s >= ends_s[k] - STEP_S) & (times_s <= ends_s[k + 1] + STEP_S)] = number
             number += 1
     return found
-
-
-@dataclass(frozen=True)
-class _Pace:
-    """What the joints along a motion allow; they are a function of the planned time."""
-
-    names: tuple[str, ...]
-
-    times_s: np.ndarray
-    joints: CubicSpline
-    fastest: np.ndarray
-    most: np.ndarray
-
-    def shares(self, opening: np.ndarray) -> np.ndarray:
-        """(N,) share of the planned speed at the times, the greatest that the joints allow.
-
-        With b the square of the share the joints' accelerations are linear in b and its slope
-        (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
-        share, or its film would be uneven.
-        """
-        count, step = len(self.times_s), self.times_s[1]
-        column = np.where(opening >= 0, opening, opening.max() + 1 + np.cumsum(opening < 0))
-        speed = np.abs(self.joints(self.times_s, 1)) / (1.0 - MARGIN)
-        highest = np.minimum(1.0, (self.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
-        bound = np.ones(column.max() + 1)
-        np.minimum.at(bound, column, highest)
-        middle = self.times_s[:-1] + 0.5 * step
-        rows, sides = [], []
-        for slope, bend, most in zip(
-            self.joints(middle, 1).T, self.joints(middle, 2).T, (1.0 - MARGIN) * self.most,
-            strict=True,
-        ):  # fmt: skip
-            before, after = 0.5 * bend - 0.5 * slope / step, 0.5 * bend + 0.5 * slope / step
-            row = np.arange(count - 1)
-            part = coo_array(
-                (np.append(before, after), (np.tile(row, 2), np.append(column[:-1], column[1:]))),
-                shape=(count - 1, len(bound)),
-            )
-            rows += [part, -part]
-            sides += [np.full(count - 1, most)] * 2
-        weights = np.bincount(column, minlength=len(bound)).astype(float)
-        solved = linprog(
-            -weights, A_ub=vstack(rows).tocsr(), b_ub=np.concatenate(sides),
-            bounds=np.stack([np.zeros_like(bound), bound], axis=1), method='highs',
-        )  # fmt: skip
-        shares = np.sqrt(np.maximum(solved.x, 0.0))[column]
-        if shares.min() < SLOWEST:
-            raise PlanError(
-                f'the robot has to stand almost still {self.times_s[shares.argmin()]:.1f} s after '
-                'the first pose; let the part stand elsewhere, paint place shows where'
-            )
-        return shares
-
-    def overrun(self, seconds: np.ndarray, joints: np.ndarray) -> float:
-        """By how much all must be slower for the limits to hold between the times, too."""
-        path = CubicSpline(seconds, joints)
-        dense = np.linspace(0.0, seconds[-1], 8 * len(seconds))
-        speed = (np.abs(path(dense, 1)) / self.fastest).max()
-        rate = (np.abs(path(dense, 2)) / self.most).max()
-        return float(max(1.0, speed, math.sqrt(rate)))
-
-    def limits(self, opening: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
-        """Of the passes that are slower than planned, the joint that makes them so."""
-        slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
-        bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
-        found = []
-        for number in range(opening.max() + 1):
-            inside = opening == number
-            share = float(shares[inside].min())
-            if share > 1.0 - TOLD:
-                continue
-            speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
-            of_speed = speed.max() > rate.max()
-            joint = int(np.argmax(speed if of_speed else rate))
-            found.append(PassLimit(number + 1, share, self.names[joint], bool(of_speed)))
-        return tuple(found)
 
 
 def _words(place_m: np.ndarray) -> str:

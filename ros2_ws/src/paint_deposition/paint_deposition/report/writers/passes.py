@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
@@ -18,6 +20,7 @@ from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
@@ -27,7 +30,7 @@ from paint_deposition.planning.plan import Plan
 from paint_deposition.report.writers.film import write_film
 from paint_deposition.report.writers.write import writable
 
-BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
+BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
 COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
     'brush',
@@ -45,6 +48,7 @@ class Passes:
     # The robot's frame and the pose of the part in it; bag and table have their poses in that
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
+    joints: JointMotion | None = None  # that drive it
 
 
 def write_passes(folder: Path, passes: Passes) -> list[str]:
@@ -62,7 +66,9 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     module = module_text(passes.moves, [comment], part[1] if part else None)
     write_text(folder / PROGRAM, module)
     write_model(folder / MODEL_FILE, passes.model)
-    return [BAG, TABLE, PROGRAM, MODEL_FILE]
+    if passes.joints:
+        write_table(folder / JOINTS, _joint_table(passes.joints))
+    return [BAG, TABLE, PROGRAM, MODEL_FILE, *([JOINTS] if passes.joints else [])]
 
 
 def write_plan(
@@ -83,7 +89,8 @@ def write_plan(
     folder, improved = Path(folder), isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     with writable(folder):
-        passes = Passes(result.trajectory, result.moves, result.model, made, part)
+        joints = result.drive.joint_motion if result.drive else None
+        passes = Passes(result.trajectory, result.moves, result.model, made, part, joints)
         names = write_passes(folder, passes)
         figures = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
         write_json(folder / name, figures)
@@ -111,6 +118,13 @@ def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Se
         ]
 
 
+def _joint_table(joints: JointMotion) -> Iterator[Sequence[object]]:
+    units = np.where(joints.slides, 'm', 'rad')
+    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(joints.joints, units, strict=True))
+    for time_s, values in zip(joints.seconds, joints.values, strict=True):
+        yield [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
+
+
 def _write_bag(target: Path, passes: Passes, digest: str) -> None:
     if target.exists():
         strangers = [
@@ -126,7 +140,7 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
         fresh = write_pose_bag(
             Path(aside) / target.name, placed,
             custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
-            part=(trajectory.frame_id, part[1]) if part else None,
+            part=(trajectory.frame_id, part[1]) if part else None, joints=passes.joints,
         )  # fmt: skip
         if target.exists():
             shutil.rmtree(target)

@@ -1,0 +1,148 @@
+"""Plans that a robot drives: its joints against the arm by the product of exponentials."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
+
+import robot_arm
+from paint_deposition.api.robot import place, read_robot
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.motion.part_frame import Rigid, at_part, moved
+from paint_deposition.planning.driven_plan import driven
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.requests import PlanRequest
+from planning.test_surface_map import sheet
+from scenes import painted
+
+pytestmark = pytest.mark.slow
+
+ROUND = DepositionModel(
+    planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
+)
+# The part lies on its back: the gun looks along its +y, which is down.
+LYING = (Rotation.from_euler('z', np.pi) * Rotation.from_euler('x', -np.pi / 2)).as_quat()
+PART_POSE = [0.9, 0.0, 0.5, *LYING]
+
+
+@pytest.fixture(scope='module')
+def urdf(tmp_path_factory):
+    path = tmp_path_factory.mktemp('robot') / 'arm.urdf'
+    path.write_text(robot_arm.urdf())
+    return path
+
+
+@pytest.fixture(scope='module')
+def cell(urdf):
+    return read_robot(urdf, PART_POSE)
+
+
+@pytest.fixture(scope='module')
+def planned():
+    flat = sheet(lambda x, z: 0.0 * x, half_m=0.15)
+    return plan(flat, ROUND, PlanRequest(speed_m_per_s=0.2), 'part')
+
+
+@pytest.fixture(scope='module')
+def on_robot(planned, cell):
+    return driven(planned, cell)
+
+
+def test_the_tip_moves_as_its_jacobian_says(cell):
+    joints = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 6))
+    position, axes, jacobian = cell.arm.jacobians(joints)
+    expected, turns = robot_arm.tip_poses(joints)
+    np.testing.assert_allclose(position, expected, atol=1e-12)
+    np.testing.assert_allclose(axes, Rotation.from_quat(turns).as_matrix(), atol=1e-12)
+    step = 1e-6
+    for j in range(6):
+        ahead, turned = robot_arm.tip_poses(joints + step * np.eye(6)[j])
+        np.testing.assert_allclose((ahead - expected) / step, jacobian[:, :3, j], atol=1e-5)
+        turn = (Rotation.from_quat(turned) * Rotation.from_quat(turns).inv()).as_rotvec()
+        np.testing.assert_allclose(turn / step, jacobian[:, 3:, j], atol=1e-5)
+
+
+def test_the_joints_lay_the_film_of_the_plan_within_their_limits(planned, on_robot):
+    drive = on_robot.drive
+    path = CubicSpline(drive.seconds, drive.joints)
+    every_ms = np.arange(0.0, drive.seconds[-1], 1e-3)
+    arm = drive.arm
+    assert (np.abs(path(every_ms, 1)) <= arm.fastest).all()
+    assert (np.abs(path(every_ms, 2)) <= arm.fastest / 0.25).all()
+    assert ((path(every_ms) >= arm.lower) & (path(every_ms) <= arm.upper)).all()
+    in_base = replace(
+        drive.trajectory, stamps_ns=np.round(1e9 + 1e9 * every_ms[::4]).astype(np.int64),
+        trigger_stamps_ns=drive.trajectory.trigger_stamps_ns
+        - drive.trajectory.stamps_ns[0] + 10**9,
+        **dict(zip(('positions_m', 'quaternions_xyzw'), robot_arm.tip_poses(path(every_ms[::4])),
+                   strict=True)),
+    )  # fmt: skip
+    motion = at_part(in_base, PART_POSE, 'part')
+    film_um = painted(planned.surface.points(), motion, ROUND).film_um
+    assert np.abs(film_um - on_robot.film_um).max() < 1e-3 * on_robot.film_um.max()
+
+
+def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
+    assert not on_robot.drive.limits
+    at_work = np.abs(np.diff(on_robot.drive.joints, axis=0)).max(axis=0)
+    used = at_work / np.diff(on_robot.drive.seconds)[0]
+    busiest = int(used.argmax())
+    fastest = np.where(np.arange(6) == busiest, 0.1 * used, cell.arm.fastest)
+    slow = replace(cell, arm=replace(cell.arm, fastest=fastest), acceleration=1e3)
+    found = driven(planned, slow)
+    limits = found.drive.limits
+    assert limits
+    assert {limit.joint for limit in limits} == {cell.arm.joints[busiest]}
+    assert all(limit.of_speed and limit.share < 0.8 for limit in limits)
+    assert found.cycle_time_s > on_robot.cycle_time_s
+    assert [str(limit) for limit in limits] == list(found.warnings)[: len(limits)]
+    assert found.mean_um > 1.05 * on_robot.mean_um
+    # Within a pass the speed is even: the film along its middle is as the plan's, but thicker.
+    first = found.trajectory
+    on, off = first.trigger_stamps_ns[2 * limits[0].number - 2 : 2 * limits[0].number]
+    inside = (first.stamps_ns > on + 10**8) & (first.stamps_ns < off - 10**8)
+    step_m = np.linalg.norm(np.diff(first.positions_m[inside], axis=0), axis=1)
+    speed = step_m / (1e-9 * np.diff(first.stamps_ns[inside]))
+    assert speed.max() < 1.02 * speed.min()
+    assert speed.mean() == pytest.approx(0.2 * limits[0].share, rel=0.02)
+
+
+def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
+    lopsided = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
+    kept = driven(plan(planned.surface, lopsided, PlanRequest(speed_m_per_s=0.2), 'part'), cell)
+    for one, rolls in ((on_robot, True), (kept, False)):
+        plain = one.trajectory.quaternions_xyzw[0]
+        roll = Rotation.from_quat(plain).as_matrix()[:, 0] @ [1.0, 0.0, 0.0]
+        assert (abs(abs(roll) - 1.0) > 1e-3) == rolls
+
+
+@pytest.mark.parametrize(
+    ('place_m', 'words'),
+    [((5.0, 0.0), 'does not reach the first pose'), ((1.2, 0.2), 'follows the motion to')],
+)
+def test_what_cannot_be_driven_says_where(planned, cell, place_m, words):
+    part = Rigid.of([*place_m, *PART_POSE[2:]])
+    with pytest.raises(PlanError, match=words):
+        replace(cell, part=part).drive(planned.trajectory, free_roll=False)
+
+
+def test_a_robot_without_speeds_is_refused(urdf, tmp_path):
+    unknown = tmp_path / 'unknown.urdf'
+    unknown.write_text(urdf.read_text().replace(' velocity="1"', '', 1))
+    with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
+        read_robot(unknown, PART_POSE)
+    with pytest.raises(PaintError, match='give seven numbers'):
+        read_robot(urdf, [1.0, 2.0])
+
+
+def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
+    found = place(planned.trajectory, cell, [0.9, 5.0], [0.0])
+    assert found.reached.tolist() == [[1.0, 0.0]]
+    assert found.part_pose == pytest.approx(PART_POSE)
+    assert found.speed[0, 0] > 0.5
+    in_base = moved(planned.trajectory, cell.part, 'base_link')
+    assert place(in_base, cell, [0.9], [0.0]).room == pytest.approx(found.room[:, :1])
