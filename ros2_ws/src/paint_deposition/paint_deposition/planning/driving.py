@@ -34,7 +34,7 @@ class Drive:
     Attributes:
         trajectory: the poses in the part's frame, timed as the joints allow, and rolled.
         seconds: (M,) times of the joints from the first pose [s].
-        joints: (M, J) [rad or m].
+        joints, speeds: (M, J) [rad or m, and per second].
         limits: of passes that are slower than planned.
         least_singular_value: of the tip's velocity by those of the joints, m and rad alike.
     """
@@ -43,6 +43,7 @@ class Drive:
     trajectory: Trajectory
     seconds: np.ndarray
     joints: np.ndarray
+    speeds: np.ndarray
     limits: tuple[PassLimit, ...]
     least_singular_value: float
 
@@ -56,15 +57,16 @@ class Drive:
     @property
     def joint_motion(self) -> JointMotion:
         """The joints over time, with their speeds."""
-        speeds = CubicSpline(self.seconds, self.joints)(self.seconds, 1)
         arm = self.arm
-        return JointMotion(arm.joints, arm.slides, self.seconds, self.joints, speeds)
+        return JointMotion(arm.joints, arm.slides, self.seconds, self.joints, self.speeds)
 
     @property
     def sentence(self) -> str:
         """How the robot drives it, in a sentence."""
         room, joint = self.to_limit
-        slow = f'with {len(self.limits)} of its passes slowed down' if self.limits else 'as planned'
+        slow = (
+            f'with {len(self.limits)} of its passes slowed down' if self.limits else 'as planned'
+        )
         return (
             f'driven {slow}; {joint} comes within {100 * room:.0f} % of its range of a limit; '
             f'nearest singularity {self.least_singular_value:.2g} m/s per rad/s'
@@ -123,12 +125,10 @@ class RobotCell:
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
         opening = _openings(trajectory, times_s)
         shares = pace.shares(opening)
-        steps_s = 2.0 * np.diff(times_s) / (shares[1:] + shares[:-1])
-        seconds = np.append(0.0, np.cumsum(steps_s))
-        seconds *= pace.overrun(seconds, joints)
+        reached_s, *motion = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
-            later_s = np.interp(1e-9 * (stamps_ns - begin_ns), times_s, seconds)
+            later_s = np.interp(1e-9 * (stamps_ns - begin_ns), times_s, reached_s)
             return begin_ns + np.round(1e9 * later_s).astype(np.int64)
 
         rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(roll_rad)
@@ -140,7 +140,7 @@ class RobotCell:
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
         limits = pace.limits(opening, shares)
-        return Drive(arm, slowed, seconds, joints, limits, float(values[:, -1].min()))
+        return Drive(arm, slowed, *motion, limits, float(values[:, -1].min()))
 
     def allowed_speeds(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
