@@ -14,6 +14,7 @@ from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_dat
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -38,7 +39,7 @@ def read_recording(
     """Read the poses and the trigger of a motion file, and transform them into the part's frame.
 
     Args:
-        path: a bag, a RAPID module or a table of poses.
+        path: a bag, a RAPID module, a tool path of noether or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
         more: the other fields of ``MotionSource``, such as ``part_pose``.
@@ -59,6 +60,9 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
+    elif is_tool_path(path):
+        source.require_kind(path, 'a tool path')
+        recorded = read_tool_path(path)
     elif is_pose_table(path):
         source.require_kind(path, 'a table of poses')
         layout = PoseLayout(
