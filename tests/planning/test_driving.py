@@ -1,13 +1,18 @@
 """Plans that a robot drives: its joints against the arm by the product of exponentials."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
+from rosbags.highlevel import AnyReader
 from scipy.interpolate import CubicHermiteSpline
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 import robot_arm
+from cli.command import paint
 from paint_deposition.api.robot import place, read_robot
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
@@ -146,3 +151,44 @@ def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
     assert found.speed[0, 0] > 0.5
     in_base = moved(planned.trajectory, cell.part, 'base_link')
     assert place(in_base, cell, [0.9], [0.0]).room == pytest.approx(found.room[:, :1])
+
+
+def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path):
+    trimesh.Trimesh(planned.surface.vertices_m, planned.surface.faces, process=False).export(
+        tmp_path / 'flat.stl'
+    )
+    model = tmp_path / 'round.yaml'
+    pd.write_model(model, ROUND)
+    part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
+    robot = '--urdf', urdf, '--tip-link', 'tool0', '--part-pose', *PART_POSE
+    done = paint('plan', *part, '--model', model, '--speed', 0.2, *robot, '-o', tmp_path / 'plan')
+    assert done.returncode == 0, done.stderr
+    assert 'driven as planned' in done.stdout
+    figures = json.loads((tmp_path / 'plan/plan.json').read_text())['robot']
+    assert figures['joints'] == list(cell.arm.joints)
+    table = np.loadtxt(tmp_path / 'plan/joints.csv', delimiter=',', skiprows=1)
+    with AnyReader([tmp_path / 'plan/trajectory']) as bag:
+        (message,) = [
+            bag.deserialize(raw, connection.msgtype)
+            for connection, _, raw in bag.messages()
+            if connection.topic == '/joint_trajectory'
+        ]
+    np.testing.assert_allclose([p.positions for p in message.points], table[:, 1:], atol=1e-6)
+    given = '--trajectory', tmp_path / 'plan/trajectory', *robot
+    done = paint('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / 'better/joints.csv').exists()
+    grid = '--x', 0.9, 1.0, '--y', 0.0, 0.05
+    done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)['reached'] == [[1.0]]
+    done = paint('place', *given[:2], '--urdf', urdf, '-o', tmp_path / 'place')
+    assert done.returncode == 2
+    assert '--part-pose' in done.stderr
+    # A tool path holds the passes: the same film, at its own speed.
+    passes = '--trajectory', tmp_path / 'plan/passes.yaml', '--part-pose', *PART_POSE
+    done = paint('simulate', *part, '--model', model, *passes, '-o', tmp_path / 'film')
+    assert 'no speeds' in done.stderr
+    film = json.loads((tmp_path / 'film/stats.json').read_text())
+    planned_um = json.loads((tmp_path / 'plan/stats.json').read_text())['mean_um']
+    assert film['mean_um'] == pytest.approx(planned_um * 0.2 / 0.3, rel=0.01)

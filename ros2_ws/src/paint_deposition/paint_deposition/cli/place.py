@@ -64,7 +64,7 @@ def place_command(
         span or (about - 0.6, about + 0.6)
         for span, about in zip((x_m, y_m), part_pose[:2], strict=True)
     ]
-    grid = [np.arange(low, high + 0.5 * step_m, step_m) for low, high in spans]
+    grid = [low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans]
     with Progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)

@@ -1,11 +1,10 @@
-"""Plans and improved programmes on disk: bag, table and robot program, figures, and the film."""
+"""The motion of a plan or an improved programme on disk: bag, table and robot program."""
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -13,9 +12,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
+from paint_deposition.files.planned_model import DIGEST, MODEL_FILE
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
@@ -25,11 +23,6 @@ from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.improvement.improvement import Improvement
-from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan
-from paint_deposition.report.writers.film import write_film
-from paint_deposition.report.writers.write import writable
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
 TOOL_PATH = 'passes.yaml'
@@ -72,33 +65,6 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     if passes.joints:
         write_table(folder / JOINTS, _joint_table(passes.joints))
     return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.joints else [])]
-
-
-def write_plan(
-    folder: str | Path,
-    result: Plan | PartPlan | Improvement,
-    details: Mapping[str, Any] | None = None,
-    part: tuple[str, Rigid] | None = None,
-) -> list[Path]:
-    """Write figures, what ``write_passes`` does, and the film, in place of an older plan.
-
-    Args:
-        details: more to say in the figures, such as the files used.
-        part: as for ``Passes``.
-
-    Raises:
-        PaintError: the folder cannot be written, or holds another folder of the bag's name.
-    """
-    folder, improved = Path(folder), isinstance(result, Improvement)
-    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
-    with writable(folder):
-        joints = result.drive.joint_motion if result.drive else None
-        passes = Passes(result.trajectory, result.moves, result.model, made, part, joints)
-        names = write_passes(folder, passes)
-        figures = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
-        write_json(folder / name, figures)
-    film = write_film(folder, result.surface, result.film_um, result.statistics, overwrite=True)
-    return [folder / one for one in (name, *names, *(file.name for file in film))]
 
 
 def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
