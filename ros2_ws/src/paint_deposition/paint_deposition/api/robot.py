@@ -45,8 +45,8 @@ def read_robot(
 def place(
     trajectory: Trajectory,
     cell: RobotCell,
-    x_m: Sequence[float],
-    y_m: Sequence[float],
+    x_m: Sequence[float] | np.ndarray,
+    y_m: Sequence[float] | np.ndarray,
     free_roll: bool = False,
     progress: Callable[[str, float], None] = lambda what, share: None,
 ) -> PartPlaces:

@@ -64,11 +64,11 @@ def place_command(
         span or (about - 0.6, about + 0.6)
         for span, about in zip((x_m, y_m), part_pose[:2], strict=True)
     ]
-    grid = [low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans]
+    x, y = (low + step_m * np.arange(int((high - low) / step_m + 1e-6) + 1) for low, high in spans)
     with Progress('place') as show:
         show('reading')
         recorded = pd.read_recording(trajectory)
-        found = place(recorded, cell, *grid, free_roll=free_roll, progress=show)
+        found = place(recorded, cell, x, y, free_roll, show)
         made_from = {'trajectory': str(trajectory), 'urdf': str(robot['urdf'])}
         results.write(found, made_from=made_from)
     options.print_all('note', recorded.notes)

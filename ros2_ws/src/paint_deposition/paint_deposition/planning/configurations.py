@@ -125,4 +125,4 @@ def towards(
 
 def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
     """(...) whether joints (..., J) keep their limits."""
-    return ((joints >= arm.lower) & (joints <= arm.upper)).all(axis=-1)
+    return np.asarray((joints >= arm.lower) & (joints <= arm.upper)).all(axis=-1)

@@ -125,7 +125,7 @@ class RobotCell:
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
         opening = _openings(trajectory, times_s)
         shares = pace.shares(opening)
-        reached_s, *motion = pace.driven(shares)
+        reached_s, seconds, driven, speeds = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
             later_s = np.interp(1e-9 * (stamps_ns - begin_ns), times_s, reached_s)
@@ -140,7 +140,7 @@ class RobotCell:
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
         limits = pace.limits(opening, shares)
-        return Drive(arm, slowed, *motion, limits, float(values[:, -1].min()))
+        return Drive(arm, slowed, seconds, driven, speeds, limits, float(values[:, -1].min()))
 
     def allowed_speeds(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
         """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there

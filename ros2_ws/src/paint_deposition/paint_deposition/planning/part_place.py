@@ -36,8 +36,7 @@ class PartPlaces:
         """Row and column of the place to choose: in the midst of those that are fast enough."""
         good = self.speed >= min(1.0, self.speed.max())
         score = np.where(good, self.room, -1.0)
-        row, column = np.unravel_index(int(score.argmax()), score.shape)
-        return int(row), int(column)
+        return divmod(int(score.argmax()), len(self.x_m))
 
     @property
     def part_pose(self) -> tuple[float, ...]:
@@ -50,7 +49,7 @@ class PartPlaces:
         """The answer in a sentence."""
         whole, count = int((self.reached == 1.0).sum()), self.reached.size
         if not whole:
-            row, column = np.unravel_index(int(self.reached.argmax()), self.reached.shape)
+            row, column = divmod(int(self.reached.argmax()), len(self.x_m))
             return (
                 f'from none of {count} places the robot drives the whole motion; from '
                 f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it follows '

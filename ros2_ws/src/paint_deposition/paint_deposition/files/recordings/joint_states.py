@@ -6,10 +6,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
+from xml.etree import ElementTree
 
 import networkx as nx
 import numpy as np
-from lxml import etree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, did_you_mean
@@ -112,7 +112,7 @@ class Robot:
 
     def _fastest(self) -> dict[str, float]:
         """Greatest speed of each joint that has one [rad/s or m/s]."""
-        root = etree.parse(self.path).getroot()
+        root = ElementTree.parse(self.path).getroot()
         limits = {joint.get('name'): joint.find('limit') for joint in root.iter('joint')}
         speeds = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
         return {name: speed for name, speed in speeds.items() if speed > 0.0}

@@ -29,7 +29,7 @@ def write_places(path: str | Path, places: PartPlaces) -> Path:
     drawn = axes.pcolormesh(*edges, 100.0 * shown, cmap='viridis', vmin=0.0, vmax=100.0)
     bar = figure.colorbar(drawn, ax=axes, shrink=0.8)
     bar.set_label('planned speed that the joints allow [%]', color=MUTED)
-    bar.outline.set_visible(False)
+    bar.ax.spines['outline'].set_visible(False)
     for row, column in np.ndindex(whole.shape):
         at = places.x_m[column], places.y_m[row]
         if not whole[row, column]:
