@@ -125,4 +125,5 @@ def towards(
 
 def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
     """(...) whether joints (..., J) keep their limits."""
-    return np.asarray((joints >= arm.lower) & (joints <= arm.upper)).all(axis=-1)
+    outside = (joints < arm.lower) | (joints > arm.upper)
+    return np.logical_not(outside.any(axis=-1))

@@ -113,7 +113,7 @@ class Robot:
     def _fastest(self) -> dict[str, float]:
         """Greatest speed of each joint that has one [rad/s or m/s]."""
         root = ElementTree.parse(self.path).getroot()
-        limits = {joint.get('name'): joint.find('limit') for joint in root.iter('joint')}
+        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
         speeds = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
         return {name: speed for name, speed in speeds.items() if speed > 0.0}
 
