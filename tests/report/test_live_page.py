@@ -164,13 +164,13 @@ def test_results_show_each_part_with_each_model(tmp_path):
     assert named == [(n, m) for n in names for m in ('after + air_drift', 'before')]
     looked = [Onlooker().look(scene) for scene in scenes]
     assert all(onlooker.film_um.max() > 1.0 for onlooker in looked)
+    rmse = [onlooker.rows['history'][-1][9] for onlooker in looked]
+    errors = found.to_dict()['experiments']
+    assert rmse[::2] == pytest.approx([e['rmse_after_um'] for e in errors], rel=0.02)
     # From one model to the other only the film and what is said of it travel.
     changed = looked[0].look(scenes[1]).kinds
     assert 'part' not in changed
     assert 'film' in changed
-    rmse = [onlooker.rows['history'][-1][9] for onlooker in looked]
-    errors = found.to_dict()['experiments']
-    assert rmse[::2] == pytest.approx([e['rmse_after_um'] for e in errors], rel=0.02)
     (tmp_path / 'campaign.yaml').unlink()
     with pytest.raises(PaintError, match='run the command in the folder in which'):
         results_scenes(tmp_path / 'results')

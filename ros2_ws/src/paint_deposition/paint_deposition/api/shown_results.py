@@ -82,13 +82,11 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
             {'model': name, 'rmse_um': found.rmse_um}
             for name, found in zip(data.names, residuals, strict=True)
         ]
-        like = None
         for name, film_um, film, found in [
             *zip(data.names, films, painted, residuals, strict=True)
         ][::-1]:
             scene = Scene(experiment.name, name)
-            scene.show_part(experiment.surface, like)
-            like = like or scene
+            scene.show_part(experiment.surface)
             scene.tell('about', text=experiment.name)
             scene.show_scale(film_scale(np.concatenate(films)), DEFAULT_PAINTED_ABOVE_UM, *wanted)
             scene.show_film(film_um)

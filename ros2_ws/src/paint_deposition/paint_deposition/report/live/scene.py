@@ -66,18 +66,15 @@ class Scene:
         self._guns: dict[str, tuple[int, np.ndarray | None, bool]] = {}
         self._shown: dict[str, dict[str, Any]] = {}
 
-    def show_part(self, surface: Surface, like: 'Scene | None' = None) -> None:
-        """Show a bare part; ``like`` is a scene that shows the same one."""
-        block = like._blocks['part'] if like else frame(
-            'part',
-            {
-                'vertices': surface.vertices_m.astype(np.float32),
-                'faces': surface.faces.astype(np.uint32),
-            },
-            outward=surface.outward.tolist(), down=surface.down.tolist(),
-        )  # fmt: skip
+    def show_part(self, surface: Surface) -> None:
+        """Show a bare part."""
+        arrays = {
+            'vertices': surface.vertices_m.astype(np.float32),
+            'faces': surface.faces.astype(np.uint32),
+        }
+        sides = {'outward': surface.outward.tolist(), 'down': surface.down.tolist()}
         with self._lock:
-            self._blocks = {'part': block}
+            self._blocks = {'part': frame('part', arrays, **sides)}
             self._film = np.zeros(len(surface.vertices_m), np.uint16)
             self._rows, self._guns, self._shown = {}, {}, {}
 
@@ -136,8 +133,8 @@ class Scene:
         with self._lock:
             blocks, film = dict(self._blocks), self._film
             rows = {name: (kept, len(kept)) for name, kept in self._rows.items()}
-        frames = [block for kind, block in blocks.items() if seen.blocks.get(kind) is not block]
-        if seen.blocks.get('part') is not blocks.get('part'):
+        frames = [block for kind, block in blocks.items() if seen.blocks.get(kind) != block]
+        if seen.blocks.get('part') != blocks.get('part'):
             seen.film = np.zeros(len(film), np.uint16)
         seen.blocks = blocks
         changed = film != seen.film
