@@ -171,6 +171,10 @@ def test_results_show_each_part_with_each_model(tmp_path):
     changed = looked[0].look(scenes[1]).kinds
     assert 'part' not in changed
     assert 'film' in changed
+    # A comparison describes its model in its figures.
+    write(pd.compare(campaign, found.model), tmp_path / 'compared')
+    compared = Onlooker().look(results_scenes(tmp_path / 'compared')[0][0])
+    np.testing.assert_array_equal(compared.film_um, Onlooker().look(scenes[0]).film_um)
     (tmp_path / 'campaign.yaml').unlink()
     with pytest.raises(PaintError, match='run the command in the folder in which'):
         results_scenes(tmp_path / 'results')
