@@ -52,7 +52,8 @@ def web_view(ros_context, spin, tmp_path):
 def test_browsers_see_the_film_of_the_simulator(
     simulator, web_view, robot, painted, wait_until, tmp_path
 ):
-    painter, viewer = simulator(), web_view(target_um=10.0, target_tolerance_um=2.0)
+    target = {'target_um': 10.0, 'target_tolerance_um': 2.0}
+    painter, viewer = simulator(**target), web_view(**target)
     motion = two_passes()
     from_robot = robot(painter, viewer)
 

@@ -2,6 +2,7 @@
 
 import contextlib
 import time
+from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ from paint_deposition.nodes.runtime.parameters import (
     direction_parameter,
     fixed_while_running,
     mesh_parameters,
+    require_colours,
     thickness_parameter,
 )
 from paint_deposition.nodes.runtime.topics import gun_topic
@@ -116,8 +118,11 @@ class WebView(PaintNode):
     def close(self) -> None:
         self.page.close()
 
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        require_colours(values)
+
     def _on_change(self, names: set[str]) -> None:
-        self._show_scale(np.empty(0))
+        self._show_scale()
 
     # --- the part and its film
 
@@ -127,7 +132,8 @@ class WebView(PaintNode):
         self._mesh_file, self._mesh_ids = mesh_file, {surface.mesh_id, turned(surface).mesh_id}
         self.scene.show_part(surface)
         self.scene.tell('about', text=Path(mesh_file).name)
-        self._show_scale(np.empty(0))
+        self._film_um = np.zeros(0, np.float32)
+        self._show_scale()
 
     def _take_part(self, part: Part) -> None:
         self._newest_ns, self._time_s = 0, 0.0
@@ -150,13 +156,13 @@ class WebView(PaintNode):
             )
             return
         self._say('')
-        film_um = np.asarray(field.thickness_um, np.float32)
-        self._show_scale(film_um)
-        self.scene.show_film(film_um)
+        self._film_um = np.asarray(field.thickness_um, np.float32)
+        self._show_scale()
+        self.scene.show_film(self._film_um)
 
-    def _show_scale(self, film_um: np.ndarray) -> None:
+    def _show_scale(self) -> None:
         values = self.values
-        scale = film_scale(film_um, values['color_min_um'], values['color_max_um'])
+        scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
         target = values['target_um'], values['target_tolerance_um']
         self.scene.show_scale(scale, values['painted_above_um'], *target)
 
