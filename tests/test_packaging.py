@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -199,6 +200,18 @@ def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
     assert 'bag_player ended with exit code 2' in said
     for process in re.findall(r'process started with pid \[(\d+)\]', said):
         assert not Path(f'/proc/{process}').exists()
+
+
+def test_containers_start_nodes_with_parameters_that_there_are(repository):
+    compose = yaml.safe_load((repository / 'compose.yaml').read_text())
+    commands = [service['command'].split() for service in compose['services'].values()]
+    assert {words[0] for words in commands} <= {*NODES, 'web_view', 'ros2'}
+    for node, *words in commands:
+        given = [a for option, a in pairwise(words) if option == '-p' and node in NODES]
+        assert {name.split(':=')[0] for name in given} <= set(table_of(node) if given else ())
+    for recipe in (repository / 'containers').glob('*.Dockerfile'):
+        copied = re.findall(r'^COPY (\S+)', recipe.read_text(), re.M)
+        assert all((repository / path).exists() for path in copied)
 
 
 def test_the_aggregator_has_one_group_for_each_node():
