@@ -15,7 +15,7 @@ EXAMPLES = {
     'locate': '--touched my_touched.csv --points my_points.csv',
     'inspect': 'door_horizontal --mesh door.stl --out door.png',
     'recover': 'my_broken_run -o recovered',
-    'place': '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o places',
+    'place': '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map',
     'watch': 'door_horizontal --mesh door.stl --trigger /atomizer/state',
     'demo': '-o my_demo',
     'doctor': '--json',
