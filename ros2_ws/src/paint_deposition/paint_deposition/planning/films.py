@@ -150,6 +150,7 @@ class PlannedFilm:
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
             'paint': paint_figures(self),
+            'warnings': list(self.warnings),
         }
 
 

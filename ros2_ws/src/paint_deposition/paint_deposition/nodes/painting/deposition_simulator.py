@@ -10,7 +10,7 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
@@ -110,6 +110,7 @@ class DepositionSimulator(PaintingNode):
             raise PaintError(
                 f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
             )
+        require_band(values['target_um'], values['target_tolerance_um'])
 
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""
