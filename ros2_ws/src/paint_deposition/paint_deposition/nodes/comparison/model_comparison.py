@@ -187,6 +187,8 @@ class ModelComparison(PaintingNode):
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
             f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
         )
+        if doubt := zeros_in_doubt(self._readings, found.predicted_um):
+            line += f'; {doubt}'
         self.get_logger().info(line)
         return True, line
 
@@ -200,6 +202,5 @@ class ModelComparison(PaintingNode):
         }
         line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
         if doubt := zeros_in_doubt(self._readings, found.predicted_um):
-            self.get_logger().warning(doubt, once=True)
             return Status(WARN, f'{line}; {doubt}', values)
         return Status(OK, line, values)
