@@ -199,7 +199,8 @@ def simulate(
             common.guns, strict=True,
         )
     )  # fmt: skip
-    predicted_um, doubts = None, ()
+    predicted_um = None
+    doubts: tuple[str, ...] = ()
     if readings is not None:
         progress('predicting the readings', 0.0)
         # Each reading by itself, in double precision, and the slope of the film around it.

@@ -68,9 +68,9 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
     own = {q: [k for k, t in enumerate(texts) if t == n] for q, n in OWN.items() if n in texts}
     at: dict[str, list[int]] = {}
     if not {*AXES, 'thickness'} <= {*own}:
-        for wanted, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
+        for quantities, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
             found = [_quantity(heading, beside) for heading in headings]
-            for quantity in (q for q in wanted if q in found and q not in at):
+            for quantity in (q for q in quantities if q in found and q not in at):
                 at[quantity] = [k for k, one in enumerate(found) if one == quantity]
         if {*AXES} <= {*at}:
             at = {q: columns for q, columns in at.items() if q not in ON_FACE}

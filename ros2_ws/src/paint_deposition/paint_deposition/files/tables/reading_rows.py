@@ -26,14 +26,14 @@ def rows_of_readings(
     places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
     both = 'point' not in at and {'row', 'column'} <= {*at}
     (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
-    films = at['thickness'] if films else []
-    measured = (row for row in table.rows if any(c < len(row) and is_value(row[c]) for c in films))
-    numbered = [
-        c for c, cell in enumerate(next(measured, [])) if is_value(cell) and c not in films
-    ]
+    thick = at['thickness'] if films else []
+    # The other columns in which the first reading has a number.
+    measured = (row for row in table.rows if any(c < len(row) and is_value(row[c]) for c in thick))
+    first = next(measured, [])[:width]
+    numbered = [c for c, cell in enumerate(first) if is_value(cell) and c not in thick]
     for k, row in enumerate(table.rows):
         cells = [*row, *[''] * (width - len(row))]
-        values = [cells[c] for c in films]
+        values = [cells[c] for c in thick]
         placed = any(is_value(cells[c]) for c in places)
         begins = next(text_of(cell) for cell in cells if cell != '')
         listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''

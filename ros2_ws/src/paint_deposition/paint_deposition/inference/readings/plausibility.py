@@ -206,8 +206,8 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
             expected_um = painted.raw_um[one.means.owner]
-            found = readings_in_doubt(one.surface, one.readings, expected_um)
-            doubts += [f'{one.name}: {doubt}' for doubt in found]
+            odd = readings_in_doubt(one.surface, one.readings, expected_um)
+            doubts += [f'{one.name}: {doubt}' for doubt in odd]
             continue
         cause = 'the gun never sprays'
         if np.any(one.path.flow > 0.0):
