@@ -105,7 +105,7 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     )
     robot(node).send(MOTION)
     painted(node)
-    changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=100.0)
+    changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=9.9)
     assert all(result.successful for result in node.set_parameters(changes))
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.within_target == 1.0))
     wait_until(lambda: viewer.shows('thickness/legend', lambda m: m.markers[-1].text == '25 µm'))
