@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -12,10 +12,15 @@ from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
+from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 PART = 'part'
 
@@ -38,7 +43,7 @@ def read_recording(
     """Read the poses and the trigger of a motion file, and transform them into the part's frame.
 
     Args:
-        path: a bag, a RAPID module or a table of poses.
+        path: a bag, a RAPID module, a tool path of noether or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
         more: the other fields of ``MotionSource``, such as ``part_pose``.
@@ -59,18 +64,32 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
+    elif is_tool_path(path):
+        source.require_kind(path, 'a tool path')
+        recorded = read_tool_path(path)
     elif is_pose_table(path):
-        source.require_kind(path, 'a table of poses')
-        layout = PoseLayout(
-            source.state_topic, source.pose_unit, source.rotation, source.angle_unit
-        )
-        recorded = read_pose_table(path, layout)
+        recorded = read_table(path, source)
     else:
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
             return _in_part_frame(recorded, source, bag)
     return _in_part_frame(replace(recorded, source=str(path)), source, None)
+
+
+def holds_joints(path: Path) -> bool:
+    """Whether the motion in a file is that of joints, for which the robot has to be known."""
+    if is_rapid(path) or is_tool_path(path) or is_pose_table(path):
+        return False
+    with open_bag(path) as bag:
+        return bool(bag.topics_of(JOINT_TYPE))
+
+
+def read_table(path: Path, source: MotionSource) -> Trajectory:
+    """The motion in a table, in the frame of its poses."""
+    source.require_kind(path, 'a table of poses')
+    layout = PoseLayout(source.state_topic, source.pose_unit, source.rotation, source.angle_unit)
+    return read_pose_table(path, layout, _robot(path, source))
 
 
 def read_gun_motions(
@@ -105,26 +124,34 @@ def read_gun_motions(
 
 def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
     """The motion in a bag, in the frame of its poses."""
-    robot = None
-    if source.urdf and source.tf:
+    robot = _robot(bag.path, source)
+    if robot and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    if source.urdf:
-        from paint_deposition.files.recordings.joint_states import Robot
-
-        robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
-    elif source.tip_link or source.base_link:
-        raise RecordingError(
-            f'{bag.path}: tip_link and base_link are links of a URDF; give --urdf'
-        )
+    how = source.tf, robot, source.pose_unit
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
         trigger = state.name if state else None
-        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, source.tf, robot)
+        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
     # The bag of a plan names its trigger itself.
     planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
     trigger = source.state_topic or planned
-    recorded = trajectory_of(bag, source.pose_topic, trigger, source.tf, robot)
+    recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
     return _with_note(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
+
+
+def _robot(path: Path, source: MotionSource) -> 'Robot | None':
+    """The robot whose joints the recording has, None where it has poses."""
+    if not source.urdf:
+        if source.tip_link or source.base_link or source.joint_prefix:
+            raise RecordingError(
+                f'{path}: tip_link, base_link and joint_prefix go with a URDF; give --urdf'
+            )
+        return None
+    from paint_deposition.files.recordings.joint_states import JointNotation, Robot
+
+    robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
+    notation = JointNotation(source.joint_prefix, source.angle_unit, source.pose_unit)
+    return replace(robot, recorded_as=notation)
 
 
 def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
