@@ -13,7 +13,11 @@ from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_statistics
+from paint_deposition.film.statistics import (
+    DEFAULT_PAINTED_ABOVE_UM,
+    film_statistics,
+    require_band,
+)
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import Trajectory
@@ -54,6 +58,7 @@ class Replay:
         target_um: float = 0.0,
         tolerance_um: float = 0.0,
     ) -> None:
+        require_band(target_um, tolerance_um)
         # Brushes between calibrated ones only for the look: live films make them as they come.
         pairs = [
             with_interpolated_brushes(m.trajectory, model)

@@ -14,7 +14,7 @@ from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField,
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.colour_scales import film_scale
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.trigger import relative_flow
@@ -120,6 +120,7 @@ class WebView(PaintNode):
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         require_colours(values)
+        require_band(values['target_um'], values['target_tolerance_um'])
 
     def _on_change(self, names: set[str]) -> None:
         self._show_scale()
