@@ -96,8 +96,11 @@ def of_readings(found: Diagnosis, experiment: str) -> Chapter:
     )  # fmt: skip
 
 
-def of_cause(found: Diagnosis, unseen: SideBySide) -> Chapter:
-    """What was missing, how sure that is, and how both models do on readings no fit has seen."""
+def of_cause(found: Diagnosis, unseen: SideBySide, hidden: str) -> Chapter:
+    """What was missing, how sure that is, and how both models do on readings no fit has seen.
+
+    For the sceptic with the id of the effect that was hidden in the readings.
+    """
     told = headline(ReportData.of(found))
     facts = dict(told.facts)
     errors = [one.points.rmse_um for one in unseen.by_name.values()]
@@ -107,7 +110,8 @@ def of_cause(found: Diagnosis, unseen: SideBySide) -> Chapter:
         told.title,
         (*(facts[what] for what in ('What is missing', 'How sure') if facts.get(what)),
          f'{count} more readings of the door were kept from every fit. On them the error goes '
-         f'from {before} to {after} µm.'),
+         f'from {before} to {after} µm.',
+         f'What the virtual shop had hidden, by a law of its own: {words.effect_name(hidden)}.'),
         (*key_figures(ReportData.of(found))[3:],
          (f'RMSE, {count} unseen readings', before, after, 'µm')),
         (),
@@ -133,6 +137,6 @@ def of_improvement(found: Improvement) -> Chapter:
          both('Least film', 'µm', 1, lambda f: f.min_um),
          both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
          both('Time', 's', 1, lambda f: f.cycle_s)),
-        [(f'The film on the door, {when}', figure)
+        [(f'The film on the door, {when}; pink is thinner, red thicker than the bar', figure)
          for when, figure in zip(('before', 'after'), improved_figures(found), strict=True)],
     )  # fmt: skip

@@ -55,10 +55,18 @@ def film_picture(
 
 
 def page_film(
-    part: PartPicture, film_um: np.ndarray, spray: SprayPath, title: str, scale: ColourScale
+    part: PartPicture,
+    film_um: np.ndarray,
+    spray: SprayPath,
+    title: str,
+    scale: ColourScale,
+    corners: tuple[np.ndarray, np.ndarray] | None = None,
 ) -> tuple[Figure, Axes]:
-    """A painted part as wide as a page has room for, with its bar of colours, and its axes."""
-    low, high = part.window(spray)
+    """A painted part as wide as a page has room for, with its bar of colours, and its axes.
+
+    The picture is of the part with its passes, or up to ``corners`` [m].
+    """
+    low, high = corners or part.window(spray)
     figure, axes = part.on_page(low, high, title)
     part.draw(axes, scale.rgba(film_um, film_um > NO_PAINT_UM))
     draw_tool_path(axes, spray, part.view, low, high)

@@ -107,9 +107,7 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
-    windows = [part.window(path) for path in result.paths]
-    low = np.minimum(windows[0][0], windows[1][0])
-    high = np.maximum(windows[0][1], windows[1][1])
+    low, high = _window(part, result)
     openings = result.retiming.programme.openings[:MOST_CHARTS]
     columns = min(len(openings), 4)
     rows = math.ceil(len(openings) / columns)
@@ -151,7 +149,16 @@ def improved_figures(result: Improvement) -> list[Figure]:
     """The film before and after for a page, in one scale."""
     part, scale = PartPicture.of(result.surface), _scale(result)
     films = zip(('before', 'after'), (result.before, result.after), result.paths, strict=True)
-    return [page_film(part, of.film_um, path, name, scale)[0] for name, of, path in films]
+    return [
+        page_film(part, of.film_um, path, name, scale, _window(part, result))[0]
+        for name, of, path in films
+    ]
+
+
+def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a picture that holds the passes of both programmes [m]."""
+    lows, highs = zip(*(part.window(path) for path in result.paths), strict=True)
+    return np.minimum(*lows), np.maximum(*highs)
 
 
 def _scale(result: Improvement) -> ColourScale:
