@@ -3,18 +3,16 @@
 The words of a chapter are those that the command prints, and its figures are those of the files.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-
-from matplotlib.figure import Figure
 
 from paint_deposition.files.atomic import write_text
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.inference.comparison.comparison import SideBySide
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.headline import headline, key_figures
@@ -35,7 +33,7 @@ class Chapter:
     title: str
     text: tuple[str, ...]  # paragraphs
     figures: Sequence[tuple[str, str, str, str]]  # label, before or '', after, unit or remark
-    pictures: Sequence[tuple[str, Figure]]  # each with what it shows
+    pictures: Sequence[tuple[str, str]]  # what each shows, and its content as an address
 
 
 def write_story(
@@ -47,10 +45,7 @@ def write_story(
         commands: of each chapter, what does the same by hand.
         underway: what is being done; while there is something the page reloads itself.
     """
-    told = [
-        (chapter, command, [(shows, embedded(figure)) for shows, figure in chapter.pictures])
-        for chapter, command in zip(chapters, commands, strict=True)
-    ]
+    told = list(zip(chapters, commands, strict=True))
     page = from_template('story.html.j2', {}, told=told, underway=underway, reload_s=RELOAD_S)
     write_text(path, page)
     return path
@@ -70,7 +65,7 @@ def of_film(film: Film) -> Chapter:
         (('Film', '', f'{s.mean_um:.1f}', 'µm on average'),
          ('Least and greatest', '', f'{s.min_um:.1f} to {s.max_um:.1f}', 'µm'),
          ('Paint on the door', '', f'{100 * s.capture_fraction:.0f}', '% of what the bell gives')),
-        (('The film on the door; lines are the passes, numbered where they begin', picture),),
+        (('The film on the door; lines are the passes, numbered where they begin', embedded(picture)),),
     )  # fmt: skip
 
 
@@ -91,7 +86,7 @@ def of_readings(found: Diagnosis, experiment: str) -> Chapter:
          f'{words.micrometres(rmse[1])}.'),
         key_figures(data)[:3],
         [(f'Measured minus predicted on the {experiment}, {name}: red is more paint than the '
-          'model says, blue less; dots are readings', figure)
+          'model says, blue less; dots are readings', embedded(figure))
          for name, figure in zip(data.model_names, pictures, strict=True)],
     )  # fmt: skip
 
@@ -101,7 +96,8 @@ def of_cause(found: Diagnosis, unseen: SideBySide, hidden: str) -> Chapter:
 
     For the sceptic with the id of the effect that was hidden in the readings.
     """
-    told = headline(ReportData.of(found))
+    data = ReportData.of(found)
+    told = headline(data)
     facts = dict(told.facts)
     errors = [one.points.rmse_um for one in unseen.by_name.values()]
     count = len(unseen.by_name[unseen.best].readings)
@@ -112,7 +108,7 @@ def of_cause(found: Diagnosis, unseen: SideBySide, hidden: str) -> Chapter:
          f'{count} more readings of the door were kept from every fit. On them the error goes '
          f'from {before} to {after} µm.',
          f'What the virtual shop had hidden, by a law of its own: {words.effect_name(hidden)}.'),
-        (*key_figures(ReportData.of(found))[3:],
+        (*key_figures(data)[3:],
          (f'RMSE, {count} unseen readings', before, after, 'µm')),
         (),
     )  # fmt: skip
@@ -122,7 +118,9 @@ def of_improvement(found: Improvement) -> Chapter:
     """A programme before and after, in the film that the model predicts."""
     band = f'within ±{100 * found.tolerance:g} % of {found.target_um:.1f} µm'
 
-    def both(label: str, unit: str, digits: int, figure) -> tuple[str, str, str, str]:
+    def both(
+        label: str, unit: str, digits: int, figure: Callable[[FilmSummary], float]
+    ) -> tuple[str, str, str, str]:
         before, after = (words.fixed(figure(of), digits) for of in (found.before, found.after))
         return label, before, after, unit
 
@@ -137,6 +135,6 @@ def of_improvement(found: Improvement) -> Chapter:
          both('Least film', 'µm', 1, lambda f: f.min_um),
          both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
          both('Time', 's', 1, lambda f: f.cycle_s)),
-        [(f'The film on the door, {when}; pink is thinner, red thicker than the bar', figure)
+        [(f'The film on the door, {when}; pink is thinner, red thicker than the bar', embedded(figure))
          for when, figure in zip(('before', 'after'), improved_figures(found), strict=True)],
     )  # fmt: skip
