@@ -65,7 +65,8 @@ def of_film(film: Film) -> Chapter:
         (('Film', '', f'{s.mean_um:.1f}', 'µm on average'),
          ('Least and greatest', '', f'{s.min_um:.1f} to {s.max_um:.1f}', 'µm'),
          ('Paint on the door', '', f'{100 * s.capture_fraction:.0f}', '% of what the bell gives')),
-        (('The film on the door; lines are the passes, numbered where they begin', embedded(picture)),),
+        [('The film on the door; lines are the passes, numbered where they begin',
+          embedded(picture))],
     )  # fmt: skip
 
 
@@ -135,6 +136,7 @@ def of_improvement(found: Improvement) -> Chapter:
          both('Least film', 'µm', 1, lambda f: f.min_um),
          both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
          both('Time', 's', 1, lambda f: f.cycle_s)),
-        [(f'The film on the door, {when}; pink is thinner, red thicker than the bar', embedded(figure))
+        [(f'The film on the door, {when}; pink is thinner, red thicker than the bar',
+          embedded(figure))
          for when, figure in zip(('before', 'after'), improved_figures(found), strict=True)],
     )  # fmt: skip
