@@ -51,7 +51,7 @@ def demo_command(output: Path, opens: bool) -> None:
         from paint_deposition.files.model_file import read_model_file
         from paint_deposition.report.page import story as chapters
 
-        story.step('reading the mesh and the recording')
+        story.step('reading mesh and recording; the first run also compiles')
         trajectory = pd.read_recording(recording, state_topic=STATE)
         film = pd.simulate(
             pd.read_mesh(mesh, max_edge_length_m=0.01), trajectory, progress=story.step
