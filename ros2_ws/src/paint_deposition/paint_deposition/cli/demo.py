@@ -123,7 +123,7 @@ class _Story:
         if self._told:
             from paint_deposition.report.page.story import write_story
 
-            write_story(self.page, *zip(*self._told, strict=True), underway)
+            write_story(self.page, self._told, underway)
             if self._opens:
                 self._opens = not webbrowser.open(self.page.resolve().as_uri())
 

@@ -36,16 +36,13 @@ class Chapter:
     pictures: Sequence[tuple[str, str]]  # what each shows, and its content as an address
 
 
-def write_story(
-    path: Path, chapters: Sequence[Chapter], commands: Sequence[str], underway: str = ''
-) -> Path:
+def write_story(path: Path, told: Sequence[tuple[Chapter, str]], underway: str = '') -> Path:
     """Write the page, whole or not at all.
 
     Args:
-        commands: of each chapter, what does the same by hand.
+        told: each chapter with the command that does the same by hand.
         underway: what is being done; while there is something the page reloads itself.
     """
-    told = list(zip(chapters, commands, strict=True))
     page = from_template('story.html.j2', {}, told=told, underway=underway, reload_s=RELOAD_S)
     write_text(path, page)
     return path
