@@ -118,11 +118,8 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
         'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
         **vars(quality),
     }  # fmt: skip
-    sides = ', '.join(
-        f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
-    )
     frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {box_words(low, high)}'
     return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 
