@@ -39,7 +39,7 @@ if [[ $("$venv/bin/uv" --version 2>>"$log") != "uv $uv_version"* ]]; then
 fi
 logged "Installing $libraries" \
     "$venv/bin/uv" pip install --require-hashes --compile-bytecode --python "$venv/bin/python" \
-    "${requirements[@]}"
+    --excludes "$root/requirements/excluded.txt" "${requirements[@]}"
 logged 'Repairing the CMake exports of the wheels' \
     "$venv/bin/python" "$root/setup/repair_cmake_exports.py"
 

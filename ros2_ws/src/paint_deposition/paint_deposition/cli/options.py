@@ -112,6 +112,10 @@ PART_POSE = click.option(
     '--part-pose', nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose,
     help='Where the part stands in the frame of the poses [m, unit quaternion].',
 )  # fmt: skip
+PAINT_MOVES = click.option(
+    '--paint-moves', is_flag=True,
+    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
+)  # fmt: skip
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
     click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),
@@ -125,13 +129,15 @@ MOTION = (
         '--gun-signal',
         help='Digital output that opens the gun, for a RAPID module that sets several.',
     ),
+    click.option('--procedure', help='Where a RAPID program starts; default: main.'),
     click.option(
         '--tf', nargs=2, metavar='TARGET SOURCE',
         callback=lambda ctx, param, given: None if given is None else list(given),
         help='Take the poses from the transforms of the bag: frame SOURCE, the TCP, in TARGET.',
     ),
     click.option(
-        '--urdf', type=click.Path(), help='Take the poses from joint states and this robot.'
+        '--urdf', type=click.Path(),
+        help='Take the poses from joint states, or joint angles of RAPID, and this robot.',
     ),
     click.option('--tip', '--tip-link', 'tip_link',
                  help='Link of the URDF that is the TCP; default: tool0, else its last link.'),

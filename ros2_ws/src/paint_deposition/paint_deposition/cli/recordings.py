@@ -44,8 +44,9 @@ def inspect_command(
 ) -> None:
     """Show what RECORDING holds, or how the gun ran over a part.
 
-    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
-    targets, moves, speeds, where the gun is switched, and what could not be followed. Of a table
+    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID program
+    (.mod, .prg, .sys, .pgf or a folder): moves, speeds, where the gun is switched, and what was
+    left out. Of a table
     of poses (.csv, .tsv, .txt): what was understood.
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
@@ -57,16 +58,16 @@ def inspect_command(
     if part['path'] is not None:
         figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, **drawn)
     else:
-        gun_signal = motion.pop('gun_signal')
+        of_program = {name: motion.pop(name) for name in ('gun_signal', 'procedure')}
         if any(drawn[name] for name in ('output', 'model_file')) or any(motion.values()):
             raise click.UsageError('--out, --model and how the motion is read need --mesh')
-        figures, lines = _contents(path, gun_signal, max_pose_gap_s)
+        figures, lines = _contents(path, of_program, max_pose_gap_s)
         figures |= {'provenance': origin(files={'recording': path})}
     click.echo(json_text(figures) if as_json else lines)
 
 
 def _contents(
-    path: Path, gun_signal: str | None, max_pose_gap_s: float
+    path: Path, of_program: dict[str, Any], max_pose_gap_s: float
 ) -> tuple[dict[str, Any], str]:
     """What a RAPID module, a table of poses or a bag holds: figures, and the same in words."""
     from paint_deposition.files.motion_source import MotionSource
@@ -75,14 +76,14 @@ def _contents(
     from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 
     if is_rapid(path):
-        program = read_program(path, gun_signal=gun_signal)
+        program = read_program(path, **of_program)
         return asdict(program), program_as_text(program)
     if is_pose_table(path):
-        MotionSource(gun_signal=gun_signal).require_kind(path, 'a table of poses')
+        MotionSource(**of_program).require_kind(path, 'a table of poses')
         poses = read_pose_table(path, PoseLayout())
         options.print_all('warning', poses.warnings)
         return _table_contents(poses)
-    MotionSource(gun_signal=gun_signal).require_kind(path, 'a bag')
+    MotionSource(**of_program).require_kind(path, 'a bag')
     summary = summarise(path, max_pose_gap_s)
     return asdict(summary), _bag_contents(summary)
 

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 PART = 'part'
 
@@ -58,7 +61,9 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
+        robot = _robot(path, source)
+        program = read_program(path, source.gun_signal, source.procedure, robot)
+        recorded = program_trajectory(program)
     elif is_pose_table(path):
         source.require_kind(path, 'a table of poses')
         layout = PoseLayout(
@@ -105,17 +110,9 @@ def read_gun_motions(
 
 def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
     """The motion in a bag, in the frame of its poses."""
-    robot = None
     if source.urdf and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    if source.urdf:
-        from paint_deposition.files.recordings.joint_states import Robot
-
-        robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
-    elif source.tip_link or source.base_link:
-        raise RecordingError(
-            f'{bag.path}: tip_link and base_link are links of a URDF; give --urdf'
-        )
+    robot = _robot(bag.path, source)
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
         trigger = state.name if state else None
@@ -125,6 +122,17 @@ def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
     trigger = source.state_topic or planned
     recorded = trajectory_of(bag, source.pose_topic, trigger, source.tf, robot)
     return _with_note(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
+
+
+def _robot(path: Path, source: MotionSource) -> 'Robot | None':
+    """The robot of the URDF that is given; of a motion file that may need it."""
+    if source.urdf:
+        from paint_deposition.files.recordings.joint_states import Robot
+
+        return Robot.read(Path(source.urdf), source.tip_link, source.base_link)
+    if source.tip_link or source.base_link:
+        raise RecordingError(f'{path}: tip_link and base_link are links of a URDF; give --urdf')
+    return None
 
 
 def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:

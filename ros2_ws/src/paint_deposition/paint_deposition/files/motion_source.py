@@ -45,6 +45,7 @@ class MotionSource(BaseModel, extra='forbid'):
     pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
     state_topic: Text | None = Field(None, description='the name of a topic of the recording')
     gun_signal: Text | None = Field(None, description='the name of a digital output')
+    procedure: Text | None = Field(None, description='the name of a procedure')
     tf: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = Field(
         None, description='[target, source], the frame of the poses and the frame of the TCP'
     )
@@ -76,7 +77,8 @@ class MotionSource(BaseModel, extra='forbid'):
 PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
-    'pose_topic': 'bags', 'state_topic': 'bags and tables', 'tf': 'bags', 'urdf': 'bags',
-    'tip_link': 'bags', 'base_link': 'bags', 'gun_signal': 'RAPID modules', 'pose_unit': 'tables',
-    'rotation': 'tables', 'angle_unit': 'tables',
+    'pose_topic': 'bags', 'state_topic': 'bags and tables', 'tf': 'bags',
+    **dict.fromkeys(('urdf', 'tip_link', 'base_link'), 'bags and RAPID modules'),
+    **dict.fromkeys(('gun_signal', 'procedure'), 'RAPID modules'),
+    **dict.fromkeys(('pose_unit', 'rotation', 'angle_unit'), 'tables'),
 }  # fmt: skip

@@ -45,6 +45,7 @@ class Passes:
     # The robot's frame and the pose of the part in it; bag and table have their poses in that
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
+    paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
 
 
 def write_passes(folder: Path, passes: Passes) -> list[str]:
@@ -59,7 +60,8 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     _write_bag(folder / BAG, passes, digest)
     write_table(folder / TABLE, _table(passes.moves, part))
     comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
-    module = module_text(passes.moves, [comment], part[1] if part else None)
+    at = part[1] if part else None
+    module = module_text(passes.moves, [comment], at, passes.paint_moves)
     write_text(folder / PROGRAM, module)
     write_model(folder / MODEL_FILE, passes.model)
     return [BAG, TABLE, PROGRAM, MODEL_FILE]
@@ -70,12 +72,13 @@ def write_plan(
     result: Plan | PartPlan | Improvement,
     details: Mapping[str, Any] | None = None,
     part: tuple[str, Rigid] | None = None,
+    paint_moves: bool = False,
 ) -> list[Path]:
     """Write figures, what ``write_passes`` does, and the film, in place of an older plan.
 
     Args:
         details: more to say in the figures, such as the files used.
-        part: as for ``Passes``.
+        part, paint_moves: as for ``Passes``.
 
     Raises:
         PaintError: the folder cannot be written, or holds another folder of the bag's name.
@@ -83,7 +86,7 @@ def write_plan(
     folder, improved = Path(folder), isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     with writable(folder):
-        passes = Passes(result.trajectory, result.moves, result.model, made, part)
+        passes = Passes(result.trajectory, result.moves, result.model, made, part, paint_moves)
         names = write_passes(folder, passes)
         figures = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
         write_json(folder / name, figures)

@@ -60,6 +60,7 @@ def _passes(
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
+    paint_moves: bool = False,
     pictures: str = 'png',
 ) -> list[Path]:
     surface = result.surface
@@ -67,7 +68,7 @@ def _passes(
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_plan(folder, result, about, part)
+    files = write_plan(folder, result, about, part, paint_moves)
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(
