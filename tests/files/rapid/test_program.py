@@ -7,9 +7,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.rapid import interpreter
 from paint_deposition.files.rapid.program import RapidProgram, read_program
 from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.programmed import GunSwitch, Move
+from robot_arm import TIP_M, urdf
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -178,6 +181,8 @@ def test_conditions_without_moves_do_no_harm(read):
         ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in the modules given'),
         (f'MoveLSync {target(1)},v100,fine,tBell,"rGun";', 'line 4: movelsync is not understood'),
         ('SearchL di,p,p,v100,tBell;', 'line 4: searchl is not understood, and may move the'),
+        ('IF TestDI(di) Incr reg1;\nSetBrush reg1;', 'line 5: reg1, which depends on testdi()'),
+        (f'TriggL {target(1)},v1,on,z1,tBell;', 'line 4: on is not declared in the modules given'),
         ('GOTO again;', 'line 4: goto is not understood'),
         ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
         ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
@@ -199,6 +204,36 @@ def test_conditions_without_moves_do_no_harm(read):
 )  # fmt: skip
 def test_what_cannot_be_followed_is_named(read, body, says):
     assert says in refusal(read, body)
+
+
+def test_loops_in_loops_end(read, monkeypatch):
+    monkeypatch.setattr(interpreter, 'MOST_STATEMENTS', 1000)
+    loops = 'FOR i FROM 1 TO 99 DO\nFOR j FROM 1 TO 99 DO\nreg1:=j;\nENDFOR\nENDFOR'
+    assert 'line 6: 1000 statements have run; check the loops' in refusal(read, loops)
+
+
+def test_joint_angles_give_the_tip_of_the_robot(read, tmp_path):
+    """The arm at rest, turned by a quarter about its upright axis; the gun may be open."""
+    (tmp_path / 'arm.urdf').write_text(urdf())
+    body = 'Set doGun;\nMoveAbsJ [[90,0,0,0,0,0],[9E9,0,0,0,0,0]],v100,fine,tBell;'
+    (move,) = read(body, robot=Robot.read(tmp_path / 'arm.urdf')).moves
+    x, y, z = TIP_M
+    np.testing.assert_allclose(move.position_m, [-y, x, z], atol=1e-12)
+    assert move.spraying
+
+
+@pytest.mark.parametrize(
+    ('how', 'refused', 'noted'),
+    [
+        ('tBell\\WObj:=wElse', 'it sprays in frames whose relation is not known', 'are left out'),
+        ('tOther', 'it sprays with', 'are taken as those'),
+    ],
+)
+def test_paint_in_two_frames_or_with_two_tools_is_refused(read, how, refused, noted):
+    way = f'MoveL {target(1)},v100,fine,{how};'
+    body = f'{{}}\n{way}\nSet doGun;\nMoveL {target(2)},v100,fine,tBell;'
+    assert any(noted in note for note in read(body.format('')).notes)
+    assert refused in refusal(read, body.format('Set doGun;'))
 
 
 def test_tools_and_parts_in_unusual_hands_are_refused(read):

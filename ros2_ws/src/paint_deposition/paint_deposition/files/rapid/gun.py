@@ -152,7 +152,7 @@ class Gun:
         spraying = self.brush != 0 and not (self.brush is None and self.planes)
         spray, switches, reached = self.now._replace(spraying=spraying), [], 0.0
         if self.planes and track_mm is None:
-            self._values.fail('a plane of SetBrush is followed on straight moves only')
+            self._values.fail('a plane of SetBrush needs a straight move from a known place')
         while self.planes and track_mm is not None:
             plane = self.planes[0]
             begin, end = track_mm[:, plane.axis]

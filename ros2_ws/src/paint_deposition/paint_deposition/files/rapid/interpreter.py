@@ -10,7 +10,7 @@ from lark import Token
 from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine
 from paint_deposition.files.rapid.values import Datum, Unknown, Values
 
-MOST_TURNS = 10_000
+MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
 LEAVING = ('return', 'exit', 'raise', 'goto')
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
 # What moves neither the robot nor the paint: settings of the motion that the film does not see,
@@ -40,6 +40,7 @@ class Interpreter(Values):
     """Runs a program. What acts on the robot and the gun is the business of a subclass."""
 
     _running: tuple[Routine, ...] = ()
+    _count = 0
 
     def act(self, i: Instruction) -> bool:
         """Do what an instruction does to the robot or the gun; whether it does anything."""
@@ -96,6 +97,9 @@ class Interpreter(Values):
 
     def _execute(self, block: Node) -> None:
         for statement in block.children:
+            self._count += 1
+            if self._count > MOST_STATEMENTS:
+                self.fail(f'{MOST_STATEMENTS} statements have run; check the loops')
             if isinstance(statement, Instruction):
                 self._instruction(statement)
             else:
@@ -218,12 +222,13 @@ class Interpreter(Values):
         for body in bodies:
             changed = [*_assigned(body)]
             for i in self.reached(body):
-                if self.acts(i) or i.name in LEAVING:
+                if i.name in CHANGING or i.name.startswith('tpread'):
+                    changed += i.values[:1]
+                elif self.acts(i):
                     self.fail(
                         f'{i.name} in line {i.line} is inside {word.upper()} and depends on '
                         f'{reason}; declare its value, or take the condition out'
                     )
-                changed += i.values[:1] if i.name in CHANGING else []
             for reference in changed:
                 name = reference.children[0]
                 unknown = Unknown(name, f'{name}, which depends on {reason}')

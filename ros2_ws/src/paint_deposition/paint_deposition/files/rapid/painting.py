@@ -19,6 +19,7 @@ MOVES = {
     'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
     'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
 }  # fmt: skip
+TRIGGERS = tuple(f't{number}' for number in range(2, 9))
 MOST_JOINTS = 6
 HOME = frame(NOWHERE)
 
@@ -161,8 +162,8 @@ class Painting(Interpreter):
                 ])  # fmt: skip
             spray = self._gun.in_paint_move(track)
         else:
-            named = [*between, *(at for at in i.options.values() if name_of(at))]
-            spray = self._gun.in_move([self.value(node) for node in named])
+            named = [*between, *(at for name, at in i.options.items() if name in TRIGGERS)]
+            spray = self._gun.in_move([self.known(node) for node in named])
         via_m = poses[0][0] * 1e-3 if targets == 2 else None
         self._append(i, (name, poses[-1]), via_m, parts[targets:], spray)
         if i.name.endswith('do') and self._gun.commanded(i) == 'gun':

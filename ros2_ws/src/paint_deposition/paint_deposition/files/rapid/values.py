@@ -120,18 +120,19 @@ class Values:
     def assign(self, reference: Node, value: Any) -> None:
         """Assign a copy of a value to a datum or a part of it."""
         name, *parts = reference.children
+        value = copy.deepcopy(value) if isinstance(value, list) else value
         datum = self._find(name)
         if not isinstance(datum, Datum):
             if parts:
                 self.fail(f'{name} has no such part to assign to')
             datum = self._global[name] = Datum('')
         if not parts:
-            datum.value, datum.declared = copy.deepcopy(value), None
+            datum.value, datum.declared = value, None
             return
         *keys, last = self._keys(datum.type, parts)
         place = self._part(self._settled(datum), keys, name)
         self._part(place, [last], name)
-        place[last] = copy.deepcopy(value)
+        place[last] = value
 
     # --- expressions, by the names of the grammar
 
