@@ -104,6 +104,7 @@ FUNCTIONS: dict[str, Callable] = {
     'sin': lambda a: math.sin(math.radians(a)), 'cos': lambda a: math.cos(math.radians(a)),
     'tan': lambda a: math.tan(math.radians(a)), 'atan': lambda x: math.degrees(math.atan(x)),
     'atan2': lambda y, x: math.degrees(math.atan2(y, x)),
+    'dim': lambda array, axis: float(np.shape(array)[int(axis) - 1]),
     'offs': _offs, 'reltool': _rel_tool, 'posemult': _pose_mult, 'distance': math.dist,
     'orientzyx': lambda *zyx: _wxyz(Rotation.from_euler('ZYX', zyx, degrees=True)),
 }  # fmt: skip

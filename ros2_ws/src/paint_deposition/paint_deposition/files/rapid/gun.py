@@ -82,7 +82,7 @@ class Gun:
         self._program.note(f'the brushes of the model have to be those of the table {table}')
 
     def do_triggio(self, i: Instruction) -> None:
-        self._values.assign(i.values[0], self._trigger(i))
+        self._values.assign(i.values[0] if i.values else None, self._trigger(i))
 
     do_triggequip = do_triggio
 

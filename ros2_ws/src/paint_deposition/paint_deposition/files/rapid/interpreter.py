@@ -138,7 +138,9 @@ class Interpreter(Values):
             )
         if i.name.startswith('tpread') and i.values:
             self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
-        self._told(i.name, i.line)
+        outputs = i.values[:1] if i.name.startswith(('set', 'reset')) else []
+        names = [part for node in outputs if isinstance(node, Node) for part in node.children[:1]]
+        self._told(' '.join([i.name, *map(str, names)]), i.line)
 
     def _told(self, name: str, line: int) -> None:
         self._passed.setdefault(name, {})[line] = None

@@ -12,7 +12,7 @@ from paint_deposition.files.rapid.gun import Gun, Spray, gun_signal, name_of
 from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
 from paint_deposition.files.rapid.moves import RapidMove, RapidProgram
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
-from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, Unknown
+from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
@@ -96,7 +96,7 @@ class Painting(Interpreter):
         self._fastest_mm_per_s = self._gun.number(i, 1)
 
     def do_pdispset(self, i: Instruction) -> None:
-        self._displacement = self._frame(i.values[0])
+        self._displacement = self._frame(i.values[0] if i.values else None)
 
     def do_pdispoff(self, _: Instruction) -> None:
         self._displacement = HOME
@@ -126,8 +126,9 @@ class Painting(Interpreter):
         joints = len(self._robot.moving_joints)
         if joints > MOST_JOINTS:
             self.fail(f'{self._robot.path} has {joints} joints to its tip, robax {MOST_JOINTS}')
-        robax = self.known(target)[0][:joints]
-        (position_m,), (quaternion,) = self._robot.poses(np.radians([robax]))
+        robax, _ = self._record(self.known(target), 'jointtarget')
+        angles = [self.number(one, 'a joint') for one in self._record(robax, 'robjoint')[:joints]]
+        (position_m,), (quaternion,) = self._robot.poses(np.radians([angles]))
         self.program.note('joint angles give the tip of the URDF, in the frame of its base')
         pose = position_m * 1e3, Rotation.from_quat(quaternion)
         self._append(i, ('', pose), None, how, self._gun.in_move([]))
@@ -152,8 +153,8 @@ class Painting(Interpreter):
         targets = MOVES[i.name]
         parts, between = self._arguments(i, targets)
         name, base = self._work_object(i)
-        base = product(base, self._displacement)
-        poses = [product(base, self._frame(part)) for part in parts[:targets]]
+        displaced = product(base, self._displacement)
+        poses = [product(displaced, self._frame(part)) for part in parts[:targets]]
         if i.name.startswith('paint'):
             track = None
             if targets == 1 and self._at and self._at[0] == name:
@@ -198,9 +199,7 @@ class Painting(Interpreter):
                 f'work object {value.name} is not in the module: poses are in its frame'
             )
             return value.name, HOME
-        if len(value) != 5:
-            self.fail(f'{name_of(node)} is no wobjdata')
-        held, fixed, unit, user, own = value
+        held, fixed, unit, user, own = self._record(value, 'wobjdata')
         if held:
             self.fail(f'the robot holds the work object {name_of(node)}; give a fixed one')
         if fixed or not unit:
@@ -216,9 +215,10 @@ class Painting(Interpreter):
         if isinstance(value, Unknown):
             self.tools[value.name] = None
             return value.name
-        if value[0] is False:
+        held, tool_frame, _ = self._record(value, 'tooldata')
+        if held is False:
             self.fail(f'tool {name} stands still; only tools the robot holds are read')
-        self.tools[name] = self._frame(value[1])
+        self.tools[name] = self._frame(tool_frame)
         return name
 
     def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:
@@ -233,17 +233,15 @@ class Painting(Interpreter):
         else:
             if name_of(node) == 'vmax':
                 self.program.note("vmax is the robot's own; 5 m/s assumed")
-            speed = self._component(node, 0, 4, 'speeddata')
+            speed = self.number(self._record(self.known(node), 'speeddata')[0], 'the speed')
         return min(speed * self._speed_share, self._fastest_mm_per_s) * 1e-3
 
     def _zone_m(self, node: object) -> float:
         """Radius in which the corner is cut; 0 for a stop point."""
-        stop = self.known(node)
-        radius = self._component(node, 1, 7, 'zonedata')
-        return 0.0 if stop[0] else radius * 1e-3
+        stop, radius_mm, *_ = self._record(self.known(node), 'zonedata')
+        return 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
 
-    def _component(self, node: object, index: int, length: int, kind: str) -> float:
-        value = self.known(node)
-        if not isinstance(value, list) or len(value) != length:
-            self.fail(f'a {kind} expected')
-        return self.number(value[index], f'component {index + 1} of a {kind}')
+    def _record(self, value: object, kind: str) -> list:
+        if not isinstance(value, list) or len(value) != len(RECORDS[kind]):
+            self.fail(f'{value!r} is no {kind}')
+        return value

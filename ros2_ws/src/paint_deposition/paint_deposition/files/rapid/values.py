@@ -1,12 +1,11 @@
 """The data of a RAPID program while it runs, and the values of its expressions."""
 
 import copy
+import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
-
-import numpy as np
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.functions import FUNCTIONS, OPERATORS, is_number
@@ -43,7 +42,7 @@ NOWHERE = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]
 PREDEFINED: dict[str, Any] = {
     'tool0': [True, NOWHERE, [0.0]], 'wobj0': [False, True, '', NOWHERE, NOWHERE],
     'vmax': [5000.0, 500.0, 5000.0, 1000.0], 'fine': [True, *6 * [0.0]],
-    'pi': np.pi, 'high': 1.0, 'low': 0.0,
+    'pi': math.pi, 'high': 1.0, 'low': 0.0,
 }  # fmt: skip
 
 
@@ -117,8 +116,10 @@ class Values:
             self.fail(f'{what} is {value!r}; a number expected')
         return value
 
-    def assign(self, reference: Node, value: Any) -> None:
+    def assign(self, reference: Any, value: Any) -> None:
         """Assign a copy of a value to a datum or a part of it."""
+        if not isinstance(reference, Node) or reference.rule != 'reference':
+            self.fail(f'{reference!r} is no name to assign to')
         name, *parts = reference.children
         value = copy.deepcopy(value) if isinstance(value, list) else value
         datum = self._find(name)
@@ -163,11 +164,9 @@ class Values:
         if routine := self.routine(name):
             return self.call(routine, nodes, options)
         if name == 'present':
-            return nodes[0].children[0] in self._local
+            return all(node.children[0] in self._local for node in nodes if isinstance(node, Node))
         values = [self.value(node) for node in nodes]
         named = {option: self.value(node) for option, node in options.items()}
-        if name == 'dim':
-            return float(np.shape(np.array(values[0], dtype=object))[int(values[1]) - 1])
         if name not in FUNCTIONS:
             return Unknown(name, f'{name}(), which is not evaluated here')
         unknown = _one_unknown([*values, *named.values()])
@@ -178,7 +177,7 @@ class Values:
             return function(*values, **named)
         except ZeroDivisionError:
             self.fail('division by zero')
-        except (ArithmeticError, TypeError, ValueError) as error:
+        except (ArithmeticError, IndexError, TypeError, ValueError) as error:
             self.fail(f'{name} of {", ".join(map(repr, values))}: {error}')
 
     # --- data
