@@ -80,9 +80,11 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
 
 
 def holds_joints(path: Path) -> bool:
-    """Whether the motion in a file is that of joints, for which the robot has to be known."""
-    if is_rapid(path) or is_tool_path(path) or is_pose_table(path):
+    """Whether the motion in a file may be that of joints, for which the robot has to be known."""
+    if is_tool_path(path) or is_pose_table(path):
         return False
+    if is_rapid(path):
+        return True
     with open_bag(path) as bag:
         return bool(bag.topics_of(JOINT_TYPE))
 
