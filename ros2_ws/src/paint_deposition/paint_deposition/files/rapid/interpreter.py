@@ -15,17 +15,17 @@ LEAVING = ('return', 'exit', 'raise', 'goto')
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
 # What moves neither the robot nor the paint: settings of the motion that the film does not see,
 # outputs and inputs, text, waiting, interrupts, files.
-PASSED_OVER = frozenset(
-    """
-    accset worldaccset pathaccLim confj confl singarea gripload motionsup softact softdeact
-    actunit deactunit waitwobj dropwobj syncmoveon syncmoveoff
-    setdo set reset setao setgo pulsedo invertdo ioenable iodisable
-    waitdi waitdo waitai waitao waitgi waitgo waituntil waitrob waitsynctask waitload waittime
-    tpwrite tperase tpshow tpreadfk tpreadnum uimsgbox errwrite errlog
-    write writebin open close rewind clkreset clkstart clkstop stop break load unload
-    idelete ienable idisable isleep iwatch isignaldi isignaldo itimer wzdisable wzenable
-    """.lower().split()
-)
+PASSED_OVER = frozenset((
+    'accset', 'worldaccset', 'pathacclim', 'confj', 'confl', 'singarea', 'gripload',
+    'motionsup', 'softact', 'softdeact', 'actunit', 'deactunit', 'waitwobj', 'dropwobj',
+    'syncmoveon', 'syncmoveoff', 'setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo',
+    'invertdo', 'ioenable', 'iodisable', 'waitdi', 'waitdo', 'waitai', 'waitao', 'waitgi',
+    'waitgo', 'waituntil', 'waitrob', 'waitsynctask', 'waitload', 'waittime', 'tpwrite',
+    'tperase', 'tpshow', 'tpreadfk', 'tpreadnum', 'uimsgbox', 'errwrite', 'errlog', 'write',
+    'writebin', 'open', 'close', 'rewind', 'clkreset', 'clkstart', 'clkstop', 'stop', 'break',
+    'load', 'unload', 'idelete', 'ienable', 'idisable', 'isleep', 'iwatch', 'isignaldi',
+    'isignaldo', 'itimer', 'wzdisable', 'wzenable',
+))  # fmt: skip
 
 
 class _Return(Exception):

@@ -1,8 +1,7 @@
 """What a RAPID program does to the robot and the gun: its moves of the TCP."""
 
 from dataclasses import replace
-from pathlib import Path
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -14,6 +13,9 @@ from paint_deposition.files.rapid.moves import RapidMove, RapidProgram
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
 
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
     'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
@@ -24,24 +26,11 @@ MOST_JOINTS = 6
 HOME = frame(NOWHERE)
 
 
-class Robot(Protocol):
-    """The arm of a URDF."""
-
-    @property
-    def path(self) -> Path: ...
-
-    @property
-    def moving_joints(self) -> list[str]: ...
-
-    def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Positions (N, 3) [m] and quaternions (N, 4) of the TCP, from joints (N, J) [rad]."""
-
-
 class Painting(Interpreter):
     """Collects the moves of a `RapidProgram` while it runs."""
 
     def __init__(
-        self, modules: list[Module], start: Routine, signal: str | None, robot: Robot | None
+        self, modules: list[Module], start: Routine, signal: str | None, robot: 'Robot | None'
     ) -> None:
         super().__init__(modules)
         signal = gun_signal(list(self.reached(start.body)), signal, start.source)

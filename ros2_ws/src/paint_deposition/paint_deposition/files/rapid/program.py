@@ -3,13 +3,17 @@
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.moves import RapidProgram, with_one_frame, with_one_tool
-from paint_deposition.files.rapid.painting import Painting, Robot
+from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
 from paint_deposition.motion.programmed import PROGRAMMED, timed
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 MODULES = ('.mod', '.prg', '.sys')
 LIST_OF_MODULES = '.pgf'
@@ -19,7 +23,7 @@ def read_program(
     path: Path | str,
     gun_signal: str | None = None,
     procedure: str | None = None,
-    robot: Robot | None = None,
+    robot: 'Robot | None' = None,
 ) -> RapidProgram:
     """Run a RAPID program, and read its moves.
 
