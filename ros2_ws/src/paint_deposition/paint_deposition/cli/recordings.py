@@ -48,10 +48,10 @@ def inspect_command(
 ) -> None:
     """Show what RECORDING holds, or how the gun ran over a part.
 
-    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
-    targets, moves, speeds, where the gun is switched, and what could not be followed. Of a table
-    of poses (.csv, .tsv, .txt): what was understood. Of gauge readings: also their zeros and
-    repeats. Of a mesh: its size, unit and bodies.
+    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID program (.mod, .prg,
+    .sys, .pgf or a folder of modules): moves, speeds, where the gun is switched, and what was left
+    out. Of a table of poses (.csv, .tsv, .txt): what was understood. Of gauge readings: also their
+    zeros and repeats. Of a mesh: its size, unit and bodies.
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
@@ -94,10 +94,11 @@ def _contents(
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
     source.require_kind(path, kind)
-    if any(value for name, value in motion.items() if name != 'gun_signal'):
+    of_program = {name: motion.pop(name) for name in ('gun_signal', 'procedure')}
+    if any(motion.values()):
         raise click.UsageError(f'how the motion of {kind} is read needs --mesh')
     if is_rapid(path):
-        program = read_program(path, gun_signal=source.gun_signal)
+        program = read_program(path, **of_program)
         return asdict(program), program_as_text(program)
     summary = summarise(path, max_pose_gap_s)
     streams = [source.to_dict() for source in summary.pose_streams]
