@@ -75,7 +75,7 @@ format: build  ## put imports and layout in order
 lock: build  ## pin the newest library versions that all supported Pythons can use
 	$(PIN) requirements/core.in -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
-	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
+	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt --excludes requirements/excluded.txt -o requirements/ros.txt
 
 audit: build  ## look the pinned libraries up among the known vulnerabilities (needs the network)
 	@setup/audit.sh

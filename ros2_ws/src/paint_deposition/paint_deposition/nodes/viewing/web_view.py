@@ -133,7 +133,7 @@ class WebView(PaintNode):
         self._mesh_file, self._mesh_ids = mesh_file, {surface.mesh_id, turned(surface).mesh_id}
         self.scene.show_part(surface)
         self.scene.tell('about', text=Path(mesh_file).name)
-        self._film_um = np.zeros(0, np.float32)
+        self._film_um: np.ndarray = np.zeros(0, np.float32)
         self._show_scale()
 
     def _take_part(self, part: Part) -> None:
