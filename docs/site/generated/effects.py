@@ -1,0 +1,40 @@
+"""The effects of the library and the covariates of learned laws, from their classes."""
+
+from inspect import cleandoc
+
+from generated.markdown import prose, table
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
+
+
+def text() -> str:
+    """A section for each family, in the order in which people look for causes."""
+    parts = []
+    for family in FAMILIES:
+        members = [effect for effect in EFFECTS.values() if effect.family == family]
+        parts += [f'## {family.capitalize()}\n', *map(_section, members)]
+    return '\n'.join(parts)
+
+
+def _section(effect: type[Effect]) -> str:
+    rows = [
+        (
+            f'`{name}`', _what(effect, name), f'{at["low"]:g} to {at["high"]:g}', at['unit'],
+            f'{at["typical"]:g}' if at['role'] == 'amplitude' else f'default {at["neutral"]:g}',
+        )
+        for name, at in effect.parameters().items()
+    ]  # fmt: skip
+    rivals = ', '.join(f'[`{rival}`](#{rival})' for rival in effect.rivals)
+    return '\n'.join([
+        f'### {effect.id}\n',
+        prose(cleandoc(effect.__doc__ or '')),
+        '',
+        f'**Where it shows:** {effect.signature}.',
+        *([f'**Easily taken for:** {rivals}.'] if rivals else []),
+        f'**Source:** {effect.source}.\n',
+        table(('parameter', 'meaning', 'bounds', 'unit', 'typical'), rows),
+    ])  # fmt: skip
+
+
+def _what(effect: type[Effect], name: str) -> str:
+    return effect.model_fields[name].description.rpartition(' [')[0]
