@@ -29,7 +29,7 @@ warnings.filterwarnings('ignore', category=DeprecationWarning, module='lark')
 MAKERS = {
     module.__name__.rpartition('.')[2]: module.text
     for module in (commands, effects, files_, messages, nodes, python)
-}
+} | {'covariates': effects.covariates}
 LANGUAGES = {'.yaml': 'yaml', '.py': 'python', '.xml': 'xml', '.json': 'json', '.csv': 'text'}
 
 

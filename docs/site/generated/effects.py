@@ -5,6 +5,7 @@ from inspect import cleandoc
 from generated.markdown import prose, table
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
+from paint_deposition.effects.learned.curves import CURVES
 
 
 def text() -> str:
@@ -14,6 +15,21 @@ def text() -> str:
         members = [effect for effect in EFFECTS.values() if effect.family == family]
         parts += [f'## {family.capitalize()}\n', *map(_section, members)]
     return '\n'.join(parts)
+
+
+def covariates() -> str:
+    """What a curve may be learned over."""
+    rows = [
+        (f'`{law.covariate}`', law.unit, law.over, _acts_on(law), ', '.join(law.kinds))
+        for law in CURVES.values()
+    ]
+    return table(('covariate', 'unit', 'what it is', 'acts on', 'kinds'), rows)
+
+
+def _acts_on(law: type[Effect]) -> str:
+    if law.flux_factor is not None:
+        return 'flux'
+    return 'film' if law.on_path is Effect.on_path else 'flow'
 
 
 def _section(effect: type[Effect]) -> str:
