@@ -19,8 +19,6 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
-import numba
-
 # One for all of linear algebra: its matrices are small.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
@@ -32,6 +30,7 @@ from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.kernel.threads import THREADS
 
 READINGS_A_PART, REPEATS = 79, 12
 MODEL = DepositionModel()
@@ -127,7 +126,7 @@ def main() -> None:
     print(
         f'{len(campaign.readings)} readings at {len(campaign)} points, '
         f'{len(campaign.experiments)} recordings, '
-        f'{numba.get_num_threads()} threads, load {os.getloadavg()[0]:.1f}; best of {rounds}'
+        f'{THREADS} threads, load {os.getloadavg()[0]:.1f}; best of {rounds}'
     )
     diagnose(campaign, MODEL, EFFECTS)
     films(campaign, rounds)

@@ -18,6 +18,7 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from unittest.mock import patch
 
 import numba
 import numpy as np
@@ -28,6 +29,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.kernel import threads
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -153,12 +155,8 @@ def kernel_um(case: Case, integrator: FilmIntegrator) -> np.ndarray:
 
 def single_threaded(run: Callable[[], np.ndarray]) -> np.ndarray:
     """Run on one thread."""
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1)
-    try:
+    with patch.object(threads, 'THREADS', 1):
         return run()
-    finally:
-        numba.set_num_threads(threads)
 
 
 def measure(case: Case, rounds: int) -> dict[str, float]:
@@ -167,14 +165,14 @@ def measure(case: Case, rounds: int) -> dict[str, float]:
     double = FilmIntegrator(case.points, MODEL, 'double')
     step = max(1, len(case.path) // NUMPY_STEPS)
     some = slice(0, None, step)
-    threads = numba.get_num_threads()
+    count = threads.THREADS
     runs = {
         'NumPy, double, 1 thread': lambda: numpy_um(case, some),
-        f'plain loop, double, {threads} threads': lambda: plain_um(case),
+        f'plain loop, double, {count} threads': lambda: plain_um(case),
         'kernel, double, 1 thread': lambda: single_threaded(lambda: kernel_um(case, double)),
-        f'kernel, double, {threads} threads': lambda: kernel_um(case, double),
+        f'kernel, double, {count} threads': lambda: kernel_um(case, double),
         'kernel, single, 1 thread': lambda: single_threaded(lambda: kernel_um(case, single)),
-        f'kernel, single, {threads} threads': lambda: kernel_um(case, single),
+        f'kernel, single, {count} threads': lambda: kernel_um(case, single),
     }
     best = dict.fromkeys(runs, math.inf)
     films = {name: run() for name, run in runs.items()}

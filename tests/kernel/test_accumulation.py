@@ -1,12 +1,12 @@
 """The compiled loop against eqs. (1) and (2) in NumPy."""
 
-import numba
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
+from paint_deposition.kernel import threads
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
@@ -88,17 +88,14 @@ def test_what_is_left_out_of_reach_is_nothing(precision):
     assert error.max() < 1e-6 * expected.max()
 
 
-def test_the_number_of_threads_changes_no_bit():
+def test_the_number_of_threads_changes_no_bit(monkeypatch):
     path, _ = spray_path(weaving(np.arange(0.0, 2.0, 0.02)))
     points, model = lying_plane(count=80), DepositionModel()
     assert len(points) * len(path) > FEW_RAYS  # fewer are painted by one thread
-    threads = numba.get_num_threads()
     films = []
-    try:
-        for count in (1, 2):
-            numba.set_num_threads(count)
-            films.append(film_um(points, path, model))
-    finally:
-        numba.set_num_threads(threads)
+    for count in (1, 2, 3):
+        monkeypatch.setattr(threads, 'THREADS', count)
+        films.append(film_um(points, path, model))
     assert films[0].max() > 1.0
     assert np.array_equal(films[0], films[1])
+    assert np.array_equal(films[0], films[2])

@@ -5,13 +5,10 @@ come in. The film is the same to the last bit.
 """
 
 import copy
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
-import numba
 import numpy as np
 
 from paint_deposition.effects.base import Effect, PathContext
@@ -26,6 +23,7 @@ from paint_deposition.film.layout import (
 from paint_deposition.film.lines_of_sight import LinesOfSight, Sight
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
+from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
@@ -35,23 +33,10 @@ Precision = Literal['single', 'double']
 ANY_REACH_M = 1e6
 # Sub-steps handed to the kernel at once, so that long work can report progress.
 BATCH = 2048
-# The simplest of the compiler's thread pools ends the process when two threads enter it at once.
-_KERNEL_LOCK = threading.Lock()
 # Fewer rays, points times sub-steps, are painted before other threads wake.
 FEW_RAYS = 500_000
 # Where the thickest film is thinner no paint landed: no gauge shows it.
 NO_PAINT_UM = 0.05
-
-
-@contextmanager
-def _threads(rays: int) -> Iterator[None]:
-    """Paint few rays in this thread alone; the film does not depend on it."""
-    threads = numba.get_num_threads()
-    numba.set_num_threads(1 if rays < FEW_RAYS else threads)
-    try:
-        yield
-    finally:
-        numba.set_num_threads(threads)
 
 
 @dataclass(frozen=True)
@@ -211,15 +196,14 @@ class FilmIntegrator:
             blocks.spheres, blocks.bounds, steps.rows, steps.sight.first, steps.sight.tracing,
             steps.brush, constants.astype(self._real), self._parameters,
         )  # fmt: skip
-        kernel: Any = compile_kernel(*self._variant, apart, self._parallel)
-        if not kernel.signatures:
-            # Before the lock is taken: it may last seconds, and others paint meanwhile.
-            kernel.compile(tuple(map(numba.typeof, arguments)))
-        if self._parallel:
-            with _KERNEL_LOCK, _threads(len(steps) * len(self._film)):
-                kernel(*arguments)
-        else:
-            kernel(*arguments)
+        kernel = compile_kernel(*self._variant, apart)
+
+        def paint(first_block: int, last_block: int) -> None:
+            kernel(first_block, last_block, *arguments)
+
+        many = self._parallel and len(steps) * len(self._film) >= FEW_RAYS
+        count = len(blocks.spheres)
+        shared_among_threads(count, paint, least_share=1 if many else count)
 
     def _in_order(self, values: np.ndarray) -> np.ndarray:
         """Values (..., V) of the sorted points in the order of the caller's."""

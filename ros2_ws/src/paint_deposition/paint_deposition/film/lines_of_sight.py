@@ -5,11 +5,12 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads, njit
+from numba import njit
 
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
 from paint_deposition.kernel.code_cache import named_for_its_code
 from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
+from paint_deposition.kernel.threads import THREADS
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
@@ -87,7 +88,7 @@ class LinesOfSight:
             )  # fmt: skip
             seen[places] = self._obstacle.sees(traced[tracings], self._positions_m[points])
 
-        with ThreadPoolExecutor(get_num_threads()) as threads:
+        with ThreadPoolExecutor(THREADS) as threads:
             list(threads.map(trace, _parts(sizes)))
         return Sight(seen, first, tracing), traced[-1] if len(traced) else last_m
 

@@ -1,19 +1,14 @@
 """Surface points laid out for the kernel: neighbours together, structure of arrays."""
 
-from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import get_num_threads
 
 # Large blocks keep the SIMD loop busy; few points are cut finer, to share them among threads.
 LARGEST_BLOCK = 256
 SMALLEST_BLOCK = 32
 # Points that a SIMD loop takes at once.
 LANES = 16
-# Fewer rows are done before a second thread wakes.
-LEAST_SHARE = 2048
 # Threads take runs of blocks; neighbours lie this far apart, for work where the gun is shared.
 SPREAD = 8
 
@@ -105,14 +100,3 @@ def _neighbours(points: np.ndarray, rows: np.ndarray, size: int) -> list[np.ndar
     for part in (split[:half], split[half:]):
         found += _neighbours(points.take(part, axis=1), rows[part], size)
     return found
-
-
-def shared_among_threads(count: int, fill: Callable[[int, int], None]) -> None:
-    """Call ``fill(start, stop)`` for shares of ``count`` rows, each in a thread of its own.
-
-    ``fill`` is compiled and lets go of Python's lock. A second thread wakes for many rows only.
-    """
-    shares = max(1, min(get_num_threads(), count // LEAST_SHARE))
-    bounds = np.linspace(0, count, shares + 1).astype(np.int64)
-    with ThreadPoolExecutor(shares) as threads:
-        list(threads.map(fill, bounds[:-1], bounds[1:]))

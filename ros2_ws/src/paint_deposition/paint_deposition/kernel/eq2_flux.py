@@ -15,7 +15,7 @@ from types import FunctionType
 from typing import Any
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
@@ -146,15 +146,16 @@ def paint_block(
 
 
 def accumulate(
-    p, n, seen, film, recent, terms, done, spheres, bounds, steps, first, tracing, brush,
-    constants, parameters,
+    first_block, last_block, p, n, seen, film, recent, terms, done, spheres, bounds, steps, first,
+    tracing, brush, constants, parameters,
 ):  # fmt: skip
-    """Add the path's film to ``film``.
+    """Add the path's film to ``film``, on the points of the blocks before ``last_block``.
 
     The newest contributions stay in ``recent``, in the points' precision, and move into
     ``film`` every FLUSH sub-steps of the whole path, wherever the calls were cut.
 
     Args:
+        first_block, last_block: the blocks to paint, the second not among them.
         p, n: (3, V) points and outward normals, single or double precision, in blocks.
         seen: (N,) uint8, 1 where a point is seen, in runs of a block's points.
         film: (V,) float64 [um], updated in place.
@@ -171,7 +172,7 @@ def accumulate(
         constants: (B, 11) of each brush, from ``layout.model_constants``.
         parameters: (B, n) of the laws for each brush, or one unused number.
     """
-    for block in prange(len(spheres)):
+    for block in range(first_block, last_block):
         paint_block(
             block, p, n, seen, film, recent, terms, done, spheres, bounds, steps, first, tracing,
             brush, constants, parameters,
@@ -185,7 +186,6 @@ def compile_kernel(
     shadowed: bool,
     real: type,
     apart: bool = False,
-    parallel: bool = True,
 ) -> Callable[..., None]:
     """The kernel with these laws inlined.
 
@@ -195,7 +195,6 @@ def compile_kernel(
         shadowed: whether lines of sight count.
         real: precision of the points, np.float32 or np.float64.
         apart: whether the film's terms are kept apart instead of summed.
-        parallel: whether blocks are shared among threads.
     """
     first_scale = sum(count for _, count in flux_factors)
     names = {
@@ -209,13 +208,12 @@ def compile_kernel(
     }
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
-    variant = counts, shadowed, real.__name__, apart, parallel
+    variant = counts, shadowed, real.__name__, apart
     block = named_for_its_code(_variant(paint_block, names), laws, *variant)
     block = njit(fastmath=True, error_model='numpy')(block)
     whole = _variant(accumulate, names | {'paint_block': block})
     whole = named_for_its_code(whole, laws, *variant)
-    options = {'parallel': parallel, 'nogil': True, 'fastmath': True, 'error_model': 'numpy'}
-    return njit(cache=True, **options)(whole)
+    return njit(cache=True, nogil=True, fastmath=True, error_model='numpy')(whole)
 
 
 def _variant(template: Any, names: dict[str, object]) -> FunctionType:

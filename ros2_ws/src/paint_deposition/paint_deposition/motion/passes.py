@@ -34,6 +34,7 @@ from paint_deposition.motion.strokes import (
     LATEST_NOTICE_M,
     carry,
     cosine,
+    difference,
     dot,
     leaves,
     take_in,
@@ -100,8 +101,9 @@ def _spray(state, heading):
 @njit
 def _on_another_track(state):
     """Whether the gun has left the line on which it closed, seen along the tool axis."""
-    between = state.position - state.closed_at
-    between -= dot(between, state.normal) * state.normal
+    x, y, z = difference(state.position, state.closed_at)
+    off = dot((x, y, z), state.normal)
+    between = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
     if dot(between, between) < HEADING_STEP_M**2:
         return False
     return cosine(between, state.carried) < COS_TRACK

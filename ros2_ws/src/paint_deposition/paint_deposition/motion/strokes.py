@@ -35,6 +35,12 @@ def dot(a, b):
 
 
 @njit
+def difference(a, b):
+    """Vector (3,) from b to a, as three numbers: arrays take seconds to compile."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
+
+
+@njit
 def cosine(a, b):
     """Cosine of the angle between two vectors (3,); 0 if one of them has no length."""
     lengths = math.sqrt(dot(a, a) * dot(b, b))
@@ -101,11 +107,11 @@ def _begin_anew(state, position):
 @njit
 def _advance(state, position):
     """Follow the path to its next position; length of the heading step that ends here, or 0."""
-    moved = position - state.position
+    moved = difference(position, state.position)
     travel = math.sqrt(dot(moved, moved))
     state.since_anchor_m += travel
     state.since_earlier_m += travel
-    step = position - state.anchor
+    step = difference(position, state.anchor)
     length = math.sqrt(dot(step, step))
     for k in range(3):
         state.position[k] = position[k]
@@ -133,7 +139,7 @@ def _take_step(state, length):
 @njit
 def _behind_turn_m(state):
     """How far back the stroke turned, if straight up to there and straight since."""
-    chord = state.position - state.earlier
+    chord = difference(state.position, state.earlier)
     square = dot(chord, chord)
     along = math.sqrt(square) * cosine(chord, state.mean)
     detour = state.since_earlier_m - along

@@ -45,10 +45,13 @@ def slerp(q0, q1, t):
 @njit(cache=True)
 def write_rotation(out, quaternion):
     """Write the rotation matrix of a unit quaternion, scalar last, into ``out`` (3, 3)."""
-    x, y, z, w = quaternion
-    out[0] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)
-    out[1] = 2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
-    out[2] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)
+    x, y, z, w = quaternion[0], quaternion[1], quaternion[2], quaternion[3]
+    # Number by number: assigned as a row each, these nine take seconds to compile.
+    out[0, 0], out[0, 1] = 1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w)
+    out[0, 2], out[1, 0] = 2.0 * (x * z + y * w), 2.0 * (x * y + z * w)
+    out[1, 1], out[1, 2] = 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)
+    out[2, 0], out[2, 1] = 2.0 * (x * z - y * w), 2.0 * (y * z + x * w)
+    out[2, 2] = 1.0 - 2.0 * (x * x + y * y)
 
 
 @njit(cache=True)

@@ -4,8 +4,9 @@ import math
 
 import numpy as np
 from numba import njit
+from scipy.sparse import coo_array
 
-from paint_deposition.kernel.blocks import shared_among_threads
+from paint_deposition.kernel.threads import shared_among_threads
 
 # Near vertices shape the parabola by far the most.
 NEARNESS = 12.0
@@ -37,21 +38,12 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     return normals
 
 
-@njit(cache=True, nogil=True)
-def _corners_at(faces, count):
+def _corners_at(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
     """Corners 3 f + k at the vertices, those of v are ``corner[first[v] : first[v + 1]]``."""
-    vertices = faces.ravel()
-    first = np.zeros(count + 2, dtype=np.int32)
-    for v in vertices:
-        first[v + 2] += 1
-    for v in range(count):
-        first[v + 2] += first[v + 1]
-    corner = np.empty(len(vertices), dtype=np.int32)
-    for c in range(len(vertices)):
-        v = vertices[c]
-        corner[first[v + 1]] = c
-        first[v + 1] += 1
-    return first[:-1], corner
+    corners = np.arange(faces.size)
+    one = np.ones(faces.size, dtype=np.int8)
+    at = coo_array((one, (faces.ravel(), corners)), shape=(count, faces.size)).tocsr()
+    return at.indptr, at.indices
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
@@ -65,7 +57,8 @@ def _cross(a, b, out):
 @njit(cache=True, nogil=True, error_model='numpy')
 def _mean_normal(vertices, faces, corners, out):
     ahead, behind, across = np.empty(3), np.empty(3), np.empty(3)
-    out[:] = 0.0
+    for axis in range(3):
+        out[axis] = 0.0
     for c in corners:
         f, k = c // 3, c % 3
         here = faces[f, k]
@@ -105,7 +98,7 @@ def _gather(faces, first, corner, v, seen, passed, near):
 @njit(cache=True, nogil=True, error_model='numpy')
 def _equations(vertices, v, normal, near, system):
     """Fill ``system`` (5, 6) with the normal equations of the parabola over the plane at v."""
-    n0, n1, n2 = normal
+    n0, n1, n2 = normal[0], normal[1], normal[2]
     # Duff et al., Building an Orthonormal Basis, Revisited, JCGT 6(1), 2017.
     sign = math.copysign(1.0, n2)
     a = -1.0 / (sign + n2)
@@ -120,7 +113,9 @@ def _equations(vertices, v, normal, near, system):
         farthest2 = max(farthest2, o0 * o0 + o1 * o1 + o2 * o2)
     size = math.sqrt(farthest2)
     terms = np.empty(TERMS + 1)
-    system[:] = 0.0
+    for i in range(TERMS):
+        for j in range(TERMS + 1):
+            system[i, j] = 0.0
     for w in near:
         o0 = (vertices[w, 0] - vertices[v, 0]) / size
         o1 = (vertices[w, 1] - vertices[v, 1]) / size
@@ -144,13 +139,13 @@ def _equations(vertices, v, normal, near, system):
 @njit(cache=True, nogil=True, error_model='numpy')
 def _solved(system, work):
     """Slopes along both axes, and the condition of the equations (Gauss and Jordan)."""
-    work[:] = 0.0
-    work[:, : TERMS + 1] = system
     size2 = 0.0
     for i in range(TERMS):
-        work[i, TERMS + 1 + i] = 1.0
         for j in range(TERMS):
             size2 += system[i, j] * system[i, j]
+            work[i, TERMS + 1 + j] = 1.0 if i == j else 0.0
+        for j in range(TERMS + 1):
+            work[i, j] = system[i, j]
     for k in range(TERMS):
         pivot = k
         for i in range(k + 1, TERMS):

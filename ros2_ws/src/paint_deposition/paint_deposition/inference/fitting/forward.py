@@ -6,7 +6,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
 
-import numba
 import numpy as np
 from scipy.linalg import block_diag
 
@@ -16,6 +15,7 @@ from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, ga
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES
+from paint_deposition.kernel.threads import THREADS
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
 
@@ -44,7 +44,7 @@ class Forward:
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
         # Where the integral is short, threads wait for each other longer than for it.
         rays = sum(len(experiment) * len(experiment.path) for experiment in campaign.experiments)
-        threads = min(numba.get_num_threads(), len(self._parts)) if rays > FEW_RAYS else 1
+        threads = min(THREADS, len(self._parts)) if rays > FEW_RAYS else 1
         self._pool = ThreadPoolExecutor(threads) if threads > 1 else None
 
     def predict_um(self, model: DepositionModel) -> np.ndarray:

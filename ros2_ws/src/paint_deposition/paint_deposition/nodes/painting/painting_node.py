@@ -7,7 +7,6 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
-import numba
 import numpy as np
 from rclpy.timer import Timer
 
@@ -84,9 +83,6 @@ class PaintingNode(ManagedNode, ABC):
         self._abort_repainting()
 
     def _load_files(self) -> None:
-        # Motion arrives in batches of milliseconds, between which further threads would only
-        # spin. A thread that repaints still uses them.
-        numba.set_num_threads(1)
         self.gun_names: list[str] = self.values['atomizers'] or ['']
         self.mesh_file: str = self.values['mesh_file']
         # (computing time, duration of the motion) of the last batches of each gun.
