@@ -9,20 +9,11 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import assert_refused, installed_paint, paint
-from paint_deposition.cli.results_folder import MARKER
+from cli.command import assert_refused, paint
 from paint_deposition.files.model_file import read_model_file
-from paint_deposition.inference.diagnosis.model_space import SURE
-from paint_deposition.inference.diagnosis.verdict import percent
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
 HIDDEN = 'incidence_attraction'
-
-
-@pytest.fixture(scope='module')
-def diagnosed(tmp_path_factory):
-    folder = tmp_path_factory.mktemp('diagnosed')
-    return installed_paint('diagnose', CAMPAIGN, '-o', folder), folder
 
 
 @pytest.fixture(scope='module')
@@ -44,64 +35,6 @@ def door_alone(tmp_path_factory):
 def table(path) -> list[dict[str, str]]:
     with path.open(newline='') as file:
         return list(csv.DictReader(file))
-
-
-@pytest.mark.slow
-def test_diagnose_names_the_hidden_effect(diagnosed):
-    done, folder = diagnosed
-    assert done.returncode == 0, done.stderr
-    model, verdict, *_ = done.stdout.splitlines()
-    assert model == 'model: fitted to the campaign, from a 50 mm bell'
-    assert verdict.startswith(f'effect missing: The readings show {HIDDEN}.')
-    assert str(folder / 'report.html') in done.stdout
-    content = json.loads((folder / 'diagnosis.json').read_text())
-    probability = content['classes'][0]['probability']
-    assert probability > SURE
-    assert f'added {HIDDEN}: {percent(probability)}\n' in done.stdout
-    assert content['verdict'] == 'effect_missing'
-    assert content['accepted'] == [HIDDEN]
-    assert content['rmse_um']['holdout_after'] < content['rmse_um']['holdout_before']
-    # A model with it is expected beside one without: both can be simulated.
-    before, after = (
-        read_model_file(folder / f'{name}.yaml') for name in ('model_before', 'model')
-    )
-    assert before.model.effects == ()
-    assert [effect.id for effect in after.model.effects] == [HIDDEN]
-    assert [step['added'] for step in after.history] == ['pattern', HIDDEN]
-    for name in ('panel', 'door'):
-        assert f'{name}: {content["geometry"][name]["sentence"]}' in done.stdout
-
-
-@pytest.mark.slow
-def test_diagnose_writes_all_that_it_says(diagnosed):
-    _, folder = diagnosed
-    names = {path.name for path in folder.iterdir()}
-    assert names == {
-        MARKER, 'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv',
-        'report.html', 'comparison.png',
-    }  # fmt: skip
-    rows = table(folder / 'residuals.csv')
-    readings = table(SAMPLES / 'measured_door/panel.csv') + table(
-        SAMPLES / 'measured_door/door.csv'
-    )
-    measured = [f'{float(reading["thickness_um"]):.3f}' for reading in readings]
-    assert [row['thickness_um'] for row in rows] == measured
-    residual = [float(row['thickness_um']) - float(row['predicted_um']) for row in rows]
-    assert [float(row['residual_um']) for row in rows] == pytest.approx(residual, abs=2e-3)
-
-
-@pytest.mark.slow
-def test_a_diagnosed_model_predicts_readings_never_seen(diagnosed, tmp_path):
-    _, folder = diagnosed
-    errors = {}
-    for name in ('model_before', 'model'):
-        done = paint('compare', SAMPLES / 'measured_door/unseen.yaml', '--model',
-                     folder / f'{name}.yaml', '-o', tmp_path / name, '--json')  # fmt: skip
-        assert done.returncode == 0, done.stderr
-        content = json.loads(done.stdout)
-        assert content == json.loads((tmp_path / name / 'comparison.json').read_text())
-        errors[name] = next(m for m in content['misfits'] if m['kind'] == 'experiment')['rmse_um']
-    assert errors['model'] < 0.85 * errors['model_before']
 
 
 @pytest.mark.slow

@@ -10,7 +10,8 @@ from paint_deposition.effects.learned.curves import CURVES
 
 def text() -> str:
     """A section for each family, in the order in which people look for causes."""
-    parts = []
+    rows = [(f'[`{effect.id}`](#{effect.id})', effect.signature) for effect in EFFECTS.values()]
+    parts = [table(('effect', 'where it shows'), rows)]
     for family in FAMILIES:
         members = [effect for effect in EFFECTS.values() if effect.family == family]
         parts += [f'## {family.capitalize()}\n', *map(_section, members)]
@@ -45,9 +46,8 @@ def _section(effect: type[Effect]) -> str:
         f'### {effect.id}\n',
         prose(cleandoc(effect.__doc__ or '')),
         '',
-        f'**Where it shows:** {effect.signature}.',
-        *([f'**Easily taken for:** {rivals}.'] if rivals else []),
-        f'**Source:** {effect.source}.\n',
+        *([f'* **Easily taken for:** {rivals}'] if rivals else []),
+        f'* **Source:** {effect.source}\n',
         table(('parameter', 'meaning', 'bounds', 'unit', 'typical'), rows),
     ])  # fmt: skip
 
