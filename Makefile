@@ -72,7 +72,7 @@ bench-line: build  ## watch 500 virtual parts for a step and an effect too small
 docs: build  ## build the site of the documentation into runs/site, links checked
 	@.venv/bin/uv pip install --quiet --require-hashes --python .venv/bin/python -r requirements/docs.txt
 	@$(IN_ENVIRONMENT) NO_MKDOCS_2_WARNING=true mkdocs build --quiet
-	@echo 'Built: runs/site/index.html'
+	@echo 'Built: runs/site/index.html; the search needs python -m http.server --directory runs/site'
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .

@@ -15,6 +15,10 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
+MODEL = """
+A model has `planar` or `brushes` by their numbers, `projection`, a list of
+[`effects`](effects.md), and a `name`; a fit adds `uncertainty`, `history` and `posterior`.
+"""
 
 
 def text() -> str:
@@ -23,7 +27,7 @@ def text() -> str:
     aliases = [(f'`{name}`', ', '.join(words)) for name, words in ALIASES.items()]
     return '\n'.join([
         '## Model\n',
-        _keys(model_file._Sections),
+        MODEL,
         '### `planar`\n', _keys(PlanarPattern),
         '### `projection`\n', _keys(model_file.ProjectionSection),
         '### A brush of `brushes`\n', 'Also `planar`.\n', _keys(SetPoints),
@@ -57,13 +61,12 @@ def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
 def _bounds(said: dict[str, Any]) -> str:
     """The range of a number, whether or not it may be left out."""
     for kind in (said, *said.get('anyOf', ())):
-        low, high = kind.get('minimum'), kind.get('maximum')
-        above = kind.get('exclusiveMinimum')
-        first = f'above {above:g}' if above is not None else '' if low is None else f'{low:g}'
-        if first or high is not None:
-            return f'{first} to {high:g}' if high is not None else f'{first} or more' if not (
-                above is not None
-            ) else first  # fmt: skip
+        low, above = kind.get('minimum'), kind.get('exclusiveMinimum')
+        high = kind.get('maximum')
+        if above is not None:
+            return f'above {above:g}' if high is None else f'above {above:g} to {high:g}'
+        if low is not None:
+            return f'{low:g} or more' if high is None else f'{low:g} to {high:g}'
     return ''
 
 
@@ -71,4 +74,6 @@ def _default(said: dict[str, Any], key: str, schema: dict[str, Any]) -> str:
     if key in schema.get('required', ()):
         return 'required'
     value = said.get('default')
-    return '' if value in (None, '', [], {}) or isinstance(value, dict) else f'`{value}`'
+    if isinstance(value, bool):
+        return f'`{value}`'.lower()
+    return f'`{value}`' if isinstance(value, (int, float)) or value else ''
