@@ -76,4 +76,5 @@ def _default(said: dict[str, Any], key: str, schema: dict[str, Any]) -> str:
     value = said.get('default')
     if isinstance(value, bool):
         return f'`{value}`'.lower()
-    return f'`{value}`' if isinstance(value, (int, float)) or value else ''
+    shown = value not in (None, '', [], {}) and not isinstance(value, dict)
+    return f'`{value}`' if shown else ''
