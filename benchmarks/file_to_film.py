@@ -5,8 +5,7 @@
 The part is the side of a body, 4.5 m by 1.5 m, crowned, with a belt line and a window, meshed
 evenly, as a binary STL; the gun passes over it for 60 s, recorded at 250 Hz. Every size runs in a
 process of its own. Times of the processor add up all threads; memory is the most that the process
-held up to then. The stages do without the cache of parts; the command runs twice, first on a new
-part and then on the part seen before.
+held up to then.
 
 Then what painting costs against the length of the path, the rate of its log and with lines of
 sight traced, each in a process of its own, and the powers of vertices and length that it follows.
@@ -145,11 +144,10 @@ def run_command(folder: Path) -> dict[str, float]:
 
 
 def stages_in_a_process(folder: Path, occlusion: bool = False) -> dict[str, Any]:
-    """The stages, without the cache of parts."""
+    """The stages, in a process of their own."""
     inner = [sys.executable, __file__, '--stages-of', str(folder)]
     inner += ['--occlusion'] if occlusion else []
-    environment = os.environ | {'PAINT_CACHE_DIR': ''}
-    done = subprocess.run(inner, stdout=subprocess.PIPE, check=True, env=environment)
+    done = subprocess.run(inner, stdout=subprocess.PIPE, check=True)
     return json.loads(done.stdout)
 
 
@@ -162,14 +160,12 @@ def compile_first() -> None:
 
 
 def measure(vertices: int) -> dict[str, Any]:
-    """Stages in a process, then the command on a new part and on one seen before."""
+    """Stages in a process, then the command."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         write_inputs(folder, vertices)
         told = stages_in_a_process(folder)
-        os.environ['PAINT_CACHE_DIR'] = str(folder / 'cache')
-        for which in ('new part', 'part seen before'):
-            told['stages'].append({'stage': f'paint simulate, {which}', **run_command(folder)})
+        told['stages'].append({'stage': 'paint simulate', **run_command(folder)})
     return told
 
 

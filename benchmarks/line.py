@@ -180,7 +180,7 @@ def main(count: int, length: int, redraws: int, seed: int) -> None:
               f'part, {cause["all_parts"]:.1f} in all')  # fmt: skip
     cases, *_ = line_cases(folder)
     table = ResultCache(output / 'finished').table(case.digest for case in cases)
-    parts = repeated(measured_parts(table.to_pydict()), length)
+    parts = repeated(measured_parts(table.to_pylist()), length)
     step_at = 3 * length // 5
     hidden = replace(hidden, step_at=step_at)
     began = time.process_time()

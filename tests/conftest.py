@@ -15,8 +15,6 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # Two threads on any machine: enough to see whether they change the film, and not so many that
 # tests on several cores get in each other's way.
 os.environ.setdefault('NUMBA_NUM_THREADS', '2')
-# Parts are prepared, not taken from what an earlier run kept.
-os.environ['PAINT_CACHE_DIR'] = ''
 
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'

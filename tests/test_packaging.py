@@ -21,8 +21,8 @@ from paint_deposition.nodes import executables
 
 PACKAGE = 'paint_deposition'
 NODES = (
-    'atomizer_source', 'bag_player', 'deposition_simulator', 'index_planner', 'model_comparison',
-    'run_recorder',
+    'atomizer_source', 'bag_player', 'deposition_simulator', 'egm_source', 'index_planner',
+    'model_comparison', 'opcua_source', 'run_recorder', 'rws_source',
 )  # fmt: skip
 SOURCES = Path(__file__).resolve().parent.parent / 'ros2_ws' / 'src'
 

@@ -14,6 +14,9 @@ from paint_deposition.nodes.recording.recorder_parameters import default_topics
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
+from paint_deposition.nodes.robot.egm_source import EgmSource
+from paint_deposition.nodes.robot.opcua_source import OpcuaSource
+from paint_deposition.nodes.robot.rws_source import RwsSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from robot_arm import urdf
 
@@ -28,6 +31,9 @@ NODES = {
     'index_planner': (IndexPlanner, PANEL),
     'bag_player': (BagPlayer, {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}),
     'atomizer_source': (AtomizerSource, {}),
+    'egm_source': (EgmSource, {'port': 16510}),
+    'opcua_source': (OpcuaSource, {'trigger': 'i=1', 'url': 'opc.tcp://127.0.0.1:9'}),
+    'rws_source': (RwsSource, {'trigger': 'doGun', 'url': 'http://127.0.0.1:9'}),
     'run_recorder': (RunRecorder, {'name': 'run'}),
 }
 # Where tf2 is installed, and with use_sim_time.

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
@@ -10,7 +9,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.comparison import draw_profile
+from paint_deposition.report.pictures.comparison import comparison_figure
 from small_campaign import small_campaign
 
 
@@ -19,9 +18,8 @@ def test_thicker_columns_are_not_cut_off_by_a_thin_one(tmp_path):
     study = Study.of(small_campaign(tmp_path, experiments=('door',), style='columns'))
     data = ReportData((compare(study, DepositionModel()),))
     thin = data.profiles[0]
-    thick = replace(thin, lines_um=[2.0 * line for line in thin.lines_um])
-    figure, row = plt.subplots(1, 2, sharey=True)
-    for axes, profile in zip(row, (thin, thick), strict=True):
-        draw_profile(axes, data, profile)
-    assert row[0].get_ylim()[1] > np.max(thick.lines_um[0])
-    plt.close(figure)
+    thick = replace(thin, lines_um=2.0 * thin.lines_um)
+    vars(data)['profiles'] = [thin, thick]
+    figure = comparison_figure(data)
+    tops_um = [film.get_ylim()[1] for film in figure.axes[::2]]
+    assert tops_um[0] == tops_um[1] > np.max(thick.lines_um[0])

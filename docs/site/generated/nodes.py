@@ -28,8 +28,11 @@ NEEDED = {
         'mesh_file': 'panel.stl', 'max_edge_length_m': 0.5,
         'measurements_file': 'panel_study/panel_577.csv',
     },
-    'index_planner': {},
     'atomizer_source': {'trigger': '/gun_open'},
+    # On this machine, where nobody answers.
+    'egm_source': {'address': '127.0.0.1'},
+    'opcua_source': {'trigger': 'ns=2;s=Gun.Open'},
+    'rws_source': {'url': 'http://127.0.0.1:9', 'trigger': 'doGun'},
 }  # fmt: skip
 # Every node of rclpy has these.
 OF_RCLPY = ('/rosout', '/parameter_events')

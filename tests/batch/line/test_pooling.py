@@ -3,12 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pyarrow as pa
 import pytest
 
 from batch.line.synthetic import FIRST_S, HOUR_S, SIGMA_UM, parts
 from paint_deposition.batch.line.changes import Series, changes_of, series_of
-from paint_deposition.batch.line.pooling import amplitudes, off_model, pooled
+from paint_deposition.batch.line.pooling import amplitudes, pooled
+from paint_deposition.batch.line.result import Line
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 
 pytestmark = pytest.mark.slow
@@ -47,10 +50,13 @@ def test_a_misfit_that_all_parts_share_is_no_effect():
 
 
 def test_a_model_that_is_not_of_the_line_is_named():
-    line = parts(3, 1)
-    assert list(off_model(line)) == list(off_model([])) == []
-    far = [replace(part, residual_um=-0.66 * part.predicted_um) for part in line]
-    assert 'predicts 25 µm where the gauge reads 9 µm; calibrate' in next(off_model(far))
+    near = parts(3, 1)
+    far = [replace(part, residual_um=-0.66 * part.predicted_um) for part in near]
+    for measured, told in ((near, False), ([], False), (far, True)):
+        line = Line(DepositionModel(), {}, pa.table({}), 0, 'none')
+        vars(line)['parts'] = measured
+        words = 'the model predicts 25 µm where the gauge reads 9 µm; calibrate'
+        assert any(words in warning for warning in line.warnings) == told
 
 
 def test_level_and_noise_are_estimated():

@@ -49,6 +49,7 @@ def test_each_oddity_is_told_and_the_rest_is_computed(line, tmp_path, at_worker)
     remarks = {one['part']: one['remark'] for one in told['remarks']}
     assert remarks[gauge].startswith('simulated only: two files of readings have its name')
     assert told['without_run'] == ['unknown_door.csv']
+    assert told['warnings'] == ['no recording has the name of unknown_door.csv; left out']
     assert (told['parts'], told['measured'], told['points']) == (3, 2, 24)
     for words in (*told['without_run'], *(one['run'] for one in told['errors']), *remarks):
         assert sum(words in text for text in done.stderr.splitlines()) == 1

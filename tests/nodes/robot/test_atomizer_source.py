@@ -82,13 +82,17 @@ def stamps_from_now() -> np.ndarray:
     return time.time_ns() + 4_000_000 * np.arange(len(WAY))
 
 
-def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until):
+@pytest.mark.parametrize(
+    ('given', 'prefix', 'scale'),
+    [({}, '', 1.0), ({'joint_prefix': 'irb_', 'angle_unit': 'deg'}, 'irb_', 180.0 / np.pi)],
+)
+def test_poses_are_those_of_the_bell(source, driver, viewer, wait_until, given, prefix, scale):
     offset = [0.0, 0.02, 0.15, 0.0, np.sin(0.2), 0.0, np.cos(0.2)]
-    source(tcp_offset=offset)
+    source(tcp_offset=offset, **given)
     robot = driver()
     wait_until(lambda: viewer.count_publishers('atomizer/pose'))
     stamps = stamps_from_now()
-    robot.move(stamps)
+    robot.move(stamps, [prefix + name for name in JOINTS], scale * WAY)
     wait_until(lambda: len(viewer.heard['atomizer/pose']) == len(WAY), what='the poses')
     pose = viewer.newest('atomizer/pose')
     expected = Rigid.of(np.concatenate([column[-1] for column in tip_poses(WAY)])) @ Rigid.of(

@@ -10,7 +10,7 @@ import click
 
 from paint_deposition.cli import options
 from paint_deposition.cli.progress import Progress
-from paint_deposition.errors import ManyError, some
+from paint_deposition.errors import ManyError
 from paint_deposition.files.parquet import MANY, require_libraries
 
 if TYPE_CHECKING:
@@ -78,7 +78,6 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
     """
     require_libraries('paint line', MANY)
     from paint_deposition.batch.line.part import computed
-    from paint_deposition.batch.line.pooling import off_model
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
     from paint_deposition.batch.line.times import dated
@@ -89,16 +88,13 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
         finished, done, workers = _computed(computed, cases, {}, results, show, **where)
         show('pooling')
         table = dated(finished.table(case.digest for case in cases))
-        found = Line(folder, model, shared_files(folder, file), table, done, workers, unmatched)
+        found = Line(model, shared_files(folder, file), table, done, workers, unmatched)
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
         results.write(found)
     _print_warnings([*found.errors, *found.remarks], results.output / 'line.json')
-    options.print_all('warning', off_model(found.parts))
-    if unmatched:
-        named = some(unmatched, MOST_WARNINGS)
-        options.print_all('warning', [f'no recording has the name of {named}; left out'])
+    options.print_all('warning', found.warnings)
     results.print(found.lines)
 
 

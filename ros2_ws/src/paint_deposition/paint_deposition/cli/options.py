@@ -114,7 +114,9 @@ PART_POSE = click.option(
 )  # fmt: skip
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
-    click.option('--pose-topic', help='Poses in the bag; default: its only PoseStamped topic.'),
+    click.option('--pose-topic',
+                 help='Poses in the bag; default: its only PoseStamped topic. Of an array: '
+                 '/poses[2]. With --urdf: joint states, several with blanks between them.'),
     click.option(
         '--state-topic', '--trigger', 'state_topic',
         help='Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
@@ -131,21 +133,24 @@ MOTION = (
         help='Take the poses from the transforms of the bag: frame SOURCE, the TCP, in TARGET.',
     ),
     click.option(
-        '--urdf', type=click.Path(), help='Take the poses from joint states and this robot.'
+        '--urdf', type=click.Path(),
+        help='Take the poses from this robot and its joints in a bag or a table.',
     ),
     click.option('--tip', '--tip-link', 'tip_link',
                  help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
     click.option('--base', '--base-link', 'base_link',
                  help='Link of the URDF for the frame of the poses; default: its root.'),
+    click.option('--joint-prefix',
+                 help="What the joints' names have before those of the URDF, or lack: irb_."),
     click.option('--pose-unit', type=click.Choice(['m', 'mm', 'cm']),
-                 help='Unit of x, y, z in a table of poses whose headings have none.'),
+                 help='Unit of positions and rails; default: that of the headings, else m.'),
     click.option(
         '--rotation', metavar='CONVENTION',
         help='Three numbers of an orientation in a table: rotvec, or Euler angles as ZYX (axes of '
         'the tool), xyz (fixed axes), kuka, abb, fanuc, rpy, staubli, kawasaki.',
     ),
     click.option('--angle-unit', type=click.Choice(['deg', 'rad']),
-                 help='Unit of the angles in a table whose headings have none.'),
+                 help='Unit of joints and angles; default: that of the headings, else rad.'),
     click.option('--frame-id', help="Name of the part's frame; default: part."),
     PART_POSE,
 )  # fmt: skip

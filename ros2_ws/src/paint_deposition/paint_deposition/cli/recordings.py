@@ -16,7 +16,8 @@ from paint_deposition.files.json_files import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
-    from paint_deposition.files.recordings.bag_summary import BagSummary
+    from paint_deposition.files.recordings.bag_summary import BagSummary, PoseSource
+    from paint_deposition.motion.stream_quality import StreamQuality
 
 
 @click.command('inspect')
@@ -57,73 +58,105 @@ def inspect_command(
     if part['path'] is not None:
         figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, **drawn)
     else:
-        gun_signal = motion.pop('gun_signal')
-        if any(drawn[name] for name in ('output', 'model_file')) or any(motion.values()):
-            raise click.UsageError('--out, --model and how the motion is read need --mesh')
-        figures, lines = _contents(path, gun_signal, max_pose_gap_s)
+        if any(drawn[name] for name in ('output', 'model_file')):
+            raise click.UsageError('--out and --model need --mesh')
+        figures, lines = _contents(path, motion, max_pose_gap_s)
         figures |= {'provenance': origin(files={'recording': path})}
     click.echo(json_text(figures) if as_json else lines)
 
 
 def _contents(
-    path: Path, gun_signal: str | None, max_pose_gap_s: float
+    path: Path, motion: dict[str, Any], max_pose_gap_s: float
 ) -> tuple[dict[str, Any], str]:
     """What a RAPID module, a table of poses or a bag holds: figures, and the same in words."""
+    from paint_deposition.errors import RecordingError
+    from paint_deposition.files.motion_files import read_table
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
-    from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+    from paint_deposition.files.refusals import checked
+    from paint_deposition.files.tables.poses import is_pose_table
 
-    if is_rapid(path):
-        program = read_program(path, gun_signal=gun_signal)
-        return asdict(program), program_as_text(program)
+    source = checked(MotionSource, 'motion', motion, RecordingError)
     if is_pose_table(path):
-        MotionSource(gun_signal=gun_signal).require_kind(path, 'a table of poses')
-        poses = read_pose_table(path, PoseLayout())
+        poses = read_table(path, source)
         options.print_all('warning', poses.warnings)
-        return _table_contents(poses)
-    MotionSource(gun_signal=gun_signal).require_kind(path, 'a bag')
+        return _table_contents(poses, max_pose_gap_s)
+    kind = 'a RAPID module' if is_rapid(path) else 'a bag'
+    source.require_kind(path, kind)
+    if any(value for name, value in motion.items() if name != 'gun_signal'):
+        raise click.UsageError(f'how the motion of {kind} is read needs --mesh')
+    if is_rapid(path):
+        program = read_program(path, gun_signal=source.gun_signal)
+        return asdict(program), program_as_text(program)
     summary = summarise(path, max_pose_gap_s)
-    return asdict(summary), _bag_contents(summary)
+    streams = [source.to_dict() for source in summary.pose_streams]
+    return asdict(summary) | {'pose_streams': streams}, _bag_contents(summary)
 
 
-def _table_contents(poses: pd.Trajectory) -> tuple[dict, str]:
+def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, str]:
     """What was understood of a table of poses: figures, and the same in words."""
+    import numpy as np
+
+    from paint_deposition.motion.stream_quality import StreamQuality
+
+    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+    quality = StreamQuality.of(poses.stamps_ns, values, max_gap_s=max_pose_gap_s)
     low, high = poses.positions_m.min(axis=0), poses.positions_m.max(axis=0)
     figures = {
         'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id,
         'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
+        **vars(quality),
     }  # fmt: skip
     sides = ', '.join(
         f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
     )
-    frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
+    line = f'poses: {_stream_words(quality, poses.frame_id, "m")}: {sides}'
     return figures, '\n'.join([line, *poses.notes])
 
 
 def _bag_contents(summary: BagSummary) -> str:
-    from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, TF_TYPES
-
     lines = [summary.path]
     width = max((len(topic.name) for topic in summary.topics), default=0)
     lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
-    lines += [
-        f"poses on {stream.topic}: {stream.poses} in frame '{stream.frame_id}' over "
-        f'{stream.duration_s:.3f} s, {stream.mean_rate_hz:.1f} a second, {stream.gaps} gaps, '
-        f'longest interval {stream.longest_gap_s:.3f} s, '
-        f'{stream.repeated_stamps} repeated and {stream.backward_stamps} backward stamps'
-        for stream in summary.pose_streams
-    ]
+    for source in summary.pose_streams:
+        lines += _source_lines(source)
     if not summary.pose_streams:
-        lines.append('no poses: there is no PoseStamped topic with messages')
-    types = {topic.type for topic in summary.topics}
-    if types & {*TF_TYPES}:
-        lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
-    if JOINT_TYPE in types:
-        lines.append('joint states: --urdf takes the motion from them')
+        lines.append('no poses: there are no messages with poses, joints or transforms that move')
     lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
     return '\n'.join(lines)
+
+
+def _source_lines(source: PoseSource) -> list[str]:
+    """One source of poses: its figures, and whether it will do."""
+    from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
+
+    what = {JOINT_TYPE: 'joints on ', 'transforms': 'transforms from '}.get(
+        source.type, 'poses on '
+    )
+    if source.quality is None:
+        return [f'{what}{source.topic} will not do: {source.faults[0]}']
+    return [
+        f'{what}{source.topic}: {_stream_words(source.quality, source.frame_id, source.unit)}',
+        *(f'  warning: {fault}' for fault in source.faults),
+        f'  {"to be used with care" if source.faults else "will do"}: {source.options}',
+    ]
+
+
+def _stream_words(quality: StreamQuality, frame_id: str, unit: str) -> str:
+    frame = f" in frame '{frame_id}'" if frame_id else ' in a frame that is not named'
+    frame = '' if unit in ('rad', 'deg') else frame
+    lag = ''
+    if quality.lag_s is not None and quality.lag_range_s is not None:
+        low, high = quality.lag_range_s
+        lag = f', logged {quality.lag_s:.3g} s after the stamp ({low:.3g} to {high:.3g})'
+    return (
+        f'{quality.poses}{frame} over {quality.duration_s:.3f} s, '
+        f'{quality.mean_rate_hz:.1f} a second, {quality.gaps} gaps, longest interval '
+        f'{quality.longest_gap_s:.3f} s, {quality.repeated_stamps} repeated and '
+        f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated samples, '
+        f'in {unit}{lag}'
+    )
 
 
 def _gun_on_part(

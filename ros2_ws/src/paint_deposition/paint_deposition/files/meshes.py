@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import MeshError
-from paint_deposition.files import surface_cache
 from paint_deposition.files.atomic import replacing
 from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
 from paint_deposition.part.edges import Edges, weld
@@ -33,8 +32,7 @@ def read_mesh(
 
     The winding says which side is outward, toward the gun. An open surface is taken as it is; a
     closed body that is inside out is turned round, and triangles wound against their neighbours
-    are turned to the majority, both with a note in ``Surface.notes``. A large part is kept on
-    disk for the next time, see ``files.surface_cache``.
+    are turned to the majority, both with a note in ``Surface.notes``.
 
     Args:
         path: STL, PLY, OBJ, glTF (.gltf, .glb), 3MF or STEP (.step, .stp).
@@ -57,15 +55,17 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    place = surface_cache.place_of(
-        path, scale, max_edge_length_m, None if down is None else np.asarray(down).tolist(), body
-    )
-    surface = surface_cache.find(place) if place else None
-    if surface is None:
-        surface = _prepared(path, scale, max_edge_length_m, down, body)
-        if place:
-            surface_cache.keep(place, surface)
-    return surface
+    read = _load(path, body)
+    notes, unit_m = [*read.notes], read.unit_m
+    vertices, faces = read.vertices, read.faces
+    del read
+    if unit_m * scale != 1.0:
+        vertices = vertices.astype(np.float64) * (unit_m * scale)
+    _check_extent(path, vertices, faces)
+    vertices, faces = weld(vertices, faces)
+    faces = _without_degenerate(path, vertices, faces, notes)
+    faces = _oriented(vertices, faces, notes)
+    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
 
 
 def write_mesh_ply(
@@ -95,22 +95,6 @@ def write_mesh_ply(
         file.write('\n'.join(head).encode())
         vertices.tofile(file)
         faces.tofile(file)
-
-
-def _prepared(
-    path: Path, scale: float, max_edge_length_m: float, down: np.ndarray | None, body: str | None
-) -> Surface:
-    read = _load(path, body)
-    notes, unit_m = [*read.notes], read.unit_m
-    vertices, faces = read.vertices, read.faces
-    del read
-    if unit_m * scale != 1.0:
-        vertices = vertices.astype(np.float64) * (unit_m * scale)
-    _check_extent(path, vertices, faces)
-    vertices, faces = weld(vertices, faces)
-    faces = _without_degenerate(path, vertices, faces, notes)
-    faces = _oriented(vertices, faces, notes)
-    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
 
 
 def _load(path: Path, body: str | None) -> Bodies:

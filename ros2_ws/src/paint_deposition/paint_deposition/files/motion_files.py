@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,6 +16,9 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 PART = 'part'
 
@@ -60,17 +63,20 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         source.require_kind(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
     elif is_pose_table(path):
-        source.require_kind(path, 'a table of poses')
-        layout = PoseLayout(
-            source.state_topic, source.pose_unit, source.rotation, source.angle_unit
-        )
-        recorded = read_pose_table(path, layout)
+        recorded = read_table(path, source)
     else:
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
             return _in_part_frame(recorded, source, bag)
     return _in_part_frame(replace(recorded, source=str(path)), source, None)
+
+
+def read_table(path: Path, source: MotionSource) -> Trajectory:
+    """The motion in a table, in the frame of its poses."""
+    source.require_kind(path, 'a table of poses')
+    layout = PoseLayout(source.state_topic, source.pose_unit, source.rotation, source.angle_unit)
+    return read_pose_table(path, layout, _robot(path, source))
 
 
 def read_gun_motions(
@@ -105,26 +111,34 @@ def read_gun_motions(
 
 def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
     """The motion in a bag, in the frame of its poses."""
-    robot = None
-    if source.urdf and source.tf:
+    robot = _robot(bag.path, source)
+    if robot and source.tf:
         raise RecordingError(f'{bag.path}: both tf and urdf are given; leave one of them out')
-    if source.urdf:
-        from paint_deposition.files.recordings.joint_states import Robot
-
-        robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
-    elif source.tip_link or source.base_link:
-        raise RecordingError(
-            f'{bag.path}: tip_link and base_link are links of a URDF; give --urdf'
-        )
+    how = source.tf, robot, source.pose_unit
     if gun:
         state = bag.find(f'/{gun}{STATE_TOPIC}')
         trigger = state.name if state else None
-        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, source.tf, robot)
+        return trajectory_of(bag, f'/{gun}{POSE_TOPIC}', trigger, *how)
     # The bag of a plan names its trigger itself.
     planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
     trigger = source.state_topic or planned
-    recorded = trajectory_of(bag, source.pose_topic, trigger, source.tf, robot)
+    recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
     return _with_note(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
+
+
+def _robot(path: Path, source: MotionSource) -> 'Robot | None':
+    """The robot whose joints the recording has, None where it has poses."""
+    if not source.urdf:
+        if source.tip_link or source.base_link or source.joint_prefix:
+            raise RecordingError(
+                f'{path}: tip_link, base_link and joint_prefix go with a URDF; give --urdf'
+            )
+        return None
+    from paint_deposition.files.recordings.joint_states import JointNotation, Robot
+
+    robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
+    notation = JointNotation(source.joint_prefix, source.angle_unit, source.pose_unit)
+    return replace(robot, recorded_as=notation)
 
 
 def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:

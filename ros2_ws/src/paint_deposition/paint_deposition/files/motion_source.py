@@ -51,14 +51,17 @@ class MotionSource(BaseModel, extra='forbid'):
     urdf: Text | None = Field(None, description="the name of the robot's URDF file")
     tip_link: Text | None = Field(None, description='the name of the link that is the TCP')
     base_link: Text | None = Field(None, description='the name of the link in which the poses are')
+    joint_prefix: Text | None = Field(
+        None, description='what the names of the joints have before those of the URDF, or lack'
+    )
     pose_unit: Literal['m', 'mm', 'cm'] | None = Field(
-        None, description="'m', 'mm' or 'cm', the unit of a table's positions"
+        None, description="'m', 'mm' or 'cm', the unit of recorded positions"
     )
     rotation: Annotated[Text, AfterValidator(_rotation)] | None = Field(
         None, description=ROTATION_WORDS
     )
     angle_unit: Literal['deg', 'rad'] | None = Field(
-        None, description="'deg' or 'rad', the unit of a table's angles"
+        None, description="'deg' or 'rad', the unit of recorded angles and joints"
     )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
@@ -76,7 +79,7 @@ class MotionSource(BaseModel, extra='forbid'):
 PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
-    'pose_topic': 'bags', 'state_topic': 'bags and tables', 'tf': 'bags', 'urdf': 'bags',
-    'tip_link': 'bags', 'base_link': 'bags', 'gun_signal': 'RAPID modules', 'pose_unit': 'tables',
-    'rotation': 'tables', 'angle_unit': 'tables',
+    'pose_topic': 'bags', 'tf': 'bags', 'gun_signal': 'RAPID modules', 'rotation': 'tables',
+    **dict.fromkeys(('state_topic', 'urdf', 'tip_link', 'base_link'), 'bags and tables'),
+    **dict.fromkeys(('joint_prefix', 'pose_unit', 'angle_unit'), 'bags and tables'),
 }  # fmt: skip

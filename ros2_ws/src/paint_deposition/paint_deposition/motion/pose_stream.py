@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paint_deposition.motion.repeated_samples import RepeatedSamples
 from paint_deposition.motion.trajectory import PoseCounts
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
@@ -141,7 +142,7 @@ FEWEST_OF_A_RESTART = 3
 
 class PoseScreen:
     """Drops and counts poses with a repeated or backward stamp, a non-finite number or a
-    quaternion that is no rotation; notices gaps and restarted streams.
+    quaternion that is no rotation, and a driver's repeats; notices gaps and restarted streams.
 
     Poses with stamps before the newest one wait. A few of them are stragglers and are dropped
     when the stream continues; a run of them that is longer than a gap is the stream restarted,
@@ -153,6 +154,7 @@ class PoseScreen:
         self.counts = PoseCounts()
         self.newest_ns: int | None = None
         self._behind = NO_POSES
+        self._repeats = RepeatedSamples()
 
     def take(self, poses: PoseBatch) -> list[PoseBatch]:
         """Screen poses; what comes back has strictly increasing stamps and unit quaternions.
@@ -203,7 +205,10 @@ class PoseScreen:
         self.counts.not_unit_quaternions += int(np.count_nonzero(finite & ~unit))
         good = finite & unit
         rotations = quaternions[good] / norms[good, np.newaxis]
-        return PoseBatch(poses.stamps_ns[good], poses.positions_m[good], rotations)
+        kept = PoseBatch(poses.stamps_ns[good], poses.positions_m[good], rotations)
+        new = self._repeats.are_new(kept.stamps_ns, np.hstack([kept.positions_m, rotations]))
+        self.counts.repeated_samples = self._repeats.count
+        return kept if new.all() else kept.select(np.flatnonzero(new))
 
     def _step_to(self, stamp_ns: int) -> None:
         if self.newest_ns is not None and stamp_ns - self.newest_ns > self.max_gap_ns:

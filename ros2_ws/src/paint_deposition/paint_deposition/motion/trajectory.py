@@ -22,11 +22,12 @@ class PoseCounts:
     gaps: int = 0
     longest_gap_ns: int = 0
     late_triggers: int = 0
+    repeated_samples: int = 0
 
     @property
     def rejected(self) -> int:
         """Poses that were dropped."""
-        stamps = self.repeated_stamps + self.backward_stamps
+        stamps = self.repeated_stamps + self.backward_stamps + self.repeated_samples
         return stamps + self.not_finite + self.not_unit_quaternions
 
     @staticmethod

@@ -15,7 +15,8 @@ Effects are found one after the other, by their evidence. Each set of effects is
 scales that are the most probable with it: those fitted without an effect would take it for noise.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
@@ -42,8 +43,10 @@ ACCEPTANCE = 0.99
 MOST_ACCEPTED = 3
 # Effects whose log evidence is this close to the best are not distinguished (odds of 20 to 1).
 INDISTINGUISHABLE = 3.0
-# A model whose mean film is off by more than this share of the readings is not of this line.
-OFF_MODEL = 0.3
+# Columns of a row that pooling takes.
+COLUMNS = (
+    'measured_um', 'predicted_um', 'sigma_um', 'x_m', 'y_m', 'z_m', 'by_pattern', 'by_effect',
+)  # fmt: skip
 ONE_BRUSH = PatternVector()
 
 
@@ -71,43 +74,22 @@ def amplitudes() -> list[tuple[str, str]]:
     return [(e.id, name) for e in EFFECTS.values() for name in e.amplitudes()]
 
 
-def measured_parts(columns: Mapping[str, Sequence[Any]]) -> list[Measured]:
+def measured_parts(rows: Iterable[Mapping[str, Any]]) -> list[Measured]:
     """The measured parts among the rows of all runs, oldest first."""
-    if 'measured_um' not in columns:
-        return []
-    rows_of: dict[str, list[int]] = {}
-    cells = zip(columns['part'], columns['measured_um'], strict=True)
-    for row, (part, value) in enumerate(cells):
-        if value is not None:
-            rows_of.setdefault(part, []).append(row)
-
-    def taken(name: str, rows: list[int]) -> np.ndarray:
-        return np.array([columns[name][row] for row in rows], dtype=float)
-
-    found = [
-        Measured(
-            part, float(columns['time_s'][rows[0]]),
-            taken('measured_um', rows) - taken('predicted_um', rows),
-            taken('sigma_um', rows), taken('predicted_um', rows),
-            np.column_stack([taken(f'{axis}_m', rows) for axis in 'xyz']),
-            taken('by_pattern', rows), taken('by_effect', rows),
-        )
-        for part, rows in rows_of.items()
-    ]  # fmt: skip
+    rows_of: dict[str, list[Mapping[str, Any]]] = defaultdict(list)
+    for row in rows:
+        if row.get('measured_um') is not None:
+            rows_of[row['part']].append(row)
+    found = []
+    for part, own in rows_of.items():
+        taken = {name: np.array([row[name] for row in own]) for name in COLUMNS}
+        found.append(Measured(
+            part, own[0]['time_s'], taken['measured_um'] - taken['predicted_um'],
+            taken['sigma_um'], taken['predicted_um'],
+            np.column_stack([taken[f'{axis}_m'] for axis in 'xyz']), taken['by_pattern'],
+            taken['by_effect'],
+        ))  # fmt: skip
     return sorted(found, key=lambda part: part.time_s)
-
-
-def off_model(parts: Sequence[Measured]) -> Iterator[str]:
-    """Yield a warning if the model's film is far from that of all readings."""
-    if not parts:
-        return
-    predicted = float(np.concatenate([part.predicted_um for part in parts]).mean())
-    measured = predicted + float(np.concatenate([part.residual_um for part in parts]).mean())
-    if abs(predicted - measured) > OFF_MODEL * measured:
-        yield (
-            f'the model predicts {predicted:.0f} µm where the gauge reads {measured:.0f} µm; '
-            "calibrate it for this line (percentages are of the model's film)"
-        )
 
 
 def places(parts: Sequence[Measured]) -> tuple[np.ndarray, list[np.ndarray]]:

@@ -24,6 +24,7 @@ from paint_deposition.batch.line.part import FIGURES
 from paint_deposition.batch.line.picture import line_figure
 from paint_deposition.batch.line.pooling import Measured, Pooled, measured_parts, pooled
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import some
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.parquet import write_parquet
 from paint_deposition.files.provenance import origin
@@ -36,15 +37,16 @@ if TYPE_CHECKING:
 
 # For pooling only.
 DERIVATIVES = ('by_pattern', 'by_effect')
-# So many of the newest alarms are printed.
-MOST_ALARMS = 5
+# So many of the newest alarms, and of the files without a run, are printed.
+MOST_ALARMS = MOST_UNMATCHED = 5
+# A model whose mean film is off by more than this share of the readings is not of this line.
+OFF_MODEL = 0.3
 
 
 @dataclass(frozen=True)
 class Line:
     """The parts of a line."""
 
-    folder: Path  # of the runs
     model: DepositionModel  # of all
     files: Mapping[str, Path]  # shared by all, by what they are
     table: pa.Table  # a row for each part and point, in the order of the runs
@@ -55,7 +57,7 @@ class Line:
     @cached_property
     def parts(self) -> list[Measured]:
         """The measured parts, oldest first."""
-        return measured_parts(self.table.to_pydict())
+        return measured_parts(self.table.to_pylist())
 
     @cached_property
     def pooled(self) -> Pooled | None:
@@ -107,6 +109,25 @@ class Line:
     def remarks(self) -> list[tuple[str, str]]:
         """Name of each part with a remark, and the remark, oldest first."""
         return [(run['part'], run['remark']) for run in self.runs if run.get('remark')]
+
+    @property
+    def warnings(self) -> list[str]:
+        """What concerns the line as a whole, with its remedy."""
+        found = []
+        if self.parts:
+            predicted_um = float(np.concatenate([p.predicted_um for p in self.parts]).mean())
+            off_um = float(np.concatenate([p.residual_um for p in self.parts]).mean())
+            measured_um = predicted_um + off_um
+            if abs(off_um) > OFF_MODEL * measured_um:
+                found.append(
+                    f'the model predicts {predicted_um:.0f} µm where the gauge reads '
+                    f'{measured_um:.0f} µm; calibrate it for this line (percentages are of the '
+                    "model's film)"
+                )
+        if self.unmatched:
+            named = some(self.unmatched, MOST_UNMATCHED)
+            found.append(f'no recording has the name of {named}; left out')
+        return found
 
     @property
     def sentence(self) -> str:
@@ -173,6 +194,7 @@ class Line:
             'errors': [{'run': name, 'error': error} for name, error in self.errors],
             'remarks': [{'part': name, 'remark': remark} for name, remark in self.remarks],
             'without_run': list(self.unmatched),
+            'warnings': self.warnings,
             'provenance': origin(self.model, self.files),
         }  # fmt: skip
 

@@ -1,63 +1,117 @@
-"""A summary of a bag: its topics, and the quality of its streams of poses."""
+"""A summary of a bag: its topics, and whether each source of poses in it will do."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
-from paint_deposition.files.recordings.bags import POSE_TYPE, read_trajectory
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE
+from paint_deposition.files.recordings.pose_topics import pose_topics, read_poses
+from paint_deposition.files.recordings.transforms import moving_transforms
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
-from paint_deposition.motion.path_builder import gap_ns
+from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
+
+# Joints of a robot that is not known do not turn further [rad].
+MOST_RAD = 4.0 * np.pi
 
 
 @dataclass(frozen=True)
-class PoseStream:
-    """Figures of one PoseStamped topic, from its header stamps."""
+class PoseSource:
+    """One source of poses in a bag: its figures by the header stamps, and how it is read.
+
+    ``frame_id`` is that of the poses, '' for joints and where it is not recorded; ``unit`` what
+    the numbers look like; ``options`` take the motion from it. ``faults`` say why it will not do,
+    or what it costs; ``will_do`` is whether it can be read with these options.
+    """
 
     topic: str
+    type: str
     frame_id: str
-    poses: int
-    duration_s: float
-    mean_rate_hz: float
-    gaps: int
-    longest_gap_s: float
-    repeated_stamps: int
-    backward_stamps: int
+    unit: str
+    quality: StreamQuality | None
+    options: str
+    faults: tuple[str, ...] = ()
+
+    @property
+    def will_do(self) -> bool:
+        """Whether its motion can be read."""
+        return self.quality is not None
+
+    def to_dict(self) -> dict[str, object]:
+        """All figures by name."""
+        figures = {} if self.quality is None else vars(self.quality)
+        own = {name: value for name, value in vars(self).items() if name != 'quality'}
+        return own | figures | {'will_do': self.will_do}
 
 
 @dataclass(frozen=True)
 class BagSummary:
-    """Topics of a bag, its pose streams, and the possible trigger topics."""
+    """Topics of a bag, its sources of poses, and the possible trigger topics."""
 
     path: str
     topics: list[BagTopic]
-    pose_streams: list[PoseStream]
+    pose_streams: list[PoseSource]
     triggers: list[str]
 
 
 def summarise(path: Path | str, max_pose_gap_s: float) -> BagSummary:
     """Summarise a bag; an interval longer than ``max_pose_gap_s`` is a gap."""
     with open_bag(path) as bag:
-        topics = bag.topics
+        sources = [
+            *(_of_poses(bag, topic, max_pose_gap_s) for topic in pose_topics(bag)),
+            *(_of_joints(bag, topic, max_pose_gap_s) for topic in bag.topics_of(JOINT_TYPE)),
+            *_of_transforms(bag, max_pose_gap_s),
+        ]
         triggers = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
-    streams = [
-        _pose_stream(path, topic.name, max_pose_gap_s)
-        for topic in bag.topics_of(POSE_TYPE)
-        if topic.message_count
-    ]
-    return BagSummary(str(path), topics, streams, triggers)
+        return BagSummary(str(path), bag.topics, [s for s in sources if s], triggers)
 
 
-def _pose_stream(path: Path | str, topic: str, max_pose_gap_s: float) -> PoseStream:
-    trajectory = read_trajectory(path, topic)
-    steps_ns = np.diff(trajectory.stamps_ns)
-    gaps = int(np.count_nonzero(steps_ns > gap_ns(max_pose_gap_s)))
-    duration_s = trajectory.duration_s
-    rate_hz = len(steps_ns) / duration_s if duration_s > 0.0 else 0.0
-    return PoseStream(
-        topic, trajectory.frame_id, len(trajectory), duration_s, rate_hz, gaps,
-        float(steps_ns.max(initial=0)) * 1e-9, int(np.count_nonzero(steps_ns == 0)),
-        int(np.count_nonzero(steps_ns < 0)),
-    )  # fmt: skip
+def _of_poses(bag: Bag, topic: BagTopic, max_gap_s: float) -> PoseSource | None:
+    if not topic.message_count:
+        return None
+    options = f'--pose-topic {topic.name}'
+    try:
+        poses, log_times_ns, _ = read_poses(bag, topic.name)
+    except RecordingError as error:
+        return PoseSource(topic.name, topic.type, '', '', None, '', (str(error),))
+    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+    quality = StreamQuality.of(poses.stamps_ns, values, log_times_ns, max_gap_s)
+    unit = 'mm' if looks_like_mm(poses.positions_m) else 'm'
+    options += ' --pose-unit mm' if unit == 'mm' else ''
+    faults = tuple(quality.faults(topic.name))
+    return PoseSource(topic.name, topic.type, poses.frame_id, unit, quality, options, faults)
+
+
+def _of_joints(bag: Bag, topic: BagTopic, max_gap_s: float) -> PoseSource | None:
+    """The joints that most messages of a topic have."""
+    rows: dict[tuple[str, ...], list[tuple[int, int, list[float]]]] = {}
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        row = stamp_ns(message.header), log_time_ns, list(message.position)
+        if len(row[2]) == len(message.name):
+            rows.setdefault(tuple(message.name), []).append(row)
+    if not rows:
+        return None
+    stamps, log_times, positions = zip(*max(rows.values(), key=len), strict=True)
+    values = np.array(positions, dtype=float)
+    logged = np.array(log_times, np.int64)
+    quality = StreamQuality.of(np.array(stamps, np.int64), values, logged, max_gap_s)
+    unit = 'deg' if np.nanmax(np.abs(values), initial=0.0) > MOST_RAD else 'rad'
+    options = f'--urdf ROBOT --pose-topic {topic.name}'
+    options += ' --angle-unit deg' if unit == 'deg' else ''
+    faults = tuple(quality.faults(topic.name))
+    return PoseSource(topic.name, topic.type, '', unit, quality, options, faults)
+
+
+def _of_transforms(bag: Bag, max_gap_s: float) -> Iterator[PoseSource]:
+    for edge in moving_transforms(bag):
+        quality = StreamQuality.of(edge.stamps_ns, edge.poses, edge.log_times_ns, max_gap_s)
+        name = f'{edge.parent} to {edge.child}'
+        unit = 'mm' if looks_like_mm(edge.poses[:, :3]) else 'm'
+        options = f'--tf {edge.parent} {edge.child}'
+        options += ' --pose-unit mm' if unit == 'mm' else ''
+        faults = tuple(quality.faults(name))
+        yield PoseSource(name, 'transforms', edge.parent, unit, quality, options, faults)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -13,18 +12,19 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics, open_bag
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.bag_files import Bag, open_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
+from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
-POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
 POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 # For a trigger without stamps the log times are used, if those of the poses show that recorder and
@@ -45,20 +45,23 @@ def trajectory_of(
     state_topic: str | None = None,
     tf: Sequence[str] | None = None,
     robot: Robot | None = None,
+    pose_unit: str | None = None,
 ) -> Trajectory:
     """The atomizer's motion from a bag: poses as recorded, unscreened, stamps in nanoseconds.
 
     Args:
-        pose_topic: PoseStamped, or the robot's joint states; None: the only one.
+        pose_topic: of poses, or the robot's joint states, several with blanks between them; None:
+            the only one, or the joint states that have the robot's joints.
         state_topic: see ``read_trigger``; None: the gun always sprays, and a note lists the
             topics that could be its trigger.
         tf: [target, source] frames of the transforms to read instead of poses; source is the TCP.
         robot: the robot whose joint states to read instead of poses.
+        pose_unit: of poses and transforms that are not in m.
 
     Raises:
         RecordingError: one line that names the bag, what is wrong and what to do.
     """
-    trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot)
+    trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot, pose_unit)
     if not state_topic:
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
     gun = read_trigger(bag, state_topic)
@@ -80,71 +83,30 @@ def motion_of(
     pose_topic: str | None = None,
     tf: Sequence[str] | None = None,
     robot: Robot | None = None,
+    pose_unit: str | None = None,
 ) -> tuple[Trajectory, np.ndarray]:
     """The poses alone, as for ``trajectory_of``, and their log times (N,) int64 [ns]."""
-    if tf:
-        from paint_deposition.files.recordings.transforms import read_tf_poses
-
-        return read_tf_poses(bag, *tf)
     if robot:
         from paint_deposition.files.recordings.joint_states import read_joint_poses
 
-        return read_joint_poses(bag, robot, pose_topic)
-    return _read_poses(bag, choose_pose_topic(bag, pose_topic))
+        read, log_times_ns, name = read_joint_poses(bag, robot, pose_topic)
+    else:
+        if tf:
+            from paint_deposition.files.recordings.transforms import read_tf_poses
 
-
-def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
-    """The named PoseStamped topic of a bag, or its only one; errors list the candidates."""
-    if not name:
-        candidates = bag.topics_of(POSE_TYPE)
-        if len(candidates) != 1:
-            listed = listed_topics(candidates, 'PoseStamped')
-            raise RecordingError(f'{bag.path}: name a pose topic; {listed}{_other_motion(bag)}')
-        name = candidates[0].name
-    topic = bag.choose(name, (POSE_TYPE,), 'PoseStamped')
-    if topic.message_count == 0:
-        raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
-    return topic
-
-
-def _other_motion(bag: Bag) -> str:
-    """Other sources of motion in a bag, for a message."""
-    moves = []
-    if bag.topics_of(*TF_TYPES):
-        moves.append('transforms (give tf: TARGET SOURCE)')
-    if bag.topics_of(JOINT_TYPE):
-        moves.append('joint states (give urdf)')
-    return f'; it has {" and ".join(moves)}' if moves else ''
-
-
-def _read_poses(bag: Bag, topic: BagTopic) -> tuple[Trajectory, np.ndarray]:
-    """The poses of a topic, and the times (N,) int64 at which they were logged [ns]."""
-    stamps, log_times, rows = [], [], []
-    frames: Counter[str] = Counter()
-    for _, log_time_ns, message in bag.decoded([topic.name]):
-        p, q = message.pose.position, message.pose.orientation
-        stamps.append(stamp_ns(message.header))
-        log_times.append(log_time_ns)
-        rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
-        frames[message.header.frame_id.lstrip('/')] += 1
-    if len(rows) != topic.message_count:
-        raise RecordingError(
-            f'{bag.path} lists {topic.message_count} messages on {topic.name} and holds '
-            f'{len(rows)}; run: paint recover {bag.path}'
-        )
-    if len(frames) > 1:
-        found = ', '.join(f"'{frame}' ({count})" for frame, count in sorted(frames.items()))
-        raise RecordingError(f'{topic.name} in {bag.path} mixes frames {found}; record one frame')
-    if len(stamps) > 1 and len(set(stamps)) == 1:
-        raise RecordingError(
-            f'all {len(stamps)} poses on {topic.name} in {bag.path} are stamped {stamps[0]} ns; '
-            'let the publisher stamp each pose'
-        )
-    values = np.array(rows, dtype=float)
-    positions, quaternions = map(np.ascontiguousarray, np.split(values, [3], axis=1))
-    frame_id = next(iter(frames), '')
-    trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, frame_id)
-    return trajectory, np.array(log_times, np.int64)
+            read, log_times_ns = read_tf_poses(bag, *tf)
+            name = f'transforms to {tf[1]}'
+        else:
+            read, log_times_ns, name = read_poses(bag, pose_topic)
+        if not pose_unit and looks_like_mm(read.positions_m):
+            raise RecordingError(
+                f'{name} in {bag.path} reaches {np.abs(read.positions_m).max():.4g} and is read '
+                'in m, as ROS has it: no part is so far away; give --pose-unit mm, or m if it is'
+            )
+        read = replace(read, positions_m=read.positions_m * LENGTHS[pose_unit or 'm'])
+    poses = np.hstack([read.positions_m, read.quaternions_xyzw])
+    faults = StreamQuality.of(read.stamps_ns, poses).faults(name)
+    return replace(read, warnings=(*read.warnings, *faults)), log_times_ns
 
 
 def write_pose_bag(

@@ -1,8 +1,10 @@
 """Forward kinematics of recorded joint states, by the URDF of the robot."""
 
-from dataclasses import dataclass
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import networkx as nx
 import numpy as np
@@ -12,9 +14,26 @@ from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, listed_topics
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
+from paint_deposition.files.tables.headings import ANGLES, LENGTHS
+from paint_deposition.motion.repeated_samples import RepeatedSamples
+from paint_deposition.motion.stream_quality import StreamQuality
 from paint_deposition.motion.trajectory import Trajectory
 
 DEFAULT_TIP = 'tool0'
+# The n-th joint in the columns of a robot's log, without marks.
+NUMBERED = re.compile(r'(?:j|joint|axis|a|rax|rj)(\d+)')
+# A joint without limits that turns further is recorded in degrees.
+MOST_TURNS_RAD = 1e3
+T = TypeVar('T')
+
+
+@dataclass(frozen=True)
+class JointNotation:
+    """How a recording writes joints: what precedes the URDF's names, and units; None is usual."""
+
+    prefix: str | None = None
+    angle_unit: str | None = None
+    length_unit: str | None = None
 
 
 @dataclass(frozen=True)
@@ -25,6 +44,7 @@ class Robot:
     base: str
     tip: str
     chain: list[Any]
+    recorded_as: JointNotation = JointNotation()
 
     @staticmethod
     def read(path: Path, tip: str | None = None, base: str | None = None) -> 'Robot':
@@ -68,6 +88,92 @@ class Robot:
         """Names of the joints that move."""
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
 
+    def recorded_joints(
+        self, names: Mapping[str, T], where: str, numbered: bool = False
+    ) -> dict[str, T]:
+        """What is recorded of each moving joint, from what is recorded by name.
+
+        Case and marks do not count, as in joint1 for joint_1; with ``numbered``, J1 is the first
+        joint that moves, if no name is known. Raises RecordingError that names the joints.
+        """
+        prefix = _plain(self.recorded_as.prefix or '')
+        plain = {_plain(name): value for name, value in names.items()}
+        found: dict[str, T] = {}
+        for joint in self.moving_joints:
+            own = _plain(joint)
+            ways = [own, prefix + own, own.removeprefix(prefix)][1 if prefix else 0 :]
+            known = next((way for way in ways if way in plain), None)
+            if joint in names and not prefix:
+                found[joint] = names[joint]
+            elif known is not None:
+                found[joint] = plain[known]
+        if numbered and not found:
+            by_number = {int(m[1]): v for n, v in plain.items() if (m := NUMBERED.fullmatch(n))}
+            joints = enumerate(self.moving_joints, start=1)
+            found = {joint: by_number[k] for k, joint in joints if k in by_number}
+        missing = [joint for joint in self.moving_joints if joint not in found]
+        if missing or not found:
+            raise RecordingError(
+                f'{where} has nothing of {" ".join(missing) or "any joint"} of {self.path.name}; '
+                f'its joints: {" ".join(sorted(names)) or "none"}{self._prefix_hint(names)}'
+            )
+        return found
+
+    def _prefix_hint(self, names: Iterable[str]) -> str:
+        """The prefix that would do, for a message."""
+        joints = self.moving_joints
+        pairs = [(name, joint) for name in names for joint in joints]
+        pairs += [(joint, name) for name, joint in pairs]
+        for long, short in pairs:
+            prefix = long.removesuffix(short)
+            if prefix != long and (
+                {prefix + joint for joint in joints} <= {*names}
+                or {prefix + name for name in names} >= {*joints}
+            ):
+                return f'; give --joint-prefix {prefix}'
+        return ''
+
+    def in_si(self, values: np.ndarray, where: str, units: Sequence[str] = ()) -> np.ndarray:
+        """Recorded values (N, J) of the moving joints in rad and m; '' is a unit that is not said.
+
+        Raises RecordingError for another unit, and for angles that can only be degrees.
+        """
+        moving = [joint for joint in self.chain if joint.joint_type != 'fixed']
+        scales = []
+        for joint, column, its in zip(moving, values.T, units or [''] * len(moving), strict=True):
+            slides = joint.joint_type == 'prismatic'
+            said = self.recorded_as.length_unit if slides else self.recorded_as.angle_unit
+            known, unit = LENGTHS if slides else ANGLES, its or said
+            if unit and unit not in known:
+                wanted = 'm or mm' if slides else 'deg or rad'
+                raise RecordingError(f'{joint.joint_name} in {where} is in {unit}; give {wanted}')
+            furthest = float(np.nanmax(np.abs(column), initial=0.0))
+            own = max(map(abs, joint.limits))
+            limit = max(2.0 * np.pi, own if np.isfinite(own) else MOST_TURNS_RAD)
+            if not slides and not unit and furthest > limit:
+                raise RecordingError(
+                    f'{joint.joint_name} in {where} reaches {furthest:.4g} and is read in rad; '
+                    'give --angle-unit deg, or rad if it is'
+                )
+            scales.append(known[unit or ('m' if slides else 'rad')])
+        return values * scales
+
+    def trajectory(
+        self, stamps_ns: np.ndarray, si: np.ndarray, recorded: Mapping[str, object], source: str
+    ) -> Trajectory:
+        """The motion of the tip from joints (N, J) [rad or m], with a note on where they are from.
+
+        ``recorded`` is what is recorded of each joint.
+        """
+        named = ' '.join(
+            joint if joint == its else f'{joint} ({its})' for joint, its in recorded.items()
+        )
+        note = (
+            f"joints: pose of '{self.tip}' in '{self.base}' by {self.path.name}, from {named} on "
+            f'{source}, {len(stamps_ns)} poses'
+        )
+        return Trajectory(stamps_ns, *self.poses(si), self.base, notes=(note,))
+
     def poses(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Positions (N, 3) and quaternions (N, 4) of the tip, from (N, J) moving joints [rad or
         m].
@@ -88,49 +194,95 @@ class Robot:
         return tip[:, :3, 3], Rotation.from_matrix(tip[:, :3, :3]).as_quat()
 
 
-def read_joint_poses(
-    bag: Bag, robot: Robot, topic_name: str | None
-) -> tuple[Trajectory, np.ndarray]:
-    """The motion of a robot's tip from joint states, and their log times (N,) [ns].
+@dataclass
+class _Columns:
+    """What the messages of one topic with the same joints hold of a robot's: a row a message."""
 
-    Joints in separate messages are interpolated at the times of the most frequent one. Raises
-    RecordingError without joint states of all joints.
+    topic: str
+    names: list[str]
+    stamps_ns: list[int] = field(default_factory=list)
+    log_times_ns: list[int] = field(default_factory=list)
+    values: list[list[float]] = field(default_factory=list)
+
+    def without_repeats(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+        """Stamps (N,), log times (N,) and values (N, K), and what is wrong with them."""
+        stamps, logged = np.array(self.stamps_ns, np.int64), np.array(self.log_times_ns, np.int64)
+        values = np.array(self.values, dtype=float)
+        faults = list(StreamQuality.of(stamps, values).repeats(self.topic))
+        new = RepeatedSamples().are_new(stamps, values)
+        new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
+        return stamps[new], logged[new], values[new], faults
+
+
+def read_joint_poses(
+    bag: Bag, robot: Robot, topic_names: str | None
+) -> tuple[Trajectory, np.ndarray, str]:
+    """The motion of a robot's tip from joint states, their log times (N,) [ns] and topics.
+
+    Joints in separate messages, as those of a rail, are interpolated at the times of the most
+    frequent one. Raises RecordingError without joint states of all joints, or with a joint on
+    several topics of which none is named.
     """
-    if not topic_name:
-        topics = [topic for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]
-        if len(topics) != 1:
-            listed = listed_topics(topics, 'JointState')
-            raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
-        topic_name = topics[0].name
-    topic = bag.choose(topic_name, (JOINT_TYPE,), 'JointState')
-    rows: dict[str, list[tuple[int, int, float]]] = {name: [] for name in robot.moving_joints}
-    seen: set[str] = set()
-    for _, log_time_ns, message in bag.decoded([topic.name]):
-        stamp = stamp_ns(message.header)
-        seen.update(message.name)
-        for name, value in zip(message.name, message.position, strict=False):
-            if name in rows and (not rows[name] or stamp > rows[name][-1][0]):
-                rows[name].append((stamp, log_time_ns, float(value)))
-    missing = [name for name in rows if len(rows[name]) < 2]
-    if missing or not rows:
+    named = (topic_names or '').split()
+    topics = [bag.choose(name, (JOINT_TYPE,), 'JointState').name for name in named]
+    topics = topics or [topic.name for topic in bag.topics_of(JOINT_TYPE) if topic.message_count]
+    if not topics:
+        listed = listed_topics([], 'JointState')
+        raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
+    streams: dict[tuple[str, tuple[str, ...]], _Columns] = {}
+    for topic, log_time_ns, message in bag.decoded(topics):
+        key = topic, tuple(message.name)
+        if key not in streams:
+            streams[key] = _Columns(topic, list(message.name))
+        stream = streams[key]
+        if len(message.position) == len(message.name):
+            stream.stamps_ns.append(stamp_ns(message.header))
+            stream.log_times_ns.append(log_time_ns)
+            stream.values.append(list(message.position))
+    its = {name: name for stream in streams.values() for name in stream.names}
+    recorded = robot.recorded_joints(its, f'{" and ".join(topics)} in {bag.path}')
+    wanted = dict.fromkeys(recorded.values())
+    used = [stream for stream in streams.values() if wanted.keys() & {*stream.names}]
+    _require_one_topic(bag, used, recorded)
+    columns: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+    warnings: list[str] = []
+    for stream in used:
+        stamps, logged, values, faults = stream.without_repeats()
+        warnings += faults
+        for column, name in enumerate(stream.names):
+            if name in wanted and len(stamps) > len(columns.get(name, ([],))[0]):
+                columns[name] = stamps, logged, values[:, column]
+    short = [joint for joint, name in recorded.items() if len(columns.get(name, ([],))[0]) < 2]
+    if short:
         raise RecordingError(
-            f'{topic.name} in {bag.path} has nothing of {" ".join(missing) or "any joint"} of '
-            f'{robot.path.name}; its joints: {" ".join(sorted(seen)) or "none"}'
+            f'{" and ".join(topics)} in {bag.path} has fewer than two positions of '
+            f'{" ".join(short)} of {robot.path.name}; record them again'
         )
-    columns = {
-        name: tuple(map(np.array, zip(*found, strict=True))) for name, found in rows.items()
-    }
-    clock = max(columns, key=lambda name: len(columns[name][0]))
-    stamps, log_times, _ = columns[clock]
+    clock = max(columns.values(), key=lambda column: len(column[0]))
+    stamps = clock[0]
     begin = max(at[0] for at, _, _ in columns.values())
     end = min(at[-1] for at, _, _ in columns.values())
     known = (stamps >= begin) & (stamps <= end)
     stamps = stamps[known]
-    values = [np.interp(stamps - begin, at - begin, v) for at, _, v in columns.values()]
-    positions, quaternions = robot.poses(np.stack(values, axis=1))
-    note = (
-        f"joints: pose of '{robot.tip}' in '{robot.base}' by {robot.path.name}, from "
-        f'{" ".join(robot.moving_joints)} on {topic.name}, {len(stamps)} poses'
-    )
-    trajectory = Trajectory(stamps, positions, quaternions, robot.base, notes=(note,))
-    return trajectory, log_times[known]
+    each = [columns[recorded[joint]] for joint in robot.moving_joints]
+    values = np.stack([np.interp(stamps - begin, at - begin, v) for at, _, v in each], axis=1)
+    name = ' and '.join(dict.fromkeys(stream.topic for stream in used))
+    si = robot.in_si(values, f'{name} in {bag.path}')
+    trajectory = robot.trajectory(stamps, si, recorded, name)
+    trajectory = replace(trajectory, warnings=tuple(warnings))
+    return trajectory, clock[1][known], name
+
+
+def _require_one_topic(bag: Bag, used: list[_Columns], recorded: dict[str, str]) -> None:
+    for joint, name in recorded.items():
+        topics = dict.fromkeys(stream.topic for stream in used if name in stream.names)
+        if len(topics) > 1:
+            raise RecordingError(
+                f'{bag.path}: {joint} is on {" and ".join(topics)}; name the topics to take, with '
+                f'blanks between several, as --pose-topic {next(iter(topics))}'
+            )
+
+
+def _plain(name: str) -> str:
+    """A name without case and marks."""
+    return re.sub(r'[\W_]', '', name.casefold())

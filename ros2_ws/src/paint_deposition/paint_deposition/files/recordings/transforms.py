@@ -61,6 +61,11 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
     return [_edge(*pair, its[last]) for pair, its in (parts | rows).items()]
 
 
+def moving_transforms(bag: Bag) -> list[Edge]:
+    """The transforms of a bag that come more than once and are not static."""
+    return [edge for edge in _edges(bag, static=False) if len(edge.stamps_ns) > 1]
+
+
 def _edge(parent: str, child: str, rows: list[tuple]) -> Edge:
     stamps, log_times, poses = map(np.array, zip(*rows, strict=True))
     _, first = np.unique(stamps, return_index=True)  # in order, each stamp once

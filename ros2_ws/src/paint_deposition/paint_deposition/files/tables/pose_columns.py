@@ -3,14 +3,20 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.headings import TIMES, Heading
+from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table, find_table, headings_in, rows_below
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
 
 # No run is longer: the unit is another one.
 LONGEST_RUN_S = 1e6
@@ -31,24 +37,41 @@ ROTATED = {
 
 @dataclass
 class PoseTable(Table):
-    """A table whose columns are found by their names, see ``column_name``."""
+    """A table whose columns are found by their names, see ``column_name``.
+
+    ``log`` says whose log it is, '' for a table with usual headings.
+    """
 
     names: list[str] = field(default_factory=list)
+    log: str = ''
 
     @staticmethod
-    def read(path: Path) -> 'PoseTable':
-        """Find the headings and the rows below them; without them the file is refused."""
-        sheet, header = find_table(path, RecordingError, _known)
+    def read(path: Path, robot: 'Robot | None' = None) -> 'PoseTable':
+        """Find the headings and the rows below them; without them the file is refused.
+
+        With a robot, the columns are those of its joints.
+        """
+        sheet, header = find_table(path, RecordingError, partial(_known, robot=robot))
         if header is None:
             first = ', '.join(map(text_of, sheet.rows[0])) if sheet.rows else 'none'
+            if robot is not None:
+                robot.recorded_joints(_by_text(headings_in(sheet.rows[0])), str(path), True)
             raise RecordingError(
-                f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first})'
+                f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
+                'joints are read with --urdf'
             )
-        headings = headings_in(sheet.rows[header])
+        headings, log = translated(headings_in(sheet.rows[header]))
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
-            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
+            path,
+            sheet.form,
+            headings,
+            sheet.rows,
+            sheet.lines,
+            RecordingError,
+            names=names,
+            log=log,
         ).select(below)
         if not len(table):
             raise table.error('no poses below the row of headings')
@@ -74,6 +97,14 @@ class PoseTable(Table):
         """The columns of all these names, None if one of them is missing."""
         found = [column for name in names if (column := self.find(name)) is not None]
         return found if len(found) == len(names) else None
+
+    def joints(self, robot: 'Robot') -> tuple[np.ndarray, dict[str, str]]:
+        """The values (N, J) of a robot's moving joints [rad or m], and their headings."""
+        columns = robot.recorded_joints(_by_text(self.headings), str(self.path), numbered=True)
+        of_each = [columns[joint] for joint in robot.moving_joints]
+        units = [self.headings[column].unit for column in of_each]
+        values = robot.in_si(self.values(of_each), str(self.path), units)
+        return values, {joint: self.headings[column].text for joint, column in columns.items()}
 
     def units(self, columns: Sequence[int]) -> set[str]:
         """The units of columns, '' for one without."""
@@ -125,6 +156,17 @@ def column_name(heading: Heading) -> str:
     return kept[-1] if kept[-1] in known else ''.join(kept)
 
 
-def _known(headings: list[Heading]) -> int:
+def _by_text(headings: Sequence[Heading]) -> dict[str, int]:
+    """The column of each heading, by its words."""
+    return {''.join(heading.words): k for k, heading in enumerate(headings) if heading.words}
+
+
+def _known(headings: list[Heading], robot: 'Robot | None') -> int:
+    headings, _ = translated(headings)
     names = {column_name(heading) for heading in headings}
-    return len(names - {''}) if {*POSITION} <= names else 0
+    if robot is None:
+        return len(names - {''}) if {*POSITION} <= names else 0
+    try:
+        return len(robot.recorded_joints(_by_text(headings), '', numbered=True))
+    except RecordingError:
+        return 0

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,12 +13,14 @@ from paint_deposition.files.tables.rotations import read_rotations
 from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
+from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+
 SUFFIXES = ('.csv', '.tsv', '.txt', '.xlsx', '.xls', '.ods')
-# No cell is larger: the unit is another one.
-LARGEST_CELL_M = 50.0
 # Names of columns, as `column_name` leaves them. The letter t is also an angle of Kawasaki's.
 TIME = ('time', 'timestamp', 'stamp', 'timefromstart', 'elapsed', 'zeit', 't')
 TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'paint', 'painton')
@@ -46,25 +49,60 @@ def is_pose_table(path: Path) -> bool:
     return path.suffix.lower() in SUFFIXES
 
 
-def read_pose_table(path: Path, layout: PoseLayout) -> Trajectory:
+def read_pose_table(path: Path, layout: PoseLayout, robot: 'Robot | None' = None) -> Trajectory:
     """The motion in a table, with what was understood as a note.
 
-    A table with times holds poses as recorded; one with speeds, passes as programmed, such as
-    ``passes.csv``. Raises RecordingError naming the file, the column and the remedy.
+    A table with times holds poses as recorded, or with ``robot`` its joints; one with speeds,
+    passes as programmed, such as ``passes.csv``. Raises RecordingError naming the file, the column
+    and the remedy.
     """
-    table = PoseTable.read(path)
+    table = PoseTable.read(path, robot)
     try:
+        if robot is not None:
+            return _joint_motion(table, layout, robot)
         return replace(_trajectory(table, layout), frame_id=_frame_id(table))
     except RecordingError as error:
         reason = str(error).removeprefix(f'{path}: ')
         raise RecordingError(f'{path}: {reason}') from None
 
 
+def _joint_motion(table: PoseTable, layout: PoseLayout, robot: 'Robot') -> Trajectory:
+    """The motion of a robot's tip from the columns of its joints."""
+    values, recorded = table.joints(robot)
+    time = table.find(*TIME)
+    if time is None:
+        raise RecordingError(
+            f'no time among the columns {table.written(())}; give a column time_s'
+        )
+    stamps, unit = table.stamps_ns(time)
+    flows, trigger = _flows(table, layout.trigger)
+    tip = robot.trajectory(stamps, values, recorded, table.path.name)
+    notes = (*tip.notes, f'{trigger}; {table.written([time])} in {unit}', table.log)
+    return _timed(
+        replace(tip, notes=tuple(filter(None, notes))), table, flows,
+        np.full(len(table), ONLY_BRUSH, np.int64),
+    )  # fmt: skip
+
+
+def _timed(
+    poses: Trajectory, table: PoseTable, flows: np.ndarray | None, brushes: np.ndarray
+) -> Trajectory:
+    """Poses with the trigger of their table, and what is wrong with them as a stream."""
+    on = slice(0, 0) if flows is None else slice(None)
+    levels = np.zeros(len(poses)) if flows is None else flows
+    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+    faults = StreamQuality.of(poses.stamps_ns, values).faults(table.path.name)
+    warnings = () if flows is not None else _could_be_trigger(table)
+    return replace(
+        poses, trigger_stamps_ns=poses.stamps_ns[on], trigger_flow=levels[on],
+        trigger_brush=numbered(brushes[on]), warnings=(*warnings, *faults),
+    )  # fmt: skip
+
+
 def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     positions, unit = _positions_m(table, layout.pose_unit)
     quaternions, orientation = read_rotations(table, layout.rotation, layout.angle_unit)
     flows, trigger = _flows(table, layout.trigger)
-    warnings = () if flows is not None else _could_be_trigger(table)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
@@ -72,13 +110,9 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     time, speed = table.find(*TIME), table.find(*SPEED)
     if time is not None:
         stamps, time_unit = table.stamps_ns(time)
-        on = slice(0, 0) if flows is None else slice(None)
-        levels = np.zeros(len(stamps)) if flows is None else flows
-        return Trajectory(
-            stamps, positions, quaternions, trigger_stamps_ns=stamps[on],
-            trigger_flow=levels[on], trigger_brush=numbered(brushes[on]),
-            notes=(f'{note}; {table.written([time])} in {time_unit}',), warnings=warnings,
-        )  # fmt: skip
+        notes = filter(None, (f'{note}; {table.written([time])} in {time_unit}', table.log))
+        poses = Trajectory(stamps, positions, quaternions, notes=tuple(notes))
+        return _timed(poses, table, flows, brushes)
     if speed is None:
         raise RecordingError(
             f'no time among the columns {table.written(())}; give a column time_s, or '
@@ -96,6 +130,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
             positions, quaternions, *columns, strict=True
         )
     ]
+    warnings = () if flows is not None else _could_be_trigger(table)
     return replace(timed(moves, flows is not None), notes=(PROGRAMMED, note), warnings=warnings)
 
 
@@ -109,7 +144,7 @@ def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:
     unit = units.pop() or given or ''
     positions = table.values(columns) * LENGTHS[unit or 'm']
     largest = float(np.nanmax(np.abs(positions), initial=0.0))
-    if not unit and largest > LARGEST_CELL_M:
+    if not unit and largest > FARTHEST_PART_M:
         raise RecordingError(
             f'{table.written(columns)} reach {largest:.4g} and have no unit; write it in the '
             'heading, as in x [mm], or give --pose-unit mm'

@@ -24,6 +24,7 @@ COUNT_LABELS = {
     'gaps': 'gaps',
     'restarts': 'restarts of the stream',
     'repeated_stamps': 'repeated stamps',
+    'repeated_samples': 'repeated samples',
     'backward_stamps': 'backward stamps',
     'not_finite': 'poses that are not finite',
     'not_unit_quaternions': 'quaternions not of unit length',

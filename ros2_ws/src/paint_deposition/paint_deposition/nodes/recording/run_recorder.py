@@ -14,9 +14,9 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bags import POSE_TYPE
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.recording.initial_messages import InitialMessages
 from paint_deposition.nodes.recording.part_runs import part_data, unused_name
 from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos

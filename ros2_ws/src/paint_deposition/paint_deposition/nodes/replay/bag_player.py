@@ -14,13 +14,10 @@ from rosgraph_msgs.msg import Clock
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
-from paint_deposition.files.recordings.bags import (
-    choose_pose_topic,
-    motion_of,
-    trajectory_of,
-)
+from paint_deposition.files.recordings.bags import motion_of, trajectory_of
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE, choose_pose_topic
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
 from paint_deposition.nodes.replay.flow_control import FlowControl
 from paint_deposition.nodes.replay.replay_clock import ReplayClock
@@ -146,10 +143,11 @@ class BagPlayer(PaintNode):
             given = values['pose_topic'] or None, values['tf'] or None, robot
             # The topic of the poses, or the poses of a bag that has none.
             self._pose_topic, self._motion = '', None
-            if robot or values['tf']:
-                self._motion = motion_of(bag, *given)
+            topic = None if robot or values['tf'] else choose_pose_topic(bag, given[0])
+            if topic and topic.type == POSE_TYPE:
+                self._pose_topic = topic.name
             else:
-                self._pose_topic = choose_pose_topic(bag, values['pose_topic']).name
+                self._motion = motion_of(bag, *given)
             self._state_topic: BagTopic | None = None
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:

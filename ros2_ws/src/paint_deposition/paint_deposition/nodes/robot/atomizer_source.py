@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
+from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, JointNotation, Robot
 from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
@@ -55,6 +56,14 @@ SOURCE = fixed_while_running(
     ),
     base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
+    joint_prefix=NodeParameter(
+        '', "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]"
+    ),
+    angle_unit=NodeParameter(
+        '',
+        'Unit of joints that turn; empty: rad, unless they turn too far [name]',
+        choices=('', 'rad', 'deg'),
+    ),
     tcp_offset=NodeParameter(
         [],
         'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link is '
@@ -128,9 +137,11 @@ class AtomizerSource(PaintNode):
         values = self.values
         self._robot = None
         if values['urdf_file']:
-            self._robot = Robot.read(
+            robot = Robot.read(
                 Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
             )
+            notation = JointNotation(values['joint_prefix'], values['angle_unit'] or None)
+            self._robot = replace(robot, recorded_as=notation)
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}

@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
-from paint_deposition.errors import PaintError, did_you_mean
+from paint_deposition.errors import PaintError, RecordingError, did_you_mean
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.part_frame import Rigid
@@ -35,27 +35,29 @@ class JointPoses:
         self.base, self.tip = robot.base, robot.tip
         self._robot, self._topic, self._take_pose = robot, topic, take_pose
         self._poses = self._incomplete = 0
+        self._refusal = ''
         self._received_s = time.monotonic()
 
     def take(self, _topic: str, message: JointState, info: Mapping[str, Any]) -> None:
         """Compute the pose for a joint state; the callback of its subscription."""
         positions_by_name = dict(zip(message.name, message.position, strict=False))
-        if any(name not in positions_by_name for name in self._robot.moving_joints):
-            self._incomplete += 1
+        try:
+            found = self._robot.recorded_joints(positions_by_name, self._topic)
+            values = np.array([[found[name] for name in self._robot.moving_joints]])
+            positions, quaternions = self._robot.poses(self._robot.in_si(values, self._topic))
+        except RecordingError as error:
+            self._incomplete, self._refusal = self._incomplete + 1, str(error)
             return
         self._received_s = time.monotonic()
-        values = np.array([[positions_by_name[name] for name in self._robot.moving_joints]])
-        positions, quaternions = self._robot.poses(values)
         tip = Rigid.of([*positions[0], *quaternions[0]])
         self._poses += 1
         self._take_pose(stamp_ns(message.header), tip, info['source_timestamp'])
 
     def status(self) -> Status:
         """Whether joint states arrive, and have all joints."""
-        values = {'robot': self._robot.path, 'joint states without all joints': self._incomplete}
+        values = {'robot': self._robot.path, 'joint states refused': self._incomplete}
         if self._incomplete and not self._poses:
-            joints = ' '.join(self._robot.moving_joints)
-            return Status(ERROR, f'no joint state has all of {joints}', values)
+            return Status(ERROR, f'no joint state has all joints: {self._refusal}', values)
         if time.monotonic() - self._received_s > SILENT_S:
             return Status(WARN, f'no joint states on {self._topic}', values)
         return Status(OK, 'following the robot', values)

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix
 
 from paint_deposition.planning.improvement.programme import STANDING_M, Opening, Programme
@@ -59,29 +60,15 @@ class Nodes:
 
     def hats(self, travel_m: np.ndarray, opening: np.ndarray) -> csr_matrix:
         """(M, n) weights of the nodes at places (M,) within or beyond openings (M,)."""
-        left, share = np.zeros(len(travel_m), np.int64), np.zeros(len(travel_m))
-        for number in range(len(self.openings)):
-            here, rows = opening == number, self.rows(number)
-            places = self.travel_m[rows]
-            inside = np.clip(travel_m[here], places[0], places[-1])
-            cell = np.clip(np.searchsorted(places, inside, side='right') - 1, 0, len(places) - 2)
-            left[here] = rows.start + cell
-            share[here] = (inside - places[cell]) / (places[cell + 1] - places[cell])
-        index = np.tile(np.arange(len(travel_m)), 2)
-        entries = np.concatenate([left, left + 1])
-        weights = np.concatenate([1.0 - share, share])
-        return csr_matrix((weights, (index, entries)), shape=(len(travel_m), len(self)))
+        ends = np.array([[one.on_m, one.off_m] for one in self.openings])[opening]
+        inside = np.clip(travel_m, *ends.T)
+        return BSpline.design_matrix(inside, np.pad(self.travel_m, 1, 'edge'), 1)
 
     def elapsed_s(self, number: int, slowness: np.ndarray, travel_m: np.ndarray) -> np.ndarray:
         """Time from the begin of an opening to places (M,) in it, for slowness (n,) [s/m]."""
         rows = self.rows(number)
-        places, values = self.travel_m[rows], slowness[rows]
-        steps = np.diff(places)
-        sums = np.concatenate([[0.0], np.cumsum(0.5 * steps * (values[1:] + values[:-1]))])
-        cell = np.clip(np.searchsorted(places, travel_m, side='right') - 1, 0, len(steps) - 1)
-        on = travel_m - places[cell]
-        rise = np.diff(values)[cell] / steps[cell]
-        return sums[cell] + values[cell] * on + 0.5 * rise * on**2
+        line = make_interp_spline(self.travel_m[rows], slowness[rows], k=1)
+        return line.antiderivative()(travel_m)
 
 
 def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Limits) -> Programme:

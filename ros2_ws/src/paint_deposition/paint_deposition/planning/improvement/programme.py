@@ -1,15 +1,13 @@
 """A given motion as a path and the openings of the gun along it, to be retimed; its moves."""
 
-from bisect import bisect_right
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns, spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory, numbered
@@ -28,6 +26,8 @@ TOLERANCE_M, LEVER_M = 0.0005, 0.3
 # A program's speeds are written in steps of this [m/s].
 SPEED_STEP_M_PER_S = 1e-5
 SLOWEST_M_PER_S = 1e-3
+# Sub-steps this close in time follow each other.
+ROUNDED_NS = 4
 # The speed is sampled so often along an opening.
 STEPS = 400
 
@@ -79,7 +79,7 @@ class Programme:
         seconds = (poses.stamps_ns - poses.stamps_ns[0]) * 1e-9
         programme = Programme(
             poses.positions_m, poses.quaternions_xyzw, travel, np.diff(seconds),
-            _openings(trajectory, poses.stamps_ns, travel, gap_ns(max_pose_gap_s)), trajectory,
+            _openings(trajectory, poses.stamps_ns, travel, max_pose_gap_s), trajectory,
         )  # fmt: skip
         if not programme.openings:
             raise PlanError(f'{trajectory.source}: the gun never sprays on a move')
@@ -187,37 +187,26 @@ def speed_along(programme: Programme, travel_m: np.ndarray) -> np.ndarray:
 
 
 def _openings(
-    trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_gap_ns: int
+    trajectory: Trajectory, stamps_ns: np.ndarray, travel_m: np.ndarray, max_pose_gap_s: float
 ) -> tuple[Opening, ...]:
     """Where the gun is open on the way; gaps between poses close it.
 
     Flows that change while it is open are taken as their mean over time.
     """
-    first, last = int(stamps_ns[0]), int(stamps_ns[-1])
-    changes = {stamp: (flow, brush) for stamp, flow, brush in trajectory.triggers}
-    changes = changes or {first: (1.0, ONLY_BRUSH)}
-    times = sorted(changes)
-    gaps = np.flatnonzero(np.diff(stamps_ns) > max_gap_ns)
-    begins, ends = stamps_ns[gaps].tolist(), stamps_ns[gaps + 1].tolist()
-    edges = sorted({first, last, *begins, *ends, *(t for t in times if first < t < last)})
-    spans: list[list[tuple[int, int, float, int]]] = []
-    for begin, end in pairwise(edges):
-        known, gap = bisect_right(times, begin) - 1, bisect_right(begins, begin) - 1
-        flow, brush = changes[times[known]] if known >= 0 else (0.0, ONLY_BRUSH)
-        if flow <= 0.0 or (gap >= 0 and begin < ends[gap]):
-            continue
-        piece = (begin, end, flow, brush)
-        if spans and spans[-1][-1][1] == begin and spans[-1][-1][3] == brush:
-            spans[-1].append(piece)
-        else:
-            spans.append([piece])
+    path, _ = spray_path(trajectory, max_pose_gap_s, whole_strokes=False)
+    half_ns, first_ns = np.rint(0.5e9 * path.dwell_s).astype(np.int64), stamps_ns[0]
+    edges_ns = np.stack([path.stamp_ns - half_ns, path.stamp_ns + half_ns]) - first_ns
+    on_m, off_m = np.interp(edges_ns, stamps_ns - first_ns, travel_m)
+    sprays = path.flow > 0.0
+    breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
+    # The halves of two sub-steps are rounded, each to a nanosecond.
+    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > ROUNDED_NS
     openings = []
-    for pieces in spans:
-        on, off = np.interp([pieces[0][0], pieces[-1][1]], stamps_ns, travel_m).tolist()
-        seconds = np.array([end - begin for begin, end, *_ in pieces], float)
-        flow = float(np.average([flow for *_, flow, _ in pieces], weights=seconds))
-        if off - on > STANDING_M:
-            openings.append(Opening(on, off, flow, pieces[0][3]))
+    for rows in np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks)):
+        on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
+        if sprays[rows[0]] and off - on > STANDING_M:
+            flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
+            openings.append(Opening(on, off, flow, int(path.brush[rows[0]])))
     return tuple(openings)
 
 

@@ -1,10 +1,10 @@
 """A model beside readings: along columns and rows, and over each part."""
 
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, FigureBase
 
 from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
@@ -16,14 +16,15 @@ from paint_deposition.report.pictures.chart import MM, colour_bar, new_figure, q
 from paint_deposition.report.pictures.part import HALO, PartPicture, draw_tool_path
 from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
+AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # Pictures of the page are as wide as a phone or half a sheet of paper [in], so that their
 # lettering is that of the page.
 PAGE_IN, TEXT_PT = 3.8, 8.0
 # As many letters of a title fit over a chart; one that is longer is written smaller.
 TITLE_LETTERS = 48
-# A profile's charts, and the room around all of them and between [in].
-CHARTS_IN, GAP_IN = (3.2, 2.4), (0.16, 0.6)
-LEFT_IN, RIGHT_IN, BOTTOM_IN, TOP_IN = 0.6, 0.15, 0.5, 0.6
+# A profile's two charts with the room around them, as shares of it, and that of the legend [in].
+PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
+PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
 # A part is drawn no higher than this [in]; few readings beyond the end of the colours do not take
 # the contrast from all others.
 HIGHEST_IN, SHOWN_SHARE = 4.2, 0.98
@@ -92,55 +93,29 @@ def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> Non
 
 def comparison_figure(data: ReportData) -> Figure:
     """The film along each column or row, and the residual below it."""
-    profiles = data.profiles
-    columns = charts_a_row(len(profiles))
-    rows = -(-len(profiles) // columns)
-    width_in = LEFT_IN + columns * CHARTS_IN[0] + (columns - 1) * GAP_IN[0] + RIGHT_IN
-    height_in = TOP_IN + rows * CHARTS_IN[1] + (rows - 1) * GAP_IN[1] + BOTTOM_IN
-    figure = new_figure(width_in, height_in)
-    figure.set_layout_engine('none')  # with so many axes it would take as long as to draw them
-    cells = figure.add_gridspec(
-        rows, columns, left=LEFT_IN / width_in, right=1.0 - RIGHT_IN / width_in,
-        bottom=BOTTOM_IN / height_in, top=1.0 - TOP_IN / height_in,
-        wspace=GAP_IN[0] / CHARTS_IN[0], hspace=GAP_IN[1] / CHARTS_IN[1],
-    )  # fmt: skip
-    film, residual = None, None
-    for k, profile in enumerate(profiles):
-        place = cells[k // columns, k % columns]
-        cell = place.subgridspec(2, 1, height_ratios=(3, 1), hspace=0.12)
-        film = figure.add_subplot(cell[0], sharey=film)
-        residual = figure.add_subplot(cell[1], sharex=film, sharey=residual)
-        draw_profile(film, data, profile)
-        draw_residual(residual, data, profile)
-        film.set_xlabel('')
-        film.tick_params(labelbottom=False)
-        if k % columns:
-            for axes in (film, residual):
-                axes.set_ylabel('')
-                axes.tick_params(labelleft=False)
-    if film is not None:
-        film.set_ylim(bottom=0.0)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
+    columns = charts_a_row(len(data.profiles))
+    rows = -(-len(data.profiles) // columns)
+    heights_in = (LEGEND_IN, rows * PROFILE_IN[1])
+    figure = _free_figure(columns * PROFILE_IN[0], sum(heights_in))
+    above, below = figure.subfigures(2, 1, height_ratios=heights_in)
+    places = below.subfigures(rows, columns, squeeze=False).ravel()
+    for place, profile in zip(places, data.profiles, strict=False):
+        _draw_profile(place, data, profile)
+    handles, labels = places[0].axes[0].get_legend_handles_labels()
+    above.legend(handles, labels, loc='upper left', ncols=len(labels), fontsize=9, frameon=False)
     return figure
 
 
 def profile_figures(data: ReportData) -> list[Figure]:
-    """A picture of each column or row, all on one scale, without a legend."""
-    bars_um = TWO_SIDED_95 * data.study.sigma_um
-    tops_um = [(data.study.measured_um + bars_um).max()]
-    tops_um += [profile.lines_um.max() for profile in data.profiles if profile.lines_um.size]
-    reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
-    figures = []
-    for profile in data.profiles:
-        figure = new_figure(PAGE_IN, CHARTS_IN[1] + GAP_IN[1])
-        film, residual = figure.subplots(2, 1, sharex=True, height_ratios=(3, 1))
-        draw_profile(film, data, profile)
-        draw_residual(residual, data, profile)
-        film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
-        residual.set_ylim(-reach_um, reach_um)
-        figures.append(figure)
-    return figures
+    """A picture of each column or row, without a legend."""
+    return [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+
+
+def _free_figure(width_in: float, height_in: float) -> Figure:
+    """A figure whose axes are placed by hand: to lay so many out takes as long as to draw them."""
+    figure = new_figure(width_in, height_in)
+    figure.set_layout_engine('none')
+    return figure
 
 
 def profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
@@ -151,7 +126,22 @@ def profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
     return [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
-def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
+def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFigure:
+    """Draw a column or row on the scale of all."""
+    film, residual = place.subplots(
+        2, 1, sharex=True, height_ratios=(3, 1), gridspec_kw=PROFILE_ROOM
+    )
+    _draw_film(film, data, profile)
+    _draw_residual(residual, data, profile)
+    bars_um = TWO_SIDED_95 * data.study.sigma_um
+    tops_um = [one.lines_um.max() for one in data.profiles if one.lines_um.size]
+    film.set(xlabel='', ylim=(0.0, 1.05 * max((data.study.measured_um + bars_um).max(), *tops_um)))
+    reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
+    residual.set_ylim(-reach_um, reach_um)
+    return place
+
+
+def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
     """Draw readings with the gauge's noise, and the models' film."""
     quiet(axes, f'{profile.axis} [mm]', 'film [µm]', size=TEXT_PT)
     of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
@@ -177,10 +167,9 @@ def draw_profile(axes: Axes, data: ReportData, profile: Profile) -> None:
     for number, single in enumerate(profile.passes_um):
         label = '' if number else 'each pass alone'
         axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
-    axes.set_ylim(bottom=0.0, auto=None)  # Axes that share the scale may need more of it.
 
 
-def draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
+def _draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
     """Draw measured minus predicted, of the last model with the gauge's noise."""
     quiet(axes, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
     at_mm, last = MM * profile.position_m, len(data.models) - 1

@@ -1,19 +1,17 @@
-"""Plans and improved programmes on disk: bag, table and robot program, figures, and the film."""
+"""The motion of a plan or an improved programme on disk: bag, table and robot program."""
 
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
+from paint_deposition.files.planned_model import DIGEST, MODEL_FILE
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
@@ -21,11 +19,6 @@ from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.improvement.improvement import Improvement
-from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.plan import Plan
-from paint_deposition.report.writers.film import write_film
-from paint_deposition.report.writers.write import writable
 
 BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
 COLUMNS = (
@@ -63,32 +56,6 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     write_text(folder / PROGRAM, module)
     write_model(folder / MODEL_FILE, passes.model)
     return [BAG, TABLE, PROGRAM, MODEL_FILE]
-
-
-def write_plan(
-    folder: str | Path,
-    result: Plan | PartPlan | Improvement,
-    details: Mapping[str, Any] | None = None,
-    part: tuple[str, Rigid] | None = None,
-) -> list[Path]:
-    """Write figures, what ``write_passes`` does, and the film, in place of an older plan.
-
-    Args:
-        details: more to say in the figures, such as the files used.
-        part: as for ``Passes``.
-
-    Raises:
-        PaintError: the folder cannot be written, or holds another folder of the bag's name.
-    """
-    folder, improved = Path(folder), isinstance(result, Improvement)
-    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
-    with writable(folder):
-        passes = Passes(result.trajectory, result.moves, result.model, made, part)
-        names = write_passes(folder, passes)
-        figures = {**result.to_dict(), DIGEST: model_digest(result.model), **(details or {})}
-        write_json(folder / name, figures)
-    film = write_film(folder, result.surface, result.film_um, result.statistics, overwrite=True)
-    return [folder / one for one in (name, *names, *(file.name for file in film))]
 
 
 def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:

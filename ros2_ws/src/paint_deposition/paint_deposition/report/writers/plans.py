@@ -11,7 +11,8 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.provenance import origin
+from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, PLAN_FILE
+from paint_deposition.files.provenance import model_digest, origin
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
@@ -25,7 +26,8 @@ from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import write_improvement_picture, write_uniformity
-from paint_deposition.report.writers.passes import write_plan
+from paint_deposition.report.writers.film import write_film
+from paint_deposition.report.writers.passes import Passes, write_passes
 from paint_deposition.report.writers.write import input_files, with_provenance, written
 
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
@@ -62,12 +64,16 @@ def _passes(
     frame_id: str = ROBOT_FRAME,
     pictures: str = 'png',
 ) -> list[Path]:
-    surface = result.surface
+    surface, improved = result.surface, isinstance(result, Improvement)
+    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
+    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    passes = Passes(result.trajectory, result.moves, result.model, made, part)
+    files = [folder / one for one in (name, *write_passes(folder, passes))]
     given = result.original.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
-    part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    files = write_plan(folder, result, about, part)
+    write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
+    files += write_film(folder, surface, result.film_um, result.statistics, overwrite=True)
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(

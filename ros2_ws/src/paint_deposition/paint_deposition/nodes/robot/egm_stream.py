@@ -1,0 +1,138 @@
+"""The positions that an ABB robot streams by EGM (UDP, protobuf), with stamps of this machine."""
+
+from collections import deque
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from paint_deposition.errors import PaintError
+
+# What is read of EGM's messages: field, number and type of the wire format that ABB documents in
+# 3HAC073319 (EGM, sensor protocol); others are passed over.
+MESSAGES = {
+    'Header': {'seqno': (1, 'uint32'), 'tm': (2, 'uint32')},
+    'Cartesian': {axis: (k, 'double') for k, axis in enumerate('xyz', start=1)},
+    'Quaternion': {f'u{k}': (k + 1, 'double') for k in range(4)},
+    'Pose': {'pos': (1, 'Cartesian'), 'orient': (2, 'Quaternion')},
+    'Joints': {'joints': (1, 'doubles')},
+    'Clock': {'sec': (1, 'uint64'), 'usec': (2, 'uint64')},
+    'FeedBack': {
+        'joints': (1, 'Joints'), 'cartesian': (2, 'Pose'), 'externalJoints': (3, 'Joints'),
+        'time': (4, 'Clock'),
+    },
+    'Robot': {'header': (1, 'Header'), 'feedBack': (2, 'FeedBack')},
+}  # fmt: skip
+# The clock of the controller drifts: only so many packets say what the fastest way takes.
+REMEMBERED = 2500
+# A number that goes back further, or after so long, is of a stream that was started again.
+RESTART = 1000
+
+
+@cache
+def egm_message(name: str = 'Robot') -> Any:
+    """The class of a message in ``MESSAGES``, for all of EgmRobot that is read.
+
+    Raises PaintError where protobuf is not installed.
+    """
+    try:
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    except ImportError:
+        raise PaintError(
+            'egm_source needs protobuf, which is not installed; run: pip install '
+            "'paint_deposition[robot]'"
+        ) from None
+    file = descriptor_pb2.FileDescriptorProto(name='egm_read.proto', package='egm_read')
+    kinds = descriptor_pb2.FieldDescriptorProto
+    for message, fields in MESSAGES.items():
+        described = file.message_type.add(name=message)
+        for field, (number, kind) in fields.items():
+            many = kinds.LABEL_REPEATED if kind == 'doubles' else kinds.LABEL_OPTIONAL
+            made = described.field.add(name=field, number=number, label=many)
+            if kind in MESSAGES:
+                made.type, made.type_name = kinds.TYPE_MESSAGE, f'.egm_read.{kind}'
+            else:
+                made.type = getattr(kinds, f'TYPE_{kind.rstrip("s").upper()}')
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f'egm_read.{name}'))
+
+
+@dataclass(frozen=True)
+class EgmSample:
+    """A measured position: stamp [ns], TCP in the correction frame, and the joints.
+
+    ``pose`` is x y z [m] qx qy qz qw, None if none was sent; ``joints_rad`` are the robot's,
+    ``external`` as sent, deg or mm.
+    """
+
+    stamp_ns: int
+    pose: tuple[float, ...] | None
+    joints_rad: np.ndarray
+    external: np.ndarray
+
+
+class EgmStream:
+    """Decodes the packets of one robot, counts those lost and repeated, and stamps positions.
+
+    The controller's milliseconds are brought to this machine's clock by the packets that were
+    fastest of late, so that a late packet does not delay its position; ``lag_ns`` is the age of a
+    position when its packet leaves.
+
+    Attributes:
+        received, lost, repeated, invalid: packets; lost ones by the gaps of their numbers.
+        late_ns: how much later than the fastest way the last packet came.
+        own_lag_ns: from the controller's own time of the last position to its arrival; None where
+            it was not sent. It is a lag only if both clocks are set.
+    """
+
+    def __init__(self, lag_ns: int) -> None:
+        self.lag_ns = lag_ns
+        self.received = self.lost = self.repeated = self.invalid = self.late_ns = 0
+        self.own_lag_ns: int | None = None
+        self._newest: int | None = None
+        self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
+
+    def take(self, packet: bytes, arrived_ns: int) -> EgmSample | None:
+        """The position in a packet; None for one that is invalid, repeated or out of order."""
+        from google.protobuf.message import DecodeError
+
+        try:
+            robot = egm_message().FromString(packet)
+        except DecodeError:
+            self.invalid += 1
+            return None
+        self.received += 1
+        if not self._is_next(robot.header.seqno):
+            self.repeated += 1
+            return None
+        sent_ns = robot.header.tm * 1_000_000
+        self._ways_ns.append(arrived_ns - sent_ns)
+        fastest_ns = min(self._ways_ns)
+        self.late_ns = arrived_ns - sent_ns - fastest_ns
+        measured = robot.feedBack
+        self.own_lag_ns = None
+        if measured.HasField('time'):
+            own_ns = measured.time.sec * 1_000_000_000 + measured.time.usec * 1000
+            self.own_lag_ns = arrived_ns - own_ns
+        pose = None
+        if measured.cartesian.HasField('orient'):
+            p, q = measured.cartesian.pos, measured.cartesian.orient
+            pose = (1e-3 * p.x, 1e-3 * p.y, 1e-3 * p.z, q.u1, q.u2, q.u3, q.u0)
+        return EgmSample(
+            sent_ns + fastest_ns - self.lag_ns, pose, np.radians(measured.joints.joints),
+            np.array(measured.externalJoints.joints),
+        )  # fmt: skip
+
+    def _is_next(self, number: int) -> bool:
+        """Whether a packet is newer than those before; counts what is missing between."""
+        step = 1 if self._newest is None else number - self._newest
+        if step < -RESTART or (step < 0 and number <= 1):
+            self._ways_ns.clear()
+            step = 1
+        if step <= 0:
+            return False
+        self.lost += step - 1
+        self._newest = number
+        return True

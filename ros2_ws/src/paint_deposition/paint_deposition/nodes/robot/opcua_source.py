@@ -1,0 +1,79 @@
+"""Node `opcua_source`: the gun's signals of a material supply, by OPC UA."""
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from paint_deposition.errors import PaintError
+from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+
+POLL_S = 0.2
+
+SOURCE = fixed_while_running(
+    'the signals are subscribed to with it; restart the node',
+    url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
+    period_s=NodeParameter(
+        0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
+    ),
+    **SIGNALS,
+)
+
+
+class OpcuaSource(SignalSource):
+    """Follows variables of a server, such as one of OPC 40702, by their node ids or browse paths.
+
+    A value counts from the source's time for it, which the server sends; `delay_s` is for one
+    that sends none.
+    """
+
+    PARAMETERS = SOURCE
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('opcua_source', **kwargs)
+
+    def follow(self, stopped: Callable[[], bool]) -> None:
+        """Subscribe to all variables, and take their values."""
+        asyncio.run(self._follow(stopped))
+
+    async def _follow(self, stopped: Callable[[], bool]) -> None:
+        try:
+            from asyncua import Client
+        except ImportError:
+            raise PaintError(
+                "asyncua is not installed; run: pip install 'paint_deposition[robot]'"
+            ) from None
+        async with Client(self.values['url']) as client:
+            found: dict[Any, str] = {}
+            for signal in self.signals:
+                if '=' in signal:
+                    node = client.get_node(signal)
+                else:
+                    node = await client.nodes.objects.get_child(signal.split('/'))
+                found[node.nodeid] = signal
+            handler = _Values(self, found)
+            period_ms = 1e3 * self.values['period_s']
+            subscription = await client.create_subscription(period_ms, handler)
+            nodes = [client.get_node(each) for each in found]
+            await subscription.subscribe_data_change(nodes, sampling_interval=period_ms)
+            self.connected()
+            while not stopped():
+                await asyncio.sleep(POLL_S)
+                await client.check_connection()
+
+
+class _Values:
+    """Takes what a subscription brings."""
+
+    def __init__(self, source: OpcuaSource, signals: dict[Any, str]) -> None:
+        self._source, self._signals = source, signals
+
+    def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
+        own = data.monitored_item.Value.SourceTimestamp
+        own_ns = None
+        if own is not None:
+            from datetime import timezone
+
+            since = own.replace(tzinfo=own.tzinfo or timezone.utc)
+            own_ns = round(since.timestamp() * 1e6) * 1000
+        self._source.take(self._signals[node.nodeid], float(value), own_ns)

@@ -1,0 +1,207 @@
+"""What the sources of a gun's signals have in common: from signals to states, and their delay."""
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped
+from paint_msgs.msg import AtomizerState
+from rclpy.qos import qos_profile_sensor_data
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.motion.stream_figures import SpeedNow
+from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
+from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.parameters import NodeParameter
+
+# What a state takes from signals: the field, and its unit.
+FIELDS = {
+    'flow': ('flow_cm3_per_min', 'cm3/min'), 'bell_speed': ('bell_speed_rpm', '1/min'),
+    'shaping_air': ('shaping_air_l_per_min', 'l/min'), 'voltage': ('voltage_kv', 'kV'),
+}  # fmt: skip
+RETRY_S = 1.0
+# The gun stands and goes [m/s]; the opening of the gun belongs to a start that is so near [s].
+STANDS_M_PER_S, GOES_M_PER_S = 0.005, 0.02
+NEAR_S = 2.0
+REMEMBERED = 50
+
+SIGNALS = {
+    'trigger': NodeParameter('', 'Signal that opens the gun [name]'),
+    'trigger_level': NodeParameter(0.0, 'The gun is on above this value of it [its unit]'),
+    **{
+        name: NodeParameter('', f'Signal of {name}, in {unit}; empty: unknown [name]')
+        for name, (_, unit) in FIELDS.items()
+    },
+    'calibrated_flow': NodeParameter(
+        0.0, 'Flow at which the model was calibrated; 0: flow counts as it [cm3/min]',
+        (0.0, math.inf),
+    ),
+    'delay_s': NodeParameter(
+        0.0, 'How late a signal is that has no time of its own, taken from its stamp [s]',
+        (0.0, 10.0),
+    ),
+}  # fmt: skip
+
+
+class StartsOfMotion:
+    """Finds in poses when the gun starts from rest, and how late its opening is told.
+
+    In a programme that opens the gun in the instruction in which the robot starts, the two are
+    one moment, and what is between them in the stamps is the delay of the signal.
+    """
+
+    def __init__(self) -> None:
+        self._speed = SpeedNow()
+        self._stood = False
+        self._starts: deque[int] = deque(maxlen=REMEMBERED)
+        self._opened: deque[int] = deque(maxlen=REMEMBERED)
+
+    def add_pose(self, stamp: int, position_m: np.ndarray) -> None:
+        """Take a pose."""
+        self._speed.add(np.array([stamp]), position_m[np.newaxis])
+        speed = self._speed.m_per_s
+        if speed < STANDS_M_PER_S:
+            self._stood, self._rest_ns = True, stamp
+        elif self._stood and speed > GOES_M_PER_S:
+            self._stood = False
+            self._starts.append(self._rest_ns)
+
+    def add_opening(self, stamp: int) -> None:
+        """Take the stamp with which the gun is told to open."""
+        self._opened.append(stamp)
+
+    def delay_s(self) -> tuple[float, int]:
+        """Median time from a start to the opening near it [s], NaN for none, and their number."""
+        starts = np.array(self._starts)
+        apart = [1e-9 * (at - starts) for at in self._opened if len(starts)]
+        nearest = [float(each[np.argmin(np.abs(each))]) for each in apart]
+        near = [each for each in nearest if abs(each) < NEAR_S]
+        return (float(np.median(near)) if near else math.nan), len(near)
+
+
+class SignalSource(PaintNode):
+    """Publishes `atomizer/state` from signals that a thread of the subclass follows.
+
+    The state is published, latched, when it changes and once all named signals have arrived.
+    """
+
+    def __init__(self, name: str, **kwargs: Any):
+        super().__init__(name, **kwargs)
+        self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
+        named = ('trigger', *FIELDS)
+        self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
+        self._received: dict[str, float] = {}
+        self._published = ''
+        self._newest_ns = 0
+        self._problem = 'not connected yet'
+        self._lags_s: deque[float] = deque(maxlen=REMEMBERED)
+        self._starts = StartsOfMotion()
+        self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
+        Diagnostics(self, {'signals': self._status})
+        self._stopped = threading.Event()
+        self._thread = threading.Thread(target=self._keep_following, name=name, daemon=True)
+        self._thread.start()
+
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        if not values['trigger']:
+            raise PaintError(f'{self.get_name()}: trigger is empty: name the signal of the gun')
+        named = [values[kind] for kind in ('trigger', *FIELDS) if values[kind]]
+        if len(set(named)) < len(named):
+            raise PaintError(f'{self.get_name()}: a signal is named twice: {" ".join(named)}')
+
+    def destroy_node(self) -> None:
+        self._stop()
+        super().destroy_node()
+
+    def close(self) -> None:
+        self._stop()
+
+    def _stop(self) -> None:
+        self._stopped.set()
+        self._thread.join()
+
+    def follow(self, stopped: Callable[[], bool]) -> None:
+        """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
+        raise NotImplementedError
+
+    def _keep_following(self) -> None:
+        while not self._stopped.is_set():
+            try:
+                self.follow(self._stopped.is_set)
+            except Exception as error:  # whatever a network and its libraries bring
+                text = ' '.join(str(error).split()) or type(error).__name__
+                self._problem = f'{self.values["url"]}: {text}'
+            self._stopped.wait(RETRY_S)
+
+    def connected(self) -> None:
+        """All signals are subscribed to."""
+        self._problem = ''
+
+    def take(self, signal: str, value: float, own_ns: int | None = None) -> None:
+        """Take the value of a signal that arrives now; ``own_ns`` is the server's time for it."""
+        kind, at_ns = self.signals[signal], own_ns
+        arrived_ns, self._problem = time.time_ns(), ''
+        # The first value may have been there for long.
+        if own_ns is not None and kind in self._received:
+            lag_s = 1e-9 * (arrived_ns - own_ns)
+            self._lags_s.append(lag_s)
+            if abs(lag_s) > MAX_CLOCK_OFFSET_S:
+                self._problem = (
+                    f'{signal} arrives {lag_s:.3g} s after its own time: set the clocks'
+                )
+                at_ns = None
+        if not math.isfinite(value):
+            self._problem = f'{signal} is {value}; the gun stays as it was'
+            return
+        if at_ns is None:
+            at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
+        self._newest_ns = max(self._newest_ns, at_ns)
+        self._received[kind] = value
+        if not {*self.signals.values()} - self._received.keys():
+            self._publish(self._newest_ns)
+
+    def _publish(self, at_ns: int) -> None:
+        values, known = self.values, self._received
+        spraying = known['trigger'] > values['trigger_level']
+        full, flow = values['calibrated_flow'], known.get('flow', math.nan)
+        relative = flow / full if full > 0.0 and 'flow' in known else 1.0
+        points = {field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()}
+        state = AtomizerState(spraying=spraying, flow=relative, **points)
+        if str(state) == self._published:  # NaN does not equal itself
+            return
+        if spraying and 'spraying=True' not in self._published:
+            self._starts.add_opening(at_ns)
+        self._published = str(state)
+        state.header = header('', at_ns)
+        self._publisher.publish(state)
+
+    def _take_pose(self, pose: PoseStamped) -> None:
+        p = pose.pose.position
+        self._starts.add_pose(stamp_ns(pose.header), np.array([p.x, p.y, p.z]))
+
+    def _status(self) -> Status:
+        received = {
+            f'{kind}, {signal}': self._received.get(kind, 'not received')
+            for signal, kind in self.signals.items()
+        }
+        lag = f'{1e3 * np.median(self._lags_s):.1f}' if self._lags_s else 'no time is sent'
+        delay_s, starts = self._starts.delay_s()
+        late = f'{1e3 * delay_s:.1f}, of {starts} starts' if starts else 'no start from rest yet'
+        values = received | {
+            'from the time of the server to arrival [ms]': lag,
+            'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
+            'opening after the start of motion [ms]': late,
+        }
+        if self._problem:
+            return Status(ERROR, self._problem, values)
+        missing = [name for name, value in received.items() if value == 'not received']
+        if missing:
+            return Status(WARN, f'not received: {"; ".join(missing)}', values)
+        return Status(OK, 'following the signals', values)

@@ -1,0 +1,128 @@
+"""An EGM stream over real UDP, in the wire format that ABB documents, encoded here by hand."""
+
+import socket
+import struct
+import time
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile
+from sensor_msgs.msg import JointState
+
+from nodes.cell import parameters
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.nodes.robot.egm_source import EgmSource
+from paint_deposition.nodes.robot.egm_stream import EgmStream
+
+MM = (812.5, -240.25, 955.0)
+WXYZ = (0.5, 0.5, -0.5, 0.5)
+DEGREES = (10.0, -20.0, 30.0, 170.0, 45.0, -400.0)
+LAG_NS = 15_000_000
+
+
+def varint(value: int) -> bytes:
+    low, rest = value & 0x7F, value >> 7
+    return bytes([low | 0x80]) + varint(rest) if rest else bytes([low])
+
+
+def field(number: int, content: float | int | bytes) -> bytes:
+    """A field of a protobuf message: double, integer, or a message of its own."""
+    if isinstance(content, bytes):
+        return varint(number << 3 | 2) + varint(len(content)) + content
+    if isinstance(content, float):
+        return varint(number << 3 | 1) + struct.pack('<d', content)
+    return varint(number << 3) + varint(content)
+
+
+def numbered(values) -> bytes:
+    return b''.join(field(k, value) for k, value in enumerate(values, start=1))
+
+
+def doubles(values) -> bytes:
+    return b''.join(field(1, value) for value in values)
+
+
+def egm_robot(number: int, tm_ms: int, time_us: int = 0) -> bytes:
+    """EgmRobot with all that a controller sends, more than is read of it."""
+    place = numbered([numbered(MM), numbered(WXYZ), numbered((180.0, 0.0, 90.0))])
+    clock = field(4, numbered(divmod(time_us, 1_000_000))) if time_us else b''
+    position = numbered([doubles(DEGREES), place, doubles((1500.0, 0.0))]) + clock
+    state = field(1, 3)
+    head = numbered([number, tm_ms, 2])
+    return numbered([head, position, position, state, state, 1, doubles((0.0,) * 6), state]) + (
+        field(10, 12.5)
+    )
+
+
+def test_positions_have_the_controllers_clock_and_late_packets_do_not_delay_them():
+    stream = EgmStream(LAG_NS)
+    late_ms = np.array([3, 1, 1, 9, 1, 22, 2, 1])
+    sent_ms = 5_000 + 4 * np.arange(len(late_ms))
+    begin_ns = 1_760_000_000_000_000_000
+    arrived = begin_ns + (sent_ms + late_ms) * 1_000_000
+    packets = [egm_robot(k + 7, int(ms)) for k, ms in enumerate(sent_ms)]
+    samples = [stream.take(*each) for each in zip(packets, arrived.tolist(), strict=True)]
+    stamps = np.array([sample.stamp_ns for sample in samples])
+    # All but the first, which was the fastest so far.
+    assert np.array_equal(stamps[1:], begin_ns + (sent_ms[1:] + 1) * 1_000_000 - LAG_NS)
+    assert samples[-1].pose == pytest.approx((0.8125, -0.24025, 0.955, 0.5, -0.5, 0.5, 0.5))
+    assert np.degrees(samples[-1].joints_rad) == pytest.approx(DEGREES)
+    assert samples[-1].external.tolist() == [1500.0, 0.0]
+
+
+def test_packets_are_counted_by_their_numbers_and_a_restart_is_none_of_them():
+    stream = EgmStream(0)
+    numbers = [40, 41, 41, 45, 44, 46, 0, 1]
+    taken = [stream.take(egm_robot(n, 4 * n), 10**18 + 4_000_000 * n) for n in numbers]
+    assert [sample is not None for sample in taken] == [1, 1, 0, 1, 0, 1, 1, 1]
+    assert (stream.received, stream.lost, stream.repeated) == (8, 3, 2)
+    assert stream.take(b'\xff\xff\xff', 10**18) is None
+    assert stream.invalid == 1
+    stream.take(egm_robot(2, 8, time_us=1_000_000_000_000_000), 10**18 + 30_000_000)
+    assert stream.own_lag_ns == 30_000_000
+
+
+def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
+    ros_context, spin, onlooker, wait_until
+):
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
+        free.bind(('127.0.0.1', 0))
+        port = free.getsockname()[1]
+    chosen = {
+        'address': '127.0.0.1', 'port': port, 'frame_id': 'wobj', 'external_joints': ['rail'],
+        'external_scales': [0.001],
+    }  # fmt: skip
+    viewer = onlooker(
+        {
+            'atomizer/pose': (PoseStamped, QoSProfile(depth=500)),
+            'joint_states': (JointState, QoSProfile(depth=500)),
+        }
+    )
+    node = EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
+    spin(node)
+    with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
+        EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
+    wait_until(lambda: viewer.count_publishers('atomizer/pose'), what='discovery')
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
+        robot.bind(('127.0.0.1', 0))
+        robot.settimeout(0.05)
+        for number in range(1, 41):
+            tm_ms = int(1e3 * time.monotonic()) & 0xFFFFFFFF
+            for _ in range(1 + (number == 30)):
+                if number not in (10, 11):
+                    robot.sendto(egm_robot(number, tm_ms), ('127.0.0.1', port))
+            time.sleep(0.004)
+        wait_until(lambda: len(viewer.heard['atomizer/pose']) == 38, what='the poses')
+        with pytest.raises(TimeoutError):
+            robot.recvfrom(100)
+    pose = viewer.newest('atomizer/pose')
+    assert pose.header.frame_id == 'wobj'
+    assert pose.pose.position.x == pytest.approx(0.8125)
+    assert 0 < time.time_ns() - stamp_ns(pose.header) < 60e9
+    wait_until(lambda: viewer.heard['joint_states'])
+    joints = viewer.newest('joint_states')
+    assert joints.name[-2:] == ['joint_6', 'rail']
+    assert joints.position[-2:].tolist() == pytest.approx([np.radians(-400.0), 1.5])
+    wait_until(lambda: viewer.reports('egm_source: robot', '2 packets lost, 1 repeated'))

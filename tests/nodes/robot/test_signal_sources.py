@@ -1,0 +1,218 @@
+"""Gun signals over real sockets: an RWS server as ABB describes it, and a server of asyncua."""
+
+import asyncio
+import socket
+import threading
+import time
+from contextlib import contextmanager
+from datetime import datetime, timedelta, timezone
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from urllib.parse import parse_qs
+
+import numpy as np
+import pytest
+from asyncua import Server, ua
+from paint_msgs.msg import AtomizerState
+from websockets.sync.server import serve
+
+from nodes.cell import parameters
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
+from paint_deposition.nodes.robot.opcua_source import OpcuaSource
+from paint_deposition.nodes.robot.rws_source import RwsSource
+from paint_deposition.nodes.robot.signal_source import StartsOfMotion
+
+GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
+EVENT = (
+    '<?xml version="1.0" encoding="utf-8"?><html xmlns="http://www.w3.org/1999/xhtml"><head>'
+    '<title>Event</title><base href="http://localhost/"/></head><body><div class="state">'
+    '<a href="subscription/1" rel="group"/><ul>{}</ul></div></body></html>'
+)
+ITEM = (
+    '<li class="ios-signalstate-ev" title="{0}"><a href="/rw/iosystem/signals/{0};state" '
+    'rel="self"/><span class="lvalue">{1}</span><span class="lstate">not simulated</span></li>'
+)
+
+
+def event(**values: float) -> str:
+    paths = {'gun': GUN, 'flow': FLOW}
+    return EVENT.format(''.join(ITEM.format(paths[k], v) for k, v in values.items()))
+
+
+class Controller:
+    """POST /subscription with digest and a cookie, then events on a websocket."""
+
+    def __init__(self) -> None:
+        self.subscribed: dict[str, list[str]] = {}
+        self.socket = None
+        self.cookie = ''
+
+    def tell(self, **values: float) -> None:
+        self.socket.send(event(**values))
+
+    @contextmanager
+    def running(self):
+        controller = self
+
+        class Http(BaseHTTPRequestHandler):
+            def do_POST(self) -> None:
+                body = self.rfile.read(int(self.headers['Content-Length'])).decode()
+                if 'username="Default User"' not in self.headers.get('Authorization', ''):
+                    self.send_response(401)
+                    challenge = 'Digest realm="validusers@robapi.abb", nonce="7", qop="auth"'
+                    self.send_header('WWW-Authenticate', challenge)
+                    self.end_headers()
+                    return
+                controller.subscribed = parse_qs(body)
+                self.send_response(201)
+                self.send_header('Location', f'ws://127.0.0.1:{port}/poll/1')
+                self.send_header('Set-Cookie', 'ABBCX=21; path=/')
+                self.end_headers()
+                self.wfile.write(event(gun=0, flow=0).encode())
+
+            def log_message(self, *_) -> None:
+                pass
+
+        def poll(connection) -> None:
+            controller.cookie = connection.request.headers['Cookie']
+            controller.socket = connection
+            for _ in connection:  # until it is closed
+                pass
+
+        events = serve(poll, '127.0.0.1', 0, subprotocols=['robapi2_subscription'])
+        port = events.socket.getsockname()[1]
+        http = ThreadingHTTPServer(('127.0.0.1', 0), Http)
+        for server in (events, http):
+            threading.Thread(target=server.serve_forever, daemon=True).start()
+        try:
+            yield f'http://127.0.0.1:{http.server_address[1]}'
+        finally:
+            http.shutdown()
+            http.server_close()
+            events.shutdown()
+
+
+class Supply:
+    """A server of asyncua with the gun's variables below Objects."""
+
+    NAMES = ('Open', 'Voltage')
+
+    def __init__(self, address: str) -> None:
+        self._address = address
+        self._loop = asyncio.new_event_loop()
+        self._nodes: dict = {}
+
+    @contextmanager
+    def running(self):
+        thread = threading.Thread(target=self._loop.run_forever, daemon=True)
+        thread.start()
+        server = self._wait(self._start())
+        try:
+            yield self
+        finally:
+            self._wait(server.stop())
+            self._loop.call_soon_threadsafe(self._loop.stop)
+            thread.join()
+
+    async def _start(self) -> Server:
+        server = Server()
+        await server.init()
+        server.set_endpoint(self._address)
+        space = await server.register_namespace('urn:supply')
+        gun = await server.nodes.objects.add_object(space, 'Gun')
+        for name, value in zip(self.NAMES, (False, 0.0), strict=True):
+            called = f'ns={space};s=Gun.{name}', f'{space}:{name}'
+            self._nodes[name] = await gun.add_variable(*called, value)
+        await server.start()
+        return server
+
+    def set(self, name: str, value, at: datetime) -> None:
+        data = ua.DataValue(ua.Variant(value), SourceTimestamp=at)
+        self._wait(self._nodes[name].write_value(data))
+
+    def _wait(self, work):
+        return asyncio.run_coroutine_threadsafe(work, self._loop).result(30.0)
+
+
+@pytest.fixture
+def states(onlooker):
+    return onlooker({'atomizer/state': (AtomizerState, LATCHED_STATES)})
+
+
+def test_signals_of_a_controller_switch_the_gun(ros_context, spin, states, wait_until):
+    controller = Controller()
+    with controller.running() as url:
+        values = {'trigger': 'doGun', 'flow': FLOW, 'calibrated_flow': 250.0, 'delay_s': 0.05}
+        node = RwsSource(context=ros_context, parameter_overrides=parameters(url=url, **values))
+        spin(node)
+        wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
+        wait_until(lambda: controller.socket is not None)
+        assert controller.subscribed == {
+            'resources': ['1', '2'], '1': ['/rw/iosystem/signals/doGun;state'], '1-p': ['2'],
+            '2': [f'/rw/iosystem/signals/{FLOW};state'], '2-p': ['2'],
+        }  # fmt: skip
+        assert controller.cookie == 'ABBCX=21'
+        controller.tell(flow=300.0)
+        controller.tell(gun=1)
+        wait_until(lambda: len(states.heard['atomizer/state']) == 3, what='the changes')
+        opened = states.decoded('atomizer/state', 2)
+        assert (opened.spraying, opened.flow, opened.flow_cm3_per_min) == (True, 1.2, 300.0)
+        assert np.isnan(opened.voltage_kv)
+        assert 0.05e9 <= time.time_ns() - stamp_ns(opened.header) < 60e9
+        wait_until(lambda: states.reports('rws_source: signals', 'following the signals'))
+        controller.socket.close()
+        wait_until(lambda: states.reports('rws_source: signals', url, b'\x02'), what='the break')
+
+
+def test_variables_of_a_material_supply_count_from_their_own_time(
+    ros_context, spin, states, wait_until, free_port
+):
+    address = f'opc.tcp://127.0.0.1:{free_port}'
+    with Supply(address).running() as supply:
+        values = {'trigger': 'ns=2;s=Gun.Open', 'voltage': '2:Gun/2:Voltage'}
+        node = OpcuaSource(
+            context=ros_context, parameter_overrides=parameters(url=address, **values)
+        )
+        spin(node)
+        wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
+        at = datetime.now(timezone.utc) - timedelta(milliseconds=80)
+        supply.set('Open', True, at)
+        wait_until(lambda: len(states.heard['atomizer/state']) == 2, what='the opening')
+        opened = states.newest('atomizer/state')
+        assert (opened.spraying, opened.flow, opened.voltage_kv) == (True, 1.0, 0.0)
+        assert stamp_ns(opened.header) == pytest.approx(1e9 * at.timestamp(), abs=2e3)
+        supply.set('Voltage', 62.0, at - timedelta(seconds=30))
+        told = 'Voltage arrives 30'
+        wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
+        assert states.newest('atomizer/state').voltage_kv == 62.0
+
+
+@pytest.fixture
+def free_port():
+    with socket.socket() as free:
+        free.bind(('127.0.0.1', 0))
+        return free.getsockname()[1]
+
+
+def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():
+    starts = StartsOfMotion()
+    begin_ns = 1_760_000_000_000_000_000
+    times_s = np.arange(0.0, 12.0, 0.004)
+    # At rest for a second of every three, then at 0.4 m/s.
+    for time_s, moved in zip(times_s, 0.4 * np.cumsum(times_s % 3.0 > 1.0) * 0.004, strict=True):
+        starts.add_pose(begin_ns + round(1e9 * time_s), np.array([moved, 0.0, 1.0]))
+        if abs(time_s % 3.0 - 1.12) < 1e-6:
+            starts.add_opening(begin_ns + round(1e9 * time_s))
+    delay_s, number = starts.delay_s()
+    assert number == 4
+    assert delay_s == pytest.approx(0.12, abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ('values', 'words'),
+    [({}, 'trigger is empty'), ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a')],
+)
+def test_signals_that_are_not_named_are_refused(ros_context, values, words):
+    with pytest.raises(PaintError, match=words):
+        RwsSource(context=ros_context, parameter_overrides=parameters(**values))
