@@ -27,6 +27,7 @@ COMMANDS = {
     'refit': ('inference', 'Add an effect of your choice and refit.'),
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
     'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
+    'place': ('place', 'Find where the part may stand so that the robot drives all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),

@@ -176,6 +176,37 @@ def grouped(
 
 
 motion_options = grouped(MOTION, 'motion')
+JOINT_ACCELERATION = click.option(
+    '--joint-acceleration', type=POSITIVE,
+    help='Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: full '
+    'speed in a quarter of a second.',
+)  # fmt: skip
+# The robot that is to drive a plan: what `read_robot` takes beside the pose of the part.
+robot_options = grouped(
+    (
+        click.option(
+            '--urdf', type=FILE,
+            help='Robot that is to drive it; --part-pose says where the part stands in its base.',
+        ),
+        click.option('--tip', '--tip-link', 'tip_link',
+                     help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
+        click.option('--base', '--base-link', 'base_link',
+                     help='Link of the URDF for the frame of the poses; default: its root.'),
+        JOINT_ACCELERATION,
+    ),
+    'robot',
+)  # fmt: skip
+
+
+def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> Any:
+    """The robot of ``robot_options`` with the part; None where none is given."""
+    if robot['urdf'] is None:
+        return None
+    if part_pose is None:
+        raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
+    from paint_deposition.api.robot import read_robot
+
+    return read_robot(part_pose=part_pose, **robot)
 
 
 def part_options(max_edge_length_m: float, required: bool = True) -> Callable:

@@ -53,6 +53,8 @@ class Programme:
     duration_s: np.ndarray  # (N - 1,) time from each pose to the next
     openings: tuple[Opening, ...]  # in order, apart from each other
     original: Trajectory  # the motion that it was made from
+    # Travels and the speeds that the joints of a robot allow there; None: any.
+    allowed: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':
