@@ -20,20 +20,17 @@ from paint_deposition.nodes import executables
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter
 
-# What a node needs to be given before it has its topics.
+# What a node needs to be given before it has its topics, besides a mesh.
+MESH = {'mesh_file': 'panel.stl', 'max_edge_length_m': 0.5}
 NEEDED = {
-    'bag_player': {'bag': 'panel_577', 'state_topic': '/atomizer/state'},
-    'deposition_simulator': {'mesh_file': 'panel.stl', 'max_edge_length_m': 0.5},
-    'model_comparison': {
-        'mesh_file': 'panel.stl', 'max_edge_length_m': 0.5,
-        'measurements_file': 'panel_study/panel_577.csv',
-    },
     'atomizer_source': {'trigger': '/gun_open'},
+    'bag_player': {'bag': 'panel_577', 'state_topic': '/atomizer/state'},
+    'model_comparison': {'measurements_file': 'panel_study/panel_577.csv'},
     # On this machine, where nobody answers.
     'egm_source': {'address': '127.0.0.1'},
     'opcua_source': {'trigger': 'ns=2;s=Gun.Open'},
     'rws_source': {'url': 'http://127.0.0.1:9', 'trigger': 'doGun'},
-}  # fmt: skip
+}
 # Every node of rclpy has these.
 OF_RCLPY = ('/rosout', '/parameter_events')
 
@@ -57,7 +54,10 @@ def _section(name: str, run: partial, context: Context) -> str:
     module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
     node_class: type[PaintNode] = getattr(module, class_name)
     with TemporaryDirectory() as written:
-        given = {key: _sample(value) for key, value in NEEDED.get(name, {}).items()}
+        needed = NEEDED.get(name, {}) | (
+            MESH if MESH.keys() <= node_class.PARAMETERS.keys() else {}
+        )
+        given = {key: _sample(value) for key, value in needed.items()}
         if 'output_directory' in node_class.PARAMETERS:
             given['output_directory'] = written
         node = node_class(
