@@ -33,15 +33,16 @@ class FiniteNumber(Finite, click.types.FloatParamType):
 
 
 class FiniteRange(Finite, click.FloatRange):
-    """A finite number within bounds; of a length in millimetres it says what is wanted."""
+    """A finite number within bounds; outside of them it says what is wanted."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            if param is None or not str(param.name).endswith('_m'):
+            if not isinstance(param, click.Option) or not param.help:
                 raise
-            words = f'{error.message.rstrip(".")}, in metres'
+            metres = ', in metres' if str(param.name).endswith('_m') else ''
+            words = f'{error.message.rstrip(".")}{metres}; wanted: {param.help.rstrip(".")}'
             raise click.BadParameter(words, ctx, param) from None
 
 
@@ -62,6 +63,12 @@ FILE = File(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
 CAMPAIGN = click.argument('campaign', type=FILE)
+
+
+POINTS = click.option(
+    '--points', 'points_file', type=FILE,
+    help='Measuring points, label and x, y, z, of readings that name their point only.',
+)  # fmt: skip
 
 
 def model_option(text: str) -> Callable:

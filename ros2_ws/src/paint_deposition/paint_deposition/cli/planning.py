@@ -105,16 +105,18 @@ def plan_command(
                 robot=cell, progress=show, **wanted,
             )  # fmt: skip
             touched = result.contacts
+        warnings = [*result.warnings, *map(str, touched)]
         show('writing')
         made_from = {
             'mesh': str(part['path']),
             'model': str(model_file or 'default'),
             'frame_id': frame_id,
             'part_pose': part_pose,
+            'warnings': warnings,
         }
         results.write(result, made_from=made_from, part_pose=part_pose, frame_id=frame_id)
     options.print_all('note', surface.notes)
-    options.print_all('warning', [*result.warnings, *map(str, touched)])
+    options.print_all('warning', warnings)
     results.print(_plan_lines(result), model=chosen.words)
 
 

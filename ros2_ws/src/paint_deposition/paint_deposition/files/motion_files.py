@@ -73,6 +73,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
+            recorded = replace(recorded, warnings=(*recorded.warnings, *bag.warnings))
             return _in_part_frame(recorded, source, bag)
     return _in_part_frame(replace(recorded, source=str(path)), source, None)
 

@@ -153,6 +153,7 @@ class PlannedFilm:
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
             'paint': paint_figures(self),
+            'warnings': list(self.warnings),
             'robot': self.drive and self.drive.to_dict(),
         }
 

@@ -204,7 +204,7 @@ def _openings(
     # The halves of two sub-steps are rounded, each to a nanosecond.
     breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > ROUNDED_NS
     openings = []
-    for rows in np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks)):
+    for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
         on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
         if sprays[rows[0]] and off - on > STANDING_M:
             flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))
