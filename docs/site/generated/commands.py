@@ -21,6 +21,6 @@ def _section(name: str, parent: click.Context) -> str:
     records = (p.get_help_record(context) for p in command.get_params(context) if p.name != 'help')
     options = definitions((names, help_text) for names, help_text in filter(None, records))
     parts = [f'## {context.command_path}\n', code(usage), cleandoc(command.help or ''), '']
-    if command.epilog:
-        parts += [cleandoc(command.epilog), '']
+    if command.epilog:  # an example; \b keeps click from wrapping it
+        parts += [code(cleandoc(command.epilog.replace('\b\n', '')), 'bash'), '']
     return '\n'.join([*parts, options])
