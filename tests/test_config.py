@@ -1,6 +1,5 @@
-"""The files in config/: examples that work as they stand, and views of what is published."""
+"""The files in config/: examples that work as they stand."""
 
-import json
 import re
 from pathlib import Path
 
@@ -15,46 +14,10 @@ from paint_deposition.files.motion_source import MOTION_KINDS
 
 REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
-# What a display of RViz shows.
-SHOWN = {
-    'Marker': 'visualization_msgs/msg/Marker', 'MarkerArray': 'visualization_msgs/msg/MarkerArray',
-    'PointCloud2': 'sensor_msgs/msg/PointCloud2', 'Path': 'nav_msgs/msg/Path',
-    'Pose': 'geometry_msgs/msg/PoseStamped',
-}  # fmt: skip
-
-
 REPOSITORY = Path(__file__).resolve().parent.parent
 CONFIG = REPOSITORY / 'config'
 PACKAGE = REPOSITORY / 'ros2_ws/src/paint_deposition'
-LAYOUTS, SAMPLES = PACKAGE / 'config', PACKAGE / 'samples'
-
-
-@pytest.fixture
-def publishers(ros_context, executor):
-    """The publishers of all nodes that a viewer looks at, by topic."""
-    from nodes.cell import parameters
-    from paint_deposition.nodes.comparison.model_comparison import ModelComparison
-    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-    from paint_deposition.nodes.planning.index_planner import IndexPlanner
-    from paint_deposition.nodes.replay.bag_player import BagPlayer
-
-    panel = SAMPLES / 'panel_study'
-    part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}
-    readings = {'measurements_file': str(panel / 'panel_577.csv')}
-    replay = {'bag': str(SAMPLES / 'door_horizontal'), 'start_paused': True}
-    nodes = {
-        DepositionSimulator: part, ModelComparison: part | readings, IndexPlanner: {},
-        BagPlayer: replay,
-    }  # fmt: skip
-    made = [n(context=ros_context, parameter_overrides=parameters(**v)) for n, v in nodes.items()]
-    for node in made:
-        executor.add_node(node)
-    return {publisher.topic_name: publisher for node in made for publisher in node.publishers}
-
-
-def type_of(publisher) -> str:
-    package, kind, _ = publisher.msg_type.__module__.split('.')
-    return f'{package}/{kind}/{publisher.msg_type.__name__}'
+SAMPLES = PACKAGE / 'samples'
 
 
 def test_model_is_the_default_one_and_readings_are_readings():
@@ -84,47 +47,3 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     assert [experiment.name for experiment in read_campaign(campaign).experiments] == [
         'panel', 'door',
     ]  # fmt: skip
-
-
-def test_viewers_show_what_is_published_as_it_is_published(publishers):
-    from rclpy.qos import DurabilityPolicy
-
-    manager = yaml.safe_load((LAYOUTS / 'paint.rviz').read_text())['Visualization Manager']
-    assert manager['Global Options']['Fixed Frame'] == 'part'
-    shown = [display for display in manager['Displays'] if 'Topic' in display]
-    assert len(shown) == 7
-    for display in shown:
-        publisher = publishers['/' + display['Topic']['Value']]
-        assert type_of(publisher) == SHOWN[display['Class'].removeprefix('rviz_default_plugins/')]
-        latched = publisher.qos_profile.durability == DurabilityPolicy.TRANSIENT_LOCAL
-        assert latched == (display['Topic']['Durability Policy'] == 'Transient Local')
-    (cloud,) = (display for display in shown if 'Channel Name' in display)
-    assert cloud['Channel Name'] == 'thickness_um'
-    _foxglove_shows_topics_and_fields_that_there_are(publishers)
-
-
-def _foxglove_shows_topics_and_fields_that_there_are(publishers):
-    layout = json.loads((LAYOUTS / 'foxglove.json').read_text())
-    panels = layout['configById']
-    assert set(panels) == set(panels_of(layout['layout']))
-    scene = panels['3D!part']
-    assert scene['followTf'] == 'part'
-    assert set(scene['topics']) <= set(publishers)
-    assert scene['topics']['/thickness/cloud']['colorField'] == 'thickness_um'
-    titled = [panel for panel in panels.values() if 'foxglovePanelTitle' in panel]
-    assert len(titled) == 4
-    assert all(p['lichtblickPanelTitle'] == p['foxglovePanelTitle'] for p in titled)
-    plots = [panel for name, panel in panels.items() if name.startswith('Plot!')]
-    paths = [path['value'] for plot in plots for path in plot['paths']]
-    assert len(paths) == 11
-    for path in paths:
-        topic, field = path.rsplit('.', 1)
-        assert field in publishers[topic].msg_type.get_fields_and_field_types(), path
-    assert panels['DiagnosticSummary!health']['topicToRender'] in publishers
-
-
-def panels_of(layout) -> list[str]:
-    """Names of the panels in a layout's tree."""
-    if isinstance(layout, str):
-        return [layout]
-    return [*panels_of(layout['first']), *panels_of(layout['second'])]

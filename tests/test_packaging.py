@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -58,11 +59,27 @@ def test_manifest_and_setup_agree():
     xml = manifest(PACKAGE)
     installed = importlib.metadata.metadata(PACKAGE)
     assert xml.findtext('name') == installed['Name'].replace('-', '_')
-    assert xml.findtext('version') == installed['Version']
     assert xml.findtext('license') == installed['License']
     maintainer = xml.find('maintainer')
     assert installed['Maintainer-email'] == f'{maintainer.text} <{maintainer.get("email")}>'
     assert installed['Version'] == paint_deposition.__version__
+
+
+@pytest.mark.filterwarnings('ignore::DeprecationWarning')
+def test_one_version_stands_everywhere(repository):
+    """Also as the newest of each changelog, that of the packages as bloom reads it."""
+    from catkin_pkg.changelog import get_changelog_from_path
+
+    version = paint_deposition.__version__
+    for package in (PACKAGE, 'paint_msgs'):
+        assert manifest(package).findtext('version') == version
+        changelog = get_changelog_from_path(SOURCES / package)
+        assert next(changelog.foreach_version())[0] == version
+    assert yaml.safe_load((repository / 'CITATION.cff').read_text())['version'] == version
+    released = re.findall(r'^## \[([\d.]+)\]', (repository / 'CHANGELOG.md').read_text(), re.M)
+    assert released[0] == version
+    licence = (repository / 'LICENSE').read_bytes()
+    assert (SOURCES / PACKAGE / 'LICENSE').read_bytes() == licence
 
 
 def test_manifest_names_every_message_package_in_use():
@@ -185,6 +202,18 @@ def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
         assert not Path(f'/proc/{process}').exists()
 
 
+def test_containers_start_nodes_with_parameters_that_there_are(repository):
+    compose = yaml.safe_load((repository / 'compose.yaml').read_text())
+    commands = [service['command'].split() for service in compose['services'].values()]
+    assert {words[0] for words in commands} <= {*NODES, 'web_view', 'ros2'}
+    for node, *words in commands:
+        given = [a for option, a in pairwise(words) if option == '-p' and node in NODES]
+        assert {name.split(':=')[0] for name in given} <= set(table_of(node) if given else ())
+    for recipe in (repository / 'containers').glob('*.Dockerfile'):
+        copied = re.findall(r'^COPY (\S+)', recipe.read_text(), re.M)
+        assert all((repository / path).exists() for path in copied)
+
+
 def test_the_aggregator_has_one_group_for_each_node():
     path = SOURCES / PACKAGE / 'config' / 'diagnostic_aggregator.yaml'
     groups = yaml.safe_load(path.read_text())['analyzers']['ros__parameters']
@@ -221,6 +250,11 @@ def test_every_dependency_is_declared_and_pinned(repository):
         Requirement(text) for text in importlib.metadata.requires(PACKAGE) if 'extra' not in text
     ]
     assert {canonicalize_name(requirement.name) for requirement in required} == chosen
+    # Those that rosdep has as packages of the system, and the comment that names the others.
+    text = (SOURCES / PACKAGE / 'package.xml').read_text().replace('ruamel.yaml', 'ruamel-yaml')
+    keys = set(re.findall('<exec_depend>python3-(.*)</', text)) - {'yaml'} | {'pyyaml'}
+    others = set(re.search('<!--(.*)-->', text, re.DOTALL)[1].replace(',', '').split())
+    assert keys == chosen - others
     for requirement in required:
         assert requirement.specifier
         assert requirement.specifier.contains(pins[canonicalize_name(requirement.name)]), (
@@ -282,6 +316,12 @@ def test_the_wheel_brings_command_and_library_without_ros(run, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert {'film.csv', 'film.ply', 'film.png', 'stats.json'} <= set(os.listdir(tmp_path))
+    done = run('paint', 'doctor')
+    assert done.returncode == 0, done.stdout
+    assert 'ROS 2           ModuleNotFoundError' in done.stdout
+    done = run('paint', 'doctor')
+    assert done.returncode == 0, done.stdout
+    assert "No module named 'rclpy'" in done.stdout
     # What it does not bring is asked for in a line: an extra, and ROS for a node.
     words = 'paint sweep needs distributed, pyarrow and ruptures, which are not installed; run:'
     for command, told in (

@@ -73,5 +73,6 @@ OUTPUTS: dict[str, type[BaseModel]] = {
         curve=figures(index_m=list[Number], sigma_n=list[Number]),
     ),
     'plan': figures('cycle_time_s sigma_n', ANY, passes=int, film=Film),
+    'doctor': figures(well=bool, findings=list[figures(name=str, found=str, remedy=str)]),
     'improve': figures(base=ANY, sigma_n=BeforeAfter, mean_um=BeforeAfter),
 }  # fmt: skip

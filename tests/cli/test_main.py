@@ -1,15 +1,19 @@
 """The command as a whole: help, mistakes, interruption."""
 
+import ast
 import os
+import shlex
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 import click
 import pytest
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
+from paint_deposition.cli.examples import EXAMPLES
 from paint_deposition.cli.main import COMMANDS
 from paint_deposition.cli.main import paint as group
 
@@ -38,12 +42,62 @@ def test_help_comes_at_once():
     assert done.stdout.splitlines()[-1] == 'loaded [] [0, 0, 0]'
 
 
+@pytest.mark.parametrize(
+    ('typed', 'offered'),
+    [
+        ('re', ['recommend', 'refit', 'recover']),
+        ('--v', ['--version']),
+        ('plan --fac', ['--faces', '--face-angle-deg']),
+    ],
+)
+def test_the_shell_completes_commands_and_options(typed, offered):
+    line = 'eval "$(_PAINT_COMPLETE=bash_source paint)"'
+    words = f'COMP_WORDS=(paint {typed}); COMP_CWORD={len(typed.split())}'
+    script = f'{line}; {words}; _paint_completion paint; echo "${{COMPREPLY[@]}}"'
+    done = subprocess.run(['bash', '-c', script], capture_output=True, text=True)
+    assert (done.stdout.split(), done.stderr) == (offered, '')
+
+
+def test_completing_a_command_loads_none():
+    program = (
+        'import atexit, sys\n'
+        'from paint_deposition.cli.main import run\n'
+        'rooms = lambda: sorted(n for n in sys.modules if n.startswith("paint_deposition.cli."))\n'
+        'atexit.register(lambda: print(rooms()))\n'
+        'run([])\n'
+    )
+    environment = os.environ | {
+        '_PAINT_COMPLETE': 'bash_complete', 'COMP_WORDS': 'paint ', 'COMP_CWORD': '1',
+    }  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, '-c', program], env=environment, capture_output=True, text=True
+    )
+    *offered, loaded = done.stdout.splitlines()
+    assert offered == [f'plain,{name}' for name in COMMANDS]
+    assert ast.literal_eval(loaded) == [f'paint_deposition.cli.{n}' for n in ('examples', 'main')]
+
+
 @pytest.mark.parametrize('command', COMMANDS)
 def test_every_command_explains_itself(command):
     done = paint(command, '--help')
     assert done.returncode == 0
     assert done.stdout.startswith(f'Usage: paint {command} [OPTIONS]')
     assert '  -h, --help ' in done.stdout
+    assert done.stdout.endswith(f'Example:\n    paint {command} {EXAMPLES[command]}\n')
+
+
+@pytest.mark.parametrize('name', COMMANDS)
+def test_every_example_is_taken_and_begins_with_samples_or_results(name, monkeypatch):
+    monkeypatch.chdir(SAMPLES)
+    command = group.get_command(click.Context(group), name)
+    given = command.make_context(name, shlex.split(EXAMPLES[name])).params
+    assert any(given.values())
+    results = {line.split()[-1] for line in EXAMPLES.values()}
+    for option, value in given.items():
+        for path in value if isinstance(value, tuple) else [value]:
+            if isinstance(path, Path) and option != 'output':
+                own = path.name.startswith('my_')
+                assert own or path.exists() or path.parts[0] in results, path
 
 
 def test_a_command_that_is_none_is_refused_with_the_nearest():

@@ -79,6 +79,7 @@ def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(mode
         (('--speed', 'nan'), 'nan is not finite'),
         (('--speed', 0.2, '--travel-deg', 'inf'), 'inf is not finite'),
         (('--speed', 0.2, '--tolerance', 1e-6), 'the closest is'),
+        (('--speed', 0.2, '--tolerance', 5), 'wanted: Largest sigma_n accepted, 0.05 for 5 %'),
         (('--speed', 0.2, '--model', 'nowhere.yaml'), 'nowhere.yaml: no such file'),
     ],
 )
@@ -109,11 +110,14 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 @pytest.mark.slow
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
-    arguments = ('--mesh', door, '--model', model_file, '--target-um', 20)
+    arguments = ('--mesh', door, '--model', model_file, '--target-um', 20, '--speed-max', 0.1)
     done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json')
     assert done.returncode == 0, done.stderr
     content = json.loads(done.stdout)
     assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
+    (warning,) = content['warnings']
+    assert warning.endswith('m/s are allowed (--speed-min, --speed-max)')
+    assert f'warning: {warning}\n' in done.stderr
     assert content['film']['mean_um'] == pytest.approx(20.0, rel=5e-3)
     assert content['sigma_n'] < content['plane']['sigma_n_on_part']
     names = {path.name for path in (tmp_path / 'plan').iterdir()}

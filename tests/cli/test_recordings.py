@@ -3,6 +3,7 @@
 import json
 
 import pytest
+import trimesh
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
@@ -66,11 +67,40 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     )
     done = paint('inspect', tmp_path / 'poses.csv')
     assert done.returncode == 0, done.stderr
-    first, understood = done.stdout.splitlines()
+    first, understood, stream = done.stdout.splitlines()
     assert first.startswith('2 poses in a frame that is not named over 0.020 s: x 0.015 to 0.095,')
     assert understood.startswith('2 poses: x y z in mm; Euler angles A [deg] B [deg] C [deg]')
+    assert stream.startswith('50.0 a second, 0 gaps, longest interval 0.020 s, 0 repeated and 0')
     told = json.loads(paint('inspect', tmp_path / 'poses.csv', '--json').stdout)
     assert told['high_m'] == [0.095, 0.0, 0.0]
+
+
+def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
+    (tmp_path / 'points.csv').write_text('no,x_m,y_m,z_m\n1,0,0,0\n2,0.5,0,0\n3,1,0,0\n4,2,0,0\n')
+    (tmp_path / 'door.csv').write_text('point;DFT\n1;20,5\n1;21,5\n2;0\n3;n/a\n4;23\n')
+    done = paint('inspect', 'door.csv', '--points', 'points.csv', cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith('warning: 1 readings are 0 (points 2): bare metal, or not meas')
+    assert '(1 of them without a reading: 3)' in done.stdout
+    assert '4 readings at 3 points, 1 of them measured again: noise of the gauge' in done.stdout
+    assert 'film 0.0 to 23.0 µm, mean 16.2 µm\nx 0.000 to 2.000' in done.stdout
+    done = paint('inspect', 'door.csv', '--points', 'points.csv', '--json', cwd=tmp_path)
+    figures = json.loads(done.stdout)
+    assert (figures['zeros'], figures['repeated'], figures['readings']) == (['2'], ['1'], 4)
+    assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
+
+
+@pytest.mark.parametrize(
+    ('scale', 'words'),
+    [(1.0, 'taken for metres'), (1e3, 'looks like millimetres, else it would be 1200 m large')],
+)
+def test_a_mesh_says_its_size_and_unit(panel, scale, words, tmp_path):
+    mesh = trimesh.load_mesh(panel)
+    mesh.apply_scale(scale).export(tmp_path / 'part.stl')
+    first, unit, box = paint('inspect', tmp_path / 'part.stl').stdout.splitlines()
+    assert first == 'part.stl: a mesh of 2 triangles, 1.200 x 0.000 x 0.800 m, 0.96 m2'
+    assert words in unit
+    assert box == 'x -0.600 to 0.600, y 0.000 to 0.000, z -0.400 to 0.400 m'
 
 
 def test_a_bag_without_poses_says_where_its_motion_is(shared_data):

@@ -82,7 +82,7 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
     readings.write_text(
         'point,x_m,y_m,z_m,thickness_um,remark\n'
         + ''.join(
-            f'p{max(k, 1)},{a:.6f},0.004,{b:.6f},{k + 1},"a, b"\n'
+            f'p{max(k, 1)},{a:.6f},0.004,{b:.6f},{k},"a, b"\n'
             for k, (a, b) in enumerate(zip(x, z, strict=True))
         )
     )
@@ -93,6 +93,7 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
         '--at', readings, *COARSE, '-o', tmp_path / 'out',
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+    assert '\nwarning: 1 of 12 readings are 0 where the model expects' in done.stderr
     lines = (tmp_path / 'out/predicted.csv').read_text().splitlines()
     assert lines[0] == 'point,x_m,y_m,z_m,thickness_um,remark,predicted_um'
     assert [line.rsplit(',', 1)[0] for line in lines] == readings.read_text().splitlines()

@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from paint_deposition.errors import PaintError
 from paint_deposition.film.statistics import film_statistics
 
 
@@ -34,6 +35,11 @@ def test_below_within_and_above_share_the_painted_area():
     assert (stats.below_target, stats.within_target, stats.above_target) == pytest.approx(
         (0.2, 0.5, 0.3)
     )
+
+
+def test_a_band_that_reaches_bare_metal_is_refused():
+    with pytest.raises(PaintError, match='tolerance_um 20 is not less than target_um 20: bare'):
+        film_statistics(np.ones(1), np.ones(1), 1.0, target_um=20.0, target_tolerance_um=20.0)
 
 
 @pytest.mark.parametrize(('target', 'cpk'), [(20.0, 1.0), (22.0, 4.0 / 6.0), (28.0, -2.0 / 6.0)])

@@ -115,6 +115,7 @@ class Cell(RuleBasedStateMachine):
             self.executor.add_node(node)
         self.active, self.frame, self.sent = True, 'part', 0
         self.stamp_ns = self.gun_ns = time.time_ns() + 3_600_000_000_000
+        self.run, self.is_whole = '', False
         self.start_recorder()
         self.change_part(0, 0, 0, False)
         self.robot.send_state(self.stamp_ns, 1.0, 1)
@@ -282,7 +283,8 @@ class Cell(RuleBasedStateMachine):
         code = self.recorder.wait()
         assert code == (-9 if signal == 'kill' else 0), self.recorder.err
         assert 'Traceback' not in self.recorder.err
-        if signal == 'kill':
+        # Before its first part it may have received nothing, of which nothing is recovered.
+        if signal == 'kill' and self.is_whole:
             run = recover(run, run.with_name(f'{run.name}_recovered')).folder
         if self.is_whole:
             self.check(run, of)

@@ -9,6 +9,7 @@ import pytest
 
 from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
@@ -102,7 +103,7 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
         ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
         ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
-        ('evo_nav2_turtlebot.mcap', ('odom',), '/odom in .* is nav_msgs/msg/Odometry, not geom'),
+        ('evo_nav2_turtlebot.mcap', ('tf',), '/tf in .* is tf2_msgs/msg/TFMessage, not geom'),
         ('rosbag2_topics_and_services.mcap', (), 'it has no PoseStamped topic'),
         ('evo_none.mcap', (), 'no bag at .*evo_none.mcap'),
         ('../README.md', (), 'is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap'),
@@ -150,6 +151,20 @@ def test_an_unfinished_file_says_how_to_recover_it(tmp_path):
     file.write_bytes(content)
     (folder / 'metadata.yaml').unlink()
     assert refusal(folder).endswith(f'run: paint recover {folder}')
+
+
+def test_a_part_of_a_split_bag_is_not_taken_for_the_whole(tmp_path):
+    """A recorder that is killed has not named its last file; a single file may be named."""
+    folder = write_pose_bag(tmp_path / 'pass', straight_pass(500))
+    shutil.copy(folder / 'pass_0.mcap', folder / 'pass_1.mcap')
+    assert refusal(folder).endswith(
+        f'metadata.yaml does not name pass_1.mcap); run: paint recover {folder}'
+    )
+    metadata = folder / 'metadata.yaml'
+    both = re.sub(r'(\s*- )pass_0.mcap', r'\1pass_0.mcap\1pass_1.mcap', metadata.read_text())
+    metadata.write_text(both)
+    (warning,) = read_recording(folder / 'pass_1.mcap', frame_id='door').warnings
+    assert warning.startswith('pass_1.mcap is one of the 2 files of a split bag; give its folder')
 
 
 def test_other_files_under_a_bags_name(tmp_path):

@@ -195,7 +195,6 @@ IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
     [
         ('DFT\n20,5\nn/a\n21\n22\nOL\n23', [1, 3, 4, 6]),
         ('time,DFT\n8:00,20.5\n8:01,\n8:02,21\n8:03,22\n8:04,\n8:05,23\nend,\n', [1, 3, 4, 6]),
-        ('DFT\n20.5\n\n21\n22\n\n23\n\nMean,21\n', [1, 3, 4, 6]),
         ('DFT\n\n20.5\n21\n22\n\n\n\n23\n24\n25\n', [1, 2, 3, 4, 5, 6]),
         ('no,DFT\n1,20\n2,21\n4,22\n5,22\n', [1, 2, 4, 5]),
         ('no,DFT\n1,20\n2,21\n3,n/a\n4,22\n5,22\n6,---\n', [1, 2, 4, 5]),
@@ -227,7 +226,20 @@ def test_a_lone_heading_keeps_its_unit(file, heading, mark):
 
 @pytest.mark.parametrize(
     'text',
-    ['DFT\n20\n21\n', 'DFT\n20\n\n21\n', 'no,DFT\n1,20\n2,21\n3,22\n', 'DFT\n' + '20\n' * 7],
+    [
+        'DFT\n20\n21\n',
+        'DFT\n20\n\n21\n',
+        'no,DFT\n1,20\n2,21\n3,22\n',
+        'DFT\n' + '20\n' * 7,
+        # A blank line may part two groups: which reading is missing is not known.
+        'DFT\n20\n21\n\n22\n23\n24\n',
+        'DFT\n20\n21\n\n22\nn/a\n23\n',
+        # Neither headings again nor a remark with a number are readings.
+        'DFT\n20\n21\n22\nDFT\n23\n24\n',
+        'time,DFT\n8:00,20\n8:01,21\nNote 2,\n' + '8:02,22\n' * 3,
+        'time,who,DFT\n8:00,M,20\n8:01,M,21\nBatch,2,\n' + '8:02,M,22\n' * 3,
+        'time,DFT\n8:00,20\n8:01,21\n\n8:02,22\n8:03,23\n8:04,24\n',
+    ],
 )
 def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points(file, text):
     with pytest.raises(
@@ -261,11 +273,61 @@ def test_points_that_are_not_listed_are_named_all_at_once(file):
     [
         ('DFT [mil]', 25.4), ('Dicke in mm', 1000.0), ('Trockenschichtdicke [um]', 1.0),
         ('DFT (thou)', 25.4), ('DFT in micrometers', 1.0), ('Dicke [Mikrometer]', 1.0),
+        ('DFT (ist) [mil]', 25.4), ('Épaisseur [mil]', 25.4), ('Blechdicke;DFT [mil]', 25.4),
     ],
 )  # fmt: skip
 def test_headings_of_the_film_in_english_and_german(file, heading, um):
-    text = f'Punkt;x [m];y [m];z [m];{heading};Soll [µm];Std [µm]\nP;0;0;0;1,5;30;2\n'
+    blech = ('Blech' in heading and '0,8;') or ''
+    text = f'Punkt;x [m];y [m];z [m];{heading};Soll [µm];Std [µm]\nP;0;0;0;{blech}1,5;30;2\n'
     assert read_readings(file('a.csv', text)).thickness_um.tolist() == [1.5 * um]
+
+
+@pytest.mark.parametrize('axis', ['{} (ist)', '{} [nominal]', '{}_nom', '{} (soll) [mm]'])
+@pytest.mark.parametrize('cells', ['100;0;50;0,85', '100 mm;0 mm;50 mm;0,85 mil'])
+def test_what_stands_beside_an_axis_or_behind_a_number(file, axis, cells):
+    axes = ';'.join(map(axis.format, 'XYZ'))
+    dicke = 'Dicke' if 'mil' in cells else 'Dicke [mil]'
+    path = file('a.csv', f'Punkt;{axes};{dicke}\nA;{cells}\n')
+    readings = read_readings(path)
+    assert readings.positions_m.tolist() == [[0.1, 0.0, 0.05]]
+    assert readings.thickness_um == pytest.approx([21.59])
+    write_predictions(path.with_name('p.csv'), readings, np.array([20.0]))
+    assert 'mil]' in path.with_name('p.csv').read_text()
+
+
+def test_measured_places_count_before_nominal_ones(file):
+    text = 'P;X soll;Y soll;Z soll;X ist;Y ist;Z ist;DFT\nA;1;2;3;4;5;6;20\n'
+    assert read_readings(file('a.csv', text)).positions_m.tolist() == [[4.0, 5.0, 6.0]]
+
+
+@pytest.mark.parametrize(
+    ('films', 'doubt'),
+    [
+        ('20.1 21.2 22.4 23.1 21.7', 'its last value, 21.7, may be the mean of the rest, and cou'),
+        ('20 21 23 21.33 1.53 20 23', 'last 4 values, 21.33, 1.53, 20, 23, may be statistics of'),
+        ('20.1 21.2 22.4 23.1 21.8', ''), ('20 20 20 20', ''),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize('more', [0, 1])
+def test_unlabelled_statistics_below_readings_are_warned_of(file, films, doubt, more):
+    """Or named where there are more readings than points."""
+    values = films.split()
+    points = ''.join(f'{k},{k},0,0\n' for k in range(len(values) - more))
+    paths = file('a.csv', '\n'.join(['DFT', *values])), file('p.csv', 'no,x_m,y_m,z_m\n' + points)
+    if more:
+        with pytest.raises(ReadingsError, match=doubt.partition(', and')[0] or 'write n/a'):
+            read_readings(*paths)
+    else:
+        assert doubt in ''.join(read_readings(*paths).doubts)
+        assert bool(doubt) == bool(read_readings(*paths).doubts)
+
+
+def test_decimal_commas_cut_by_the_commas_between_columns_are_warned_of(file):
+    points = file('p.csv', IN_ORDER)
+    (doubt,) = read_readings(file('a.csv', 'point,DFT,Remark\n1,20,5\n2,21,0\n'), points).doubts
+    assert doubt.startswith("'DFT' has whole numbers only, as has 'Remark' beside it: if decimal")
+    for text in ('point,DFT,Remark\n1,20.0,5\n', 'point,DFT,Remark\n1,20,\n', 'DFT,point\n20,1\n'):
+        assert read_readings(file('a.csv', text), points).doubts == ()
 
 
 def test_columns_unit_and_decimals_can_be_named(file):
@@ -394,6 +456,14 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
         ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
         ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
+        ('point,DFT\n1,20\n\npoint,DFT [mil]\n2,1\n', {}, 'lines 1 and 4 are headings of two tab'),
+        ('point,DFT\n1,20\npoint,DFT,Units\n2,1,mil\n', {}, 'lines 1 and 3 are headings of two'),
+        ('Punkt;Nassschichtdicke\n1;45\n', {}, "thickness .columns: 'Punkt', 'Nassschichtdicke'"),
+        ('point,DFT\n1,20,5\n2,21,5\n', {}, 'with decimal commas, put semicolons between the col'),
+        ('point;DFT [mm]\n1;24\n', {}, 'is 24000; .* it may be in another unit than is said'),
+        ('point;DFT\n1;24 µm\n2;1 mil\n', {}, "DFT is '24 µm'; .* write the one unit in the hea"),
+        ('point;DFT 1;DFT 2\n;µm;mil\n1;24;1\n', {}, 'thickness is in mil and µm; give all of it'),
+        ('Units;mils\n\npoint;DFT [µm]\n1;24\n', {}, 'thickness is in mil and µm; give all of'),
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
         ('point,DFT (ell)\nP,1\n', {}, "thickness .*; 'DFT .ell.' is in 'ell': give it in µm"),
         (

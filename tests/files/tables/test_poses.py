@@ -48,6 +48,12 @@ LAYOUTS = {
             1e3 * POSITIONS_M, degrees('ZYX'), separator=';', decimal=',',
         ), {},
     ),
+    'German words': (
+        table(
+            'Zeit (Sekunden);X (ist) [mm];Y (ist) [mm];Z (ist) [mm];A (Grad);B (Grad);C (Grad)',
+            TIMES_S, 1e3 * POSITIONS_M, degrees('ZYX'), separator=';', decimal=',',
+        ), {},
+    ),
     'KUKA without units': (
         table('time_s,X,Y,Z,A,B,C', TIMES_S, 1e3 * POSITIONS_M, degrees('ZYX')),
         {'pose_unit': 'mm'},

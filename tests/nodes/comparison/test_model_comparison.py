@@ -19,6 +19,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.comparison.model_comparison import ModelComparison
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN
 
 MOTION = two_passes()
 TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
@@ -150,6 +151,19 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     assert not grey[distance < 0.0599].any()
     texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
     assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
+
+
+def test_a_zero_is_warned_of_once_film_is_expected_there(
+    comparison, robot, readings, wait_until, tmp_path
+):
+    table = readings.read_text().splitlines()
+    x, y, z, _, *rest = table[1].split(',')
+    readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))
+    node = comparison()
+    assert node._status().level == OK
+    robot(node).send(MOTION)
+    wait_until(lambda: node._status().level == WARN, what='the warning')
+    assert '; 1 of 40 readings are 0 where the model expects' in node._status().message
 
 
 def test_bad_input_is_one_line(comparison):

@@ -81,6 +81,7 @@ def test_changes_that_cannot_be_are_refused_with_the_reason(simulator):
         ({'publish_rate_hz': 600.0}, 'out of range'),
         ({'max_pose_gap_s': math.nan}, 'out of range'),
         ({'color_min_um': 50.0}, 'color_min_um 50 is not below color_max_um 0'),
+        ({'target_um': 20.0, 'target_tolerance_um': 60.0}, 'tolerance_um 60 is not less than tar'),
         ({'model_file': 'none.yaml'}, 'none.yaml: no such file'),
         ({'part_pose': [0.0, 1.0], 'part_parent_frame': 'cell'}, 'seven numbers'),
         ({'part_pose': [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]}, 'without part_parent_frame'),
@@ -104,7 +105,7 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     )
     robot(node).send(MOTION)
     painted(node)
-    changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=100.0)
+    changes = parameters(color_max_um=25.0, target_um=10.0, target_tolerance_um=9.9)
     assert all(result.successful for result in node.set_parameters(changes))
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.within_target == 1.0))
     wait_until(lambda: viewer.shows('thickness/legend', lambda m: m.markers[-1].text == '25 µm'))

@@ -1,5 +1,7 @@
 """What the gun's states do to the film while it is painted."""
 
+from dataclasses import replace
+
 import numpy as np
 import rclpy
 from paint_msgs.msg import AtomizerState
@@ -51,6 +53,22 @@ def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, 
     closed.header.stamp.sec += 120
     states.publish(closed)
     wait_until(lambda: node.inputs[0].states_received == 2, what='the next state')
+
+
+def test_what_leaves_the_part_bare_is_reported(simulator, robot, onlooker, wait_until):
+    """A gun by another clock, and one that sprays beside the part."""
+    node, viewer = simulator(), onlooker()
+    source, motion = robot(node), two_passes(poses=900, trigger=False)
+    source.send_state(motion.stamps_ns[0] + 5_000_000_000, 1.0)
+    wait_until(lambda: node.inputs[0].states_received, what='the state')
+    source.send(motion, slice(0, 50))
+    ahead = '1 states stamped over 1 s ahead of the poses sent after them: set the clocks'
+    wait_until(lambda: viewer.reports(POSES, ahead, b'\x01'))
+    source.send_state(motion.stamps_ns[50], 1.0)
+    aside = replace(motion, positions_m=motion.positions_m + np.array([2.0, 0.0, 0.0]))
+    source.send(aside, slice(50, None))
+    bare = 'cm3 were sprayed and nothing lands on the part: check part_pose'
+    wait_until(lambda: viewer.reports(POSES.replace('poses', 'part'), bare, b'\x01'))
 
 
 def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, painted, onlooker,

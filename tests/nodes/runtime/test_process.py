@@ -31,10 +31,14 @@ class Worker(PaintNode):
             os.kill(os.getpid(), signal.SIGINT)
         self.create_timer(0.02, self.work)
 
+    def _validate(self, values):
+        if values['does'] == 'load at once':
+            os.kill(os.getpid(), signal.SIGINT)
+
     def _load_files(self):
         if self.values['does'] == 'refuse':
             raise PaintError('mesh none.stl does not exist; give a mesh')
-        if self.values['does'] == 'load':
+        if 'load' in self.values['does']:
             print('loading', flush=True)
             while True:
                 time.sleep(0.01)
@@ -72,7 +76,7 @@ def worker(ros_domain, tmp_path):
     started = []
 
     def worker(does: str) -> NodeProcess:
-        process = NodeProcess(tmp_path / does, '', code=NODE, does=does)
+        process = NodeProcess(tmp_path / does, '', code=NODE, does=repr(does))
         started.append(process)
         return process
 
@@ -88,20 +92,20 @@ def complaints(process: NodeProcess) -> list[str]:
 
 
 def test_an_interrupt_ends_it_cleanly(worker, wait_until, tmp_path):
-    """Between callbacks, within one, which is completed first, and while it loads."""
-    run, work, load = map(worker, ('run', 'work', 'load'))
+    """Between callbacks, within one, which is completed first, before it loads and meanwhile."""
+    run, work, load, early = map(worker, ('run', 'work', 'load', 'load at once'))
     for process, word in ((run, 'ready'), (work, 'working'), (load, 'loading')):
         wait_until(lambda p=process, w=word: w in p.out, what=word)
         process.interrupt_as_launch_does()
         # And once more while it finishes its files.
         process.interrupt_as_launch_does()
-    assert [process.wait() for process in (run, work, load)] == [0, 0, 0]
+    assert [process.wait() for process in (run, work, load, early)] == [0, 0, 0, 0]
     assert run.out.split() == ['ready', 'closed']
     assert run.err.strip().endswith('[worker]: ready')
     assert complaints(run) == []
     assert (tmp_path / 'worked').exists()
     assert work.out.split()[-1] == 'closed'
-    assert load.err == ''
+    assert load.err == early.err == early.out == ''
 
 
 def test_errors_and_signals_end_it_with_a_code_and_a_line(worker, tmp_path):

@@ -2,6 +2,7 @@
 
 import tempfile
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.films import simulated
 from paint_deposition.planning.improvement.improvement import (
     DEFAULT_TOLERANCE,
@@ -46,6 +48,7 @@ def improve(
     posterior: Posterior | None = None,
     rivals: Sequence[DepositionModel] = (),
     target_region: np.ndarray | None = None,
+    robot: RobotCell | None = None,
     seed: int = 0,
     progress: Progress = lambda what, share: None,
     **wanted: Any,
@@ -63,6 +66,7 @@ def improve(
         rivals: other models that explain the readings as well; each counts as much as the model.
         target_region: (V,) bool, vertices whose film counts; default: the side that the gun
             faces, where the programme lays more than a tenth of its greatest film.
+        robot: that is to drive it, from ``read_robot``: its joints limit the speeds.
         seed: of the draws.
         progress: called with what is being done and the share of it that is done, 0 to 1.
         wanted: the fields of ``planning.requests.ImproveRequest``.
@@ -74,6 +78,8 @@ def improve(
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, original = seen.surface, Programme.of(trajectory)
+    if robot:
+        original = replace(original, allowed=robot.allowed_speeds(trajectory))
     progress('the film as it is', 0.0)
     film_um, paint = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
@@ -85,9 +91,13 @@ def improve(
     if posterior is not None:
         models += draw_models(model, posterior, DRAWS, seed)
     retiming = retime_for_evenness(surface, target_region, original, models, request, progress)
-    moves = moves_of(retiming.programme, request)
+    programme, drive = retiming.programme, None
+    if robot:
+        drive = robot.drive(programme.trajectory(), free_roll=False)
+        programme = Programme.of(drive.trajectory)
+    moves = moves_of(programme, request)
     progress('the film of the written files', 0.0)
-    passes = Passes(retiming.programme.trajectory(), moves, model, 'Improved')
+    passes = Passes(programme.trajectory(), moves, model, 'Improved')
     improved, program = _read_back(passes)
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, program)
@@ -98,7 +108,7 @@ def improve(
     return Improvement(
         surface, target_region, model, request, trajectory, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
-        (*seen.trajectory.warnings, *seen.geometry.warnings),
+        (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
     )  # fmt: skip
 
 

@@ -7,6 +7,8 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.driven_plan import driven
+from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.optimised_plan import optimise
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
@@ -39,6 +41,7 @@ def plan(
     model: DepositionModel | None = None,
     *,
     frame_id: str = 'part',
+    robot: RobotCell | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> Plan:
@@ -48,6 +51,8 @@ def plan(
         surface: the part.
         model: what the gun sprays; default: a 50 mm bell.
         frame_id: of the planned poses.
+        robot: that is to drive it, from ``read_robot``: passes that its joints cannot keep up
+            with are slower, and the plan has the joints; default: any robot does.
         progress: called with what is being done and the share of it that is done, 0 to 1.
         wanted: the fields of ``planning.requests.PlanRequest``; ``speed_m_per_s`` or
             ``target_um`` at least.
@@ -57,7 +62,8 @@ def plan(
     """
     request = PlanRequest(**wanted)
     unoptimised = planned(surface, model or DepositionModel(), request, frame_id, progress)
-    return optimise(unoptimised, progress) if request.optimise else unoptimised
+    found = optimise(unoptimised, progress) if request.optimise else unoptimised
+    return driven(found, robot) if robot else found
 
 
 @takes(PlanRequest)
@@ -68,22 +74,24 @@ def plan_faces(
     frame_id: str = 'part',
     face_angle_deg: float = math.degrees(WIDEST_RAD),
     envelope: GunEnvelope | None = None,
+    robot: RobotCell | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> PartPlan:
     """Lay passes over a part that has several sides, each of them sprayed by itself.
 
     Args:
-        surface, model, frame_id, progress, wanted: as for ``plan``. With ``outward``, faces on the
-            back are left out; ``optimise`` chooses the speeds along the passes for an even film on
-            all faces together.
+        surface, model, frame_id, robot, progress, wanted: as for ``plan``. With ``outward``,
+            faces on the back are left out; ``optimise`` chooses the speeds along the passes for an
+            even film on all faces together.
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
         envelope: of the gun, for the check that it keeps clear of the part.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
-    return planned_faces(
+    found = planned_faces(
         surface, model or DepositionModel(), PlanRequest(**wanted), frame_id,
         math.radians(face_angle_deg), envelope, progress,
     )  # fmt: skip
+    return driven(found, robot) if robot else found

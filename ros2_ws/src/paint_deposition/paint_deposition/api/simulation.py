@@ -13,8 +13,9 @@ from paint_deposition.film.film import Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
-from paint_deposition.film.statistics import film_statistics
+from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
@@ -155,7 +156,9 @@ def simulate(
             part; says why.
         ModelError: models of several guns that do not go together.
         ReadingsError: readings that are not on the part.
+        PaintError: a tolerance that is not less than the target.
     """
+    require_band(target_um, tolerance_um)
     motions = [trajectory] if isinstance(trajectory, Trajectory) else list(trajectory)
     if isinstance(model, Sequence):
         models = list(model)
@@ -197,6 +200,7 @@ def simulate(
         )
     )  # fmt: skip
     predicted_um = None
+    doubts: tuple[str, ...] = ()
     if readings is not None:
         progress('predicting the readings', 0.0)
         # Each reading by itself, in double precision, and the slope of the film around it.
@@ -204,7 +208,8 @@ def simulate(
         part = Experiment.of('part', surface, seen[0].path, each)
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
         predicted_um = at_points.gauge_um[: len(part)]
-    return Film(surface, guns, film_um, statistics, readings, predicted_um, common.used)
+        doubts = readings_in_doubt(surface, readings, predicted_um)
+    return Film(surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts)
 
 
 def _painted(

@@ -30,6 +30,7 @@ from paint_deposition.planning.requests import ImproveRequest
 @options_of(ImproveRequest)
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
+@options.JOINT_ACCELERATION
 @options.results_options(
     'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
 )
@@ -41,24 +42,33 @@ def improve_command(
     rivals: tuple[Path, ...],
     seed: int,
     motion: dict[str, Any],
+    joint_acceleration: float | None,
     results: options.Results,
 ) -> None:
     """Make the film of a given programme more even; its path stays as it is.
 
     Speeds along the passes, flows and the places where the gun opens and closes are chosen
     through the whole model. What changes is printed pass by pass; the bag and the robot program
-    are read back, and all figures are of their film.
+    are read back, and all figures are of their film. With --urdf and --part-pose no joint of the
+    robot is faster than it can be.
     """
+    from paint_deposition.files.motion_files import holds_joints
+
     with Progress('improve') as show:
         show('reading')
         chosen = model_for(model_file, trajectory)
-        recorded = pd.read_recording(trajectory, **motion)
+        robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
+        limits = {'joint_acceleration': joint_acceleration}
+        part_pose = motion['part_pose']
+        cell = options.robot_cell(robot | limits, part_pose) if part_pose else None
+        known = motion if holds_joints(trajectory) else motion | dict.fromkeys(robot)
+        recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')
         surface = pd.read_mesh(**part)
         result = pd.improve(
             surface, recorded, chosen.model,
             posterior=chosen.file.posterior if chosen.file else None,
-            rivals=[pd.read_model(path) for path in rivals],
+            rivals=[pd.read_model(path) for path in rivals], robot=cell,
             seed=seed, progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
@@ -87,6 +97,8 @@ def _lines(result: pd.Improvement) -> Iterator[str]:
     for change in result.changes:
         yield change.sentence
     yield from result.limit_sentences
+    if result.drive:
+        yield result.drive.sentence
     yield (
         'the robot program lays the film of the bag within '
         f'{100 * result.program_difference:.2f} % of its peak'

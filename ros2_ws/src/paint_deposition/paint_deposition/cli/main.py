@@ -5,8 +5,10 @@ import os
 import sys
 
 import click
+from click.shell_completion import CompletionItem
 
 from paint_deposition import __version__
+from paint_deposition.cli.examples import EXAMPLES
 from paint_deposition.errors import PaintError, did_you_mean
 
 # As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
@@ -28,9 +30,11 @@ COMMANDS = {
     'refit': ('inference', 'Add an effect of your choice and refit.'),
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
     'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
+    'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
+    'doctor': ('doctor', 'Say what is installed, and test it.'),
 }
 
 
@@ -45,7 +49,18 @@ class Commands(click.Group):
             remedy = did_you_mean(name, COMMANDS)
             raise click.UsageError(f'no command is called {name!r}; {remedy}')
         module = importlib.import_module(f'paint_deposition.cli.{COMMANDS[name][0]}')
-        return getattr(module, f'{name}_command')
+        command: click.Command = getattr(module, f'{name}_command')
+        command.epilog = f'\b\nExample:\n  paint {name} {EXAMPLES[name]}'
+        return command
+
+    def shell_complete(self, context: click.Context, incomplete: str) -> list[CompletionItem]:
+        """Commands without loading their modules, all of which together take a second."""
+        commands = [
+            CompletionItem(name, help=summary)
+            for name, (_, summary) in COMMANDS.items()
+            if name.startswith(incomplete)
+        ]
+        return commands + click.Command.shell_complete(self, context, incomplete)
 
     def resolve_command(
         self, context: click.Context, args: list[str]
@@ -96,7 +111,7 @@ def main(arguments: list[str] | None = None) -> None:
 def run(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit code."""
     try:
-        paint.main(args=arguments, prog_name='paint', standalone_mode=False)
+        return paint.main(args=arguments, prog_name='paint', standalone_mode=False) or 0
     except (PaintError, click.ClickException) as error:
         text = error.format_message() if isinstance(error, click.ClickException) else str(error)
         return _refuse(text)
@@ -105,9 +120,6 @@ def run(arguments: list[str] | None = None) -> int:
     except (click.Abort, KeyboardInterrupt):
         click.echo('paint: interrupted', err=True)
         return 130
-    except click.exceptions.Exit as leaving:
-        return leaving.exit_code
-    return 0
 
 
 def _refuse(text: str) -> int:

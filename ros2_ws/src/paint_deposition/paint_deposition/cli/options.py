@@ -33,15 +33,16 @@ class FiniteNumber(Finite, click.types.FloatParamType):
 
 
 class FiniteRange(Finite, click.FloatRange):
-    """A finite number within bounds; of a length in millimetres it says what is wanted."""
+    """A finite number within bounds; outside of them it says what is wanted."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             return super().convert(value, param, ctx)
         except click.BadParameter as error:
-            if param is None or not str(param.name).endswith('_m'):
+            if not isinstance(param, click.Option) or not param.help:
                 raise
-            words = f'{error.message.rstrip(".")}, in metres'
+            metres = ', in metres' if str(param.name).endswith('_m') else ''
+            words = f'{error.message.rstrip(".")}{metres}; wanted: {param.help.rstrip(".")}'
             raise click.BadParameter(words, ctx, param) from None
 
 
@@ -62,6 +63,12 @@ FILE = File(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
 JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
 CAMPAIGN = click.argument('campaign', type=FILE)
+
+
+POINTS = click.option(
+    '--points', 'points_file', type=FILE,
+    help='Measuring points, label and x, y, z, of readings that name their point only.',
+)  # fmt: skip
 
 
 def model_option(text: str) -> Callable:
@@ -176,6 +183,37 @@ def grouped(
 
 
 motion_options = grouped(MOTION, 'motion')
+JOINT_ACCELERATION = click.option(
+    '--joint-acceleration', type=POSITIVE,
+    help='Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: full '
+    'speed in a quarter of a second.',
+)  # fmt: skip
+# The robot that is to drive a plan: what `read_robot` takes beside the pose of the part.
+robot_options = grouped(
+    (
+        click.option(
+            '--urdf', type=FILE,
+            help='Robot that is to drive it; --part-pose says where the part stands in its base.',
+        ),
+        click.option('--tip', '--tip-link', 'tip_link',
+                     help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
+        click.option('--base', '--base-link', 'base_link',
+                     help='Link of the URDF for the frame of the poses; default: its root.'),
+        JOINT_ACCELERATION,
+    ),
+    'robot',
+)  # fmt: skip
+
+
+def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> Any:
+    """The robot of ``robot_options`` with the part; None where none is given."""
+    if robot['urdf'] is None:
+        return None
+    if part_pose is None:
+        raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
+    from paint_deposition.api.robot import read_robot
+
+    return read_robot(part_pose=part_pose, **robot)
 
 
 def part_options(max_edge_length_m: float, required: bool = True) -> Callable:

@@ -56,6 +56,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @options.BRUSH
 @options_of(PlanRequest)
 @options.PART_POSE
+@options.robot_options
 @click.option(
     '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
 )
@@ -74,6 +75,7 @@ def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
     part: dict[str, Any],
+    robot: dict[str, Any],
     model_file: Path | None,
     brush: int,
     part_pose: list[float] | None,
@@ -87,6 +89,7 @@ def plan_command(
 
     chosen, wanted = chosen_model(model_file, brush=brush), dict(request)
     model = chosen.model
+    cell = options.robot_cell(robot, part_pose)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as show:
         show('reading the mesh')
@@ -94,24 +97,26 @@ def plan_command(
         frame = frame_id if part_pose is None else 'part'
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
-            result = pd.plan(surface, model, frame_id=frame, progress=show, **wanted)
+            result = pd.plan(surface, model, frame_id=frame, robot=cell, progress=show, **wanted)
             touched = contacts(surface, result.trajectory, envelope)
         else:
             result = pd.plan_faces(
                 surface, model, frame_id=frame, face_angle_deg=face_angle_deg, envelope=envelope,
-                progress=show, **wanted,
+                robot=cell, progress=show, **wanted,
             )  # fmt: skip
             touched = result.contacts
+        warnings = [*result.warnings, *map(str, touched)]
         show('writing')
         made_from = {
             'mesh': str(part['path']),
             'model': str(model_file or 'default'),
             'frame_id': frame_id,
             'part_pose': part_pose,
+            'warnings': warnings,
         }
         results.write(result, made_from=made_from, part_pose=part_pose, frame_id=frame_id)
     options.print_all('note', surface.notes)
-    options.print_all('warning', [*result.warnings, *map(str, touched)])
+    options.print_all('warning', warnings)
     results.print(_plan_lines(result), model=chosen.words)
 
 
@@ -124,6 +129,8 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
     yield from options.paint_lines(result)
+    if result.drive:
+        yield result.drive.sentence
     if isinstance(result, pd.PartPlan):
         gun = result.envelope
         if not result.contacts:

@@ -10,6 +10,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
+from paint_deposition.cli.inspected import box_words, mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.json_files import json_text
@@ -22,6 +23,7 @@ if TYPE_CHECKING:
 
 @click.command('inspect')
 @click.argument('recording', type=options.FILE, required=False)
+@options.POINTS
 @options.part_options(0.02, required=False)
 @click.option(
     '--trajectory', type=options.FILE, help='The motion to set beside the part; or RECORDING.'
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
 @options.JSON
 def inspect_command(
     recording: Path | None,
+    points_file: Path | None,
     part: dict[str, Any],
     trajectory: Path | None,
     max_pose_gap_s: float,
@@ -47,7 +50,8 @@ def inspect_command(
 
     Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
     targets, moves, speeds, where the gun is switched, and what could not be followed. Of a table
-    of poses (.csv, .tsv, .txt): what was understood.
+    of poses (.csv, .tsv, .txt): what was understood. Of gauge readings: also their zeros and
+    repeats. Of a mesh: its size, unit and bodies.
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
@@ -60,24 +64,30 @@ def inspect_command(
     else:
         if any(drawn[name] for name in ('output', 'model_file')):
             raise click.UsageError('--out and --model need --mesh')
-        figures, lines = _contents(path, motion, max_pose_gap_s)
+        figures, lines = _contents(path, points_file, motion, max_pose_gap_s)
         figures |= {'provenance': origin(files={'recording': path})}
     click.echo(json_text(figures) if as_json else lines)
 
 
 def _contents(
-    path: Path, motion: dict[str, Any], max_pose_gap_s: float
+    path: Path, points_file: Path | None, motion: dict[str, Any], max_pose_gap_s: float
 ) -> tuple[dict[str, Any], str]:
-    """What a RAPID module, a table of poses or a bag holds: figures, and the same in words."""
+    """What a module, table, mesh or bag holds: figures, and the same in words."""
     from paint_deposition.errors import RecordingError
+    from paint_deposition.files.mesh_bodies import SUFFIXES
     from paint_deposition.files.motion_files import read_table
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
     from paint_deposition.files.refusals import checked
     from paint_deposition.files.tables.poses import is_pose_table
+    from paint_deposition.files.tables.readings import holds_readings
 
     source = checked(MotionSource, 'motion', motion, RecordingError)
+    if path.suffix.lower() in SUFFIXES:
+        return mesh_in(path)
+    if is_pose_table(path) and (points_file or holds_readings(path)):
+        return readings_in(path, points_file)
     if is_pose_table(path):
         poses = read_table(path, source)
         options.print_all('warning', poses.warnings)
@@ -111,11 +121,14 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
     sides = ', '.join(
         f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
     )
-    line = f'poses: {_stream_words(quality, poses.frame_id, "m")}: {sides}'
-    return figures, '\n'.join([line, *poses.notes])
+    frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
+    return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 
 def _bag_contents(summary: BagSummary) -> str:
+    from paint_deposition.files.recordings.message_definitions import TF_TYPES
+
     lines = [summary.path]
     width = max((len(topic.name) for topic in summary.topics), default=0)
     lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
@@ -123,6 +136,8 @@ def _bag_contents(summary: BagSummary) -> str:
         lines += _source_lines(source)
     if not summary.pose_streams:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
+    if {topic.type for topic in summary.topics} & {*TF_TYPES}:
+        lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
     lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
     return '\n'.join(lines)
 
@@ -131,31 +146,29 @@ def _source_lines(source: PoseSource) -> list[str]:
     """One source of poses: its figures, and whether it will do."""
     from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 
-    what = {JOINT_TYPE: 'joints on ', 'transforms': 'transforms from '}.get(
-        source.type, 'poses on '
-    )
+    kinds = {JOINT_TYPE: 'joints on', 'transforms': 'transforms from'}
+    what = f'{kinds.get(source.type, "poses on")} {source.topic}'
     if source.quality is None:
-        return [f'{what}{source.topic} will not do: {source.faults[0]}']
+        return [f'{what} will not do: {source.faults[0]}']
+    frame = f" in frame '{source.frame_id}'" if source.frame_id else ''
     return [
-        f'{what}{source.topic}: {_stream_words(source.quality, source.frame_id, source.unit)}',
+        f'{what}: {source.quality.poses}{frame} over {source.quality.duration_s:.3f} s, '
+        f'{_stream_words(source.quality)}, in {source.unit}',
         *(f'  warning: {fault}' for fault in source.faults),
         f'  {"to be used with care" if source.faults else "will do"}: {source.options}',
     ]
 
 
-def _stream_words(quality: StreamQuality, frame_id: str, unit: str) -> str:
-    frame = f" in frame '{frame_id}'" if frame_id else ' in a frame that is not named'
-    frame = '' if unit in ('rad', 'deg') else frame
+def _stream_words(quality: StreamQuality) -> str:
     lag = ''
     if quality.lag_s is not None and quality.lag_range_s is not None:
         low, high = quality.lag_range_s
         lag = f', logged {quality.lag_s:.3g} s after the stamp ({low:.3g} to {high:.3g})'
     return (
-        f'{quality.poses}{frame} over {quality.duration_s:.3f} s, '
         f'{quality.mean_rate_hz:.1f} a second, {quality.gaps} gaps, longest interval '
         f'{quality.longest_gap_s:.3f} s, {quality.repeated_stamps} repeated and '
-        f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated samples, '
-        f'in {unit}{lag}'
+        f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated '
+        f'samples{lag}'
     )
 
 

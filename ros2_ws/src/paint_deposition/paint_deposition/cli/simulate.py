@@ -38,10 +38,7 @@ from paint_deposition.cli.progress import Progress
     'predicted_um, what the gauge should show at exactly those points: the film with effects on '
     'the gauge.',
 )  # fmt: skip
-@click.option(
-    '--points', 'points_file', type=options.FILE,
-    help='Measuring points, label and x, y, z, of readings that name their point only.',
-)  # fmt: skip
+@options.POINTS
 @options.motion_options
 @options.MAX_POSE_GAP
 @click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
@@ -65,11 +62,6 @@ def simulate_command(
     """
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
-    if wanted['target_um'] and wanted['tolerance_um'] >= wanted['target_um']:
-        raise click.UsageError(
-            f'--tolerance-um {wanted["tolerance_um"]:g} is not less than --target-um '
-            f'{wanted["target_um"]:g}: bare metal would be within it; give a smaller one'
-        )
     with Progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions

@@ -16,6 +16,7 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.interruptions import checked_path
@@ -57,11 +58,10 @@ class _File(BaseModel, extra='forbid'):
     def _band(self) -> '_File':
         if (self.target_um is None) != (self.tolerance_um is None):
             raise ValueError('target_um and tolerance_um belong together; give both or none')
-        if self.target_um and self.tolerance_um and self.tolerance_um >= self.target_um:
-            raise ValueError(
-                f'tolerance_um {self.tolerance_um:g} is not less than target_um '
-                f'{self.target_um:g}: bare metal would be within it; give a smaller one'
-            )
+        try:
+            require_band(self.target_um or 0.0, self.tolerance_um or 0.0)
+        except PaintError as error:
+            raise ValueError(str(error)) from None
         return self
 
 

@@ -50,9 +50,10 @@ def read_readings(
     table = read.table
     thickness, row, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
-        span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
         found = f'{read.heading("thickness")} is {thickness[k]:g}'
-        table.complain(row[k], f'{found}; expected {span}')
+        span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
+        unit = ': it may be in another unit than is said' if thickness[k] > THICKEST_UM else ''
+        table.complain(row[k], f'{found}; expected {span}{unit}')
     if listed is not None:
         positions, normals, labels, place_words = listed.joined_to(read)
     else:
@@ -70,7 +71,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
-        GUESSED in place_words,
+        GUESSED in place_words, read.doubts,
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -166,10 +167,13 @@ class MeasuringPoints:
                 if not {*wanted} <= {*self.labels}:
                     wanted = [self.labels[int(number) - 1] for number in wanted]
                 return wanted, 'by the order of the readings'
+        figures = readings.figures_at_end
+        what = f'{figures}; delete it if so' if figures else (
+            'which is missing is not known; write n/a in its place'
+        )  # fmt: skip
         raise readings.table.error(
             f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
-            f'{self.path.name}: which is missing is not known; write n/a in its place, or give a '
-            "column 'point' with the labels of the points"
+            f"{self.path.name}: {what}, or give a column 'point' with the labels of the points"
         )
 
 
@@ -243,7 +247,7 @@ def _places(
         )
     raise table.error(
         f'the readings have no coordinates {shown(table.headings)}; give x, y, z, or a list of '
-        'measuring points (points: in a campaign, --points with simulate)'
+        'measuring points (points: in a campaign, else --points)'
     )
 
 

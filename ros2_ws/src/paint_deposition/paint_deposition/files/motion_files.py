@@ -12,8 +12,10 @@ from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
+from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -41,7 +43,7 @@ def read_recording(
     """Read the poses and the trigger of a motion file, and transform them into the part's frame.
 
     Args:
-        path: a bag, a RAPID module or a table of poses.
+        path: a bag, a RAPID module, a tool path of noether or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
         more: the other fields of ``MotionSource``, such as ``part_pose``.
@@ -62,14 +64,26 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
         recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
+    elif is_tool_path(path):
+        source.require_kind(path, 'a tool path')
+        recorded = read_tool_path(path)
     elif is_pose_table(path):
         recorded = read_table(path, source)
     else:
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
+            recorded = replace(recorded, warnings=(*recorded.warnings, *bag.warnings))
             return _in_part_frame(recorded, source, bag)
     return _in_part_frame(replace(recorded, source=str(path)), source, None)
+
+
+def holds_joints(path: Path) -> bool:
+    """Whether the motion in a file is that of joints, for which the robot has to be known."""
+    if is_rapid(path) or is_tool_path(path) or is_pose_table(path):
+        return False
+    with open_bag(path) as bag:
+        return bool(bag.topics_of(JOINT_TYPE))
 
 
 def read_table(path: Path, source: MotionSource) -> Trajectory:

@@ -76,7 +76,10 @@ class MotionSource(BaseModel, extra='forbid'):
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
-PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
+PLURAL = {
+    'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules',
+    'a tool path': 'tool paths',
+}  # fmt: skip
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
     'pose_topic': 'bags', 'tf': 'bags', 'gun_signal': 'RAPID modules', 'rotation': 'tables',

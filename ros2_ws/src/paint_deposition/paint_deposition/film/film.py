@@ -59,6 +59,7 @@ class Film:
         readings: places where the gauge should be predicted, or None.
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
         paint: that was sprayed.
+        doubts: what is odd in the readings.
     """
 
     surface: Surface
@@ -68,6 +69,7 @@ class Film:
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
     paint: PaintUsed = NO_PAINT
+    doubts: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         s = self.statistics
@@ -103,7 +105,7 @@ class Film:
 
     @property
     def warnings(self) -> tuple[str, ...]:
-        """What is odd in recordings and geometry, each with its likely cause."""
+        """What is odd in recordings, geometry and readings, each with its likely cause."""
         spraying_s = sum(gun.path.spraying_time_s for gun in self.guns)
         bare = (
             f'the part stays bare, its thickest film is {self.film_um.max():.2g} µm: the gun '
@@ -112,7 +114,8 @@ class Film:
         odd = self._of_each(lambda gun: gun.geometry.warnings)
         odd = odd or ((bare,) if self.statistics.coverage == 0.0 else ())
         recorded = self._of_each(lambda gun: gun.trajectory.warnings)
-        return (*recorded, *odd, *self._of_each(lambda gun: impossible_brushes(gun.model)))
+        brushes = self._of_each(lambda gun: impossible_brushes(gun.model))
+        return (*recorded, *odd, *brushes, *self.doubts)
 
     def _of_each(self, lines: Callable[[GunFilm], tuple[str, ...]]) -> tuple[str, ...]:
         return tuple(

@@ -5,6 +5,8 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from paint_deposition.errors import PaintError
+
 # Thinner film counts as bare metal: overspray dust that no gauge shows.
 DEFAULT_PAINTED_ABOVE_UM = 1.0
 CPK_MEANS = (
@@ -57,6 +59,15 @@ class FilmStatistics:
         return {k: None if math.isnan(v) else float(v) for k, v in asdict(self).items()}
 
 
+def require_band(target_um: float, tolerance_um: float) -> None:
+    """Refuse a tolerance about a target that would accept bare metal. Raises PaintError."""
+    if 0.0 < target_um <= tolerance_um:
+        raise PaintError(
+            f'tolerance_um {tolerance_um:g} is not less than target_um {target_um:g}: bare metal '
+            'would be within it; give a smaller one'
+        )
+
+
 def film_statistics(
     film_um: np.ndarray,
     area_m2: np.ndarray,
@@ -69,8 +80,9 @@ def film_statistics(
     """Sum up a film (V,) [um] by the area (V,) that each vertex stands for; 1 um on 1 m2 is 1 cm3.
 
     ``emitted_cm3`` are the solids that a part which catches everything would get, K1 times the
-    time sprayed. A target of 0 is none.
+    time sprayed. A target of 0 is none. Raises PaintError as ``require_band``.
     """
+    require_band(target_um, target_tolerance_um)
     painted = film_um > painted_above_um
     film, area = film_um[painted], area_m2[painted]
     painted_area = float(area.sum())

@@ -20,6 +20,7 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.improvement.nodes import Nodes
 from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_pass, trajectory_of
@@ -89,6 +90,7 @@ class PlannedFilm:
     paint: PaintUsed
     statistics: FilmStatistics  # of the film on the painted part
     sigma_n: float  # standard deviation over mean there, bare metal included
+    drive: Drive | None = None  # of the robot that it was made for
 
     @property
     def mean_um(self) -> float:
@@ -123,6 +125,7 @@ class PlannedFilm:
     def warnings(self) -> Iterator[str]:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
+        yield from map(str, self.drive.limits if self.drive else ())
         if target and request.speed_m_per_s and abs(self.mean_um / target - 1.0) > NEAR:
             yield (
                 f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
@@ -150,6 +153,8 @@ class PlannedFilm:
             'sigma_n': self.sigma_n,
             'film': self.statistics.to_dict(),
             'paint': paint_figures(self),
+            'warnings': list(self.warnings),
+            'robot': self.drive and self.drive.to_dict(),
         }
 
 

@@ -182,7 +182,7 @@ class ImproveRequest(Limits):
     )
     tolerance: float | None = given(
         None, 'Accepted difference from the target, 0.1 for 10 %; film outside counts more.',
-        above=0.0,
+        above=0.0, below=1.0,
     )  # fmt: skip
     paint_weight: float = given(
         3e-3, 'Cost of all the paint of the programme, in units of sigma_n squared.',

@@ -49,7 +49,7 @@ class RawMessage(NamedTuple):
 
 
 class Bag:
-    """An open bag; made by `open_bag`."""
+    """An open bag; made by `open_bag`. ``warnings`` say what it lacks."""
 
     def __init__(self, path: Path, reader: Ros1Reader | Ros2Reader) -> None:
         self.path = path
@@ -59,7 +59,13 @@ class Bag:
         counts: Counter[tuple[str, str]] = Counter()
         for connection in reader.connections:
             counts[connection.topic, connection.msgtype] += connection.msgcount
-        kept = custom_data(path if path.is_dir() else path.parent).get(KEPT, '').split()
+        folder = path if path.is_dir() else path.parent
+        kept = custom_data(folder).get(KEPT, '').split()
+        named = _information(folder).get('relative_file_paths') or []
+        self.warnings: tuple[str, ...] = ()
+        if path.name in named[:-1] or path.name in named[1:]:
+            several = f'{path.name} is one of the {len(named)} files of a split bag'
+            self.warnings = (f'{several}; give its folder, {folder}, for all of it',)
         self._kept = {name: int(n) for name, _, n in (entry.partition('=') for entry in kept)}
         # Sorted by name, topics without messages included.
         self.topics = [
@@ -165,11 +171,16 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
+    return _information(path).get('custom_data') or {}
+
+
+def _information(path: Path) -> dict[str, Any]:
+    """What the metadata.yaml of a rosbag2 folder says, nothing where it cannot be read."""
     try:
         text = (path / 'metadata.yaml').read_text(encoding='utf-8')
         metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
-        return dict(metadata['rosbag2_bagfile_information'].get('custom_data') or {})
-    except Exception:  # an older version, damaged, or no bag, which reading it reports
+        return dict(metadata['rosbag2_bagfile_information'])
+    except Exception:  # damaged, or no bag, which reading it reports
         return {}
 
 
@@ -218,6 +229,13 @@ def _require_bag(path: Path) -> None:
             raise RecordingError(_unfinished(path, f'{file.name} has no end'))
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
+    if path.is_dir():
+        # A recorder that splits its bag and is killed has not named the last file yet.
+        listed = _information(path).get('relative_file_paths') or names
+        named = {Path(name).name.removesuffix('.zstd') for name in listed}
+        there = {name for name in names if name.endswith(ROS2_SUFFIXES)}
+        if others := ', '.join(sorted(there - named)):
+            raise RecordingError(_unfinished(path, f'its metadata.yaml does not name {others}'))
 
 
 def _unfinished(path: Path, reason: str) -> str:

@@ -18,6 +18,7 @@ from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
 from paint_deposition.files.tables.headings import LENGTHS
+from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import Trajectory
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
 
 POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
+JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
+JOINT_TOPIC = '/joint_trajectory'
 # For a trigger without stamps the log times are used, if those of the poses show that recorder and
 # robot have the same clock.
 MAX_CLOCK_OFFSET_S = 1.0
@@ -99,10 +102,12 @@ def motion_of(
         else:
             read, log_times_ns, name = read_poses(bag, pose_topic)
         if not pose_unit and looks_like_mm(read.positions_m):
-            raise RecordingError(
-                f'{name} in {bag.path} reaches {np.abs(read.positions_m).max():.4g} and is read '
-                'in m, as ROS has it: no part is so far away; give --pose-unit mm, or m if it is'
+            far = (
+                f'{name}: its positions reach {np.nanmax(np.abs(read.positions_m)):.4g} and are '
+                'read in m, as ROS has them: no part is so far away; give --pose-unit mm, or m '
+                'if it is'
             )
+            read = replace(read, warnings=(*read.warnings, far))
         read = replace(read, positions_m=read.positions_m * LENGTHS[pose_unit or 'm'])
     poses = np.hstack([read.positions_m, read.quaternions_xyzw])
     faults = StreamQuality.of(read.stamps_ns, poses).faults(name)
@@ -116,11 +121,13 @@ def write_pose_bag(
     state_topic: str = STATE_TOPIC,
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
+    joints: JointMotion | None = None,
 ) -> Path:
     """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped and the trigger.
 
     The trigger is Bool, or AtomizerState for other flows than 0 and 1 and for numbered brushes.
-    ``part`` is name and pose of the part's frame, for /tf_static.
+    ``part`` is name and pose of the part's frame, for /tf_static; ``joints`` drive the motion and
+    are written as one JointTrajectory.
     """
     poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
@@ -150,6 +157,12 @@ def write_pose_bag(
             stamped = types.types['geometry_msgs/msg/TransformStamped'](header, child, transform)
             cdr = types.serialize_cdr(types.types[TF_TYPES[0]]([stamped]), TF_TYPES[0])
             run.write('/tf_static', bytes(cdr), begin_ns, begin_ns)
+        if joints:
+            begin_ns = int(trajectory.stamps_ns[0])
+            _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
+            message = _joint_trajectory(types, _header(types, begin_ns, ''), joints)
+            cdr = types.serialize_cdr(message, JOINT_TRAJECTORY_TYPE)
+            run.write(JOINT_TOPIC, bytes(cdr), begin_ns, begin_ns)
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
             header = _header(types, time_ns, trajectory.frame_id)
             if is_pose:
@@ -159,6 +172,21 @@ def write_pose_bag(
                 cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
             run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
     return run.folder
+
+
+def _joint_trajectory(types: Typestore, header: Any, joints: JointMotion) -> Any:
+    point, duration = (
+        types.types[name]
+        for name in ('trajectory_msgs/msg/JointTrajectoryPoint', 'builtin_interfaces/msg/Duration')
+    )
+    none = np.empty(0)
+    points = [
+        point(position, speed, none, none, duration(int(time_s), round(time_s % 1.0 * 1e9)))
+        for time_s, position, speed in zip(
+            joints.seconds.tolist(), joints.values, joints.speeds, strict=True
+        )
+    ]
+    return types.types[JOINT_TRAJECTORY_TYPE](header, list(joints.joints), points)
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:

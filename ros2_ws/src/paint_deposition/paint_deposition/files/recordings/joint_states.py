@@ -3,8 +3,10 @@
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
+from xml.etree import ElementTree
 
 import networkx as nx
 import numpy as np
@@ -15,6 +17,7 @@ from paint_deposition.files.recordings.bag_files import Bag, listed_topics
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.tables.headings import ANGLES, LENGTHS
+from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.repeated_samples import RepeatedSamples
 from paint_deposition.motion.stream_quality import StreamQuality
 from paint_deposition.motion.trajectory import Trajectory
@@ -87,6 +90,32 @@ class Robot:
     def moving_joints(self) -> list[str]:
         """Names of the joints that move."""
         return [joint.joint_name for joint in self.chain if joint.joint_type != 'fixed']
+
+    @cached_property
+    def arm(self) -> Arm:
+        """The joints that move, with their limits."""
+        moving, frames, frame = [], [], np.eye(4)
+        for joint in self.chain:
+            frame = frame @ joint.child2parent
+            if joint.joint_type != 'fixed':
+                moving.append(joint)
+                frames.append(frame)
+                frame = np.eye(4)
+        axes = np.array([joint.joint_axis for joint in moving])
+        lower, upper = np.array([joint.limits for joint in moving]).T
+        return Arm(
+            tuple(self.moving_joints), np.array([*frames, frame]),
+            axes / np.linalg.norm(axes, axis=1, keepdims=True),
+            np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
+            np.array([self._fastest().get(name, np.inf) for name in self.moving_joints]),
+        )  # fmt: skip
+
+    def _fastest(self) -> dict[str, float]:
+        """Greatest speed of each joint that has one [rad/s or m/s]."""
+        root = ElementTree.parse(self.path).getroot()
+        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
+        speeds = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
+        return {name: speed for name, speed in speeds.items() if speed > 0.0}
 
     def recorded_joints(
         self, names: Mapping[str, T], where: str, numbered: bool = False
@@ -178,20 +207,8 @@ class Robot:
         """Positions (N, 3) and quaternions (N, 4) of the tip, from (N, J) moving joints [rad or
         m].
         """
-        tip = np.tile(np.eye(4), (len(values), 1, 1))
-        columns = iter(values.T)
-        for joint in self.chain:
-            tip = tip @ joint.child2parent
-            if joint.joint_type != 'fixed':
-                axis = joint.joint_axis / np.linalg.norm(joint.joint_axis)
-                along = np.outer(next(columns), axis)
-                moved = np.tile(np.eye(4), (len(values), 1, 1))
-                if joint.joint_type == 'prismatic':
-                    moved[:, :3, 3] = along
-                else:
-                    moved[:, :3, :3] = Rotation.from_rotvec(along).as_matrix()
-                tip = tip @ moved
-        return tip[:, :3, 3], Rotation.from_matrix(tip[:, :3, :3]).as_quat()
+        positions, axes = self.arm.tips(values)
+        return positions, Rotation.from_matrix(axes).as_quat()
 
 
 @dataclass

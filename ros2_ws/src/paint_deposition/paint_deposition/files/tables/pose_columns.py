@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.tables.headings import TIMES, Heading
+from paint_deposition.files.tables.headings import BESIDE, TIMES, Heading
 from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table, find_table, headings_in, rows_below
@@ -24,9 +24,7 @@ POSITION = ('x', 'y', 'z')
 QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ROTATION_VECTOR, ROLL_PITCH_YAW = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
 # What a heading says of a pose beside the coordinate itself.
-BESIDE = (
-    'tcp', 'tool', 'pose', 'position', 'pos', 'actual', 'act', 'robot', 'header', 'field', 'p',
-)  # fmt: skip
+BESIDE_POSE = {*BESIDE, 'tcp', 'tool', 'pose', 'robot', 'header', 'field', 'p'}
 # What stands before an axis in the columns of an orientation, and what it makes of it.
 ROTATED = {
     **dict.fromkeys(('orientation', 'quaternion', 'quat', 'q'), 'q'),
@@ -64,21 +62,16 @@ class PoseTable(Table):
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
-            path,
-            sheet.form,
-            headings,
-            sheet.rows,
-            sheet.lines,
-            RecordingError,
-            names=names,
+            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names,
             log=log,
-        ).select(below)
+        ).select(below)  # fmt: skip
         if not len(table):
             raise table.error('no poses below the row of headings')
         for k, row in enumerate(table.rows):
             if any(cell != '' for cell in row[len(headings) :]):
-                table.complain(k, f'{len(row)} values under {len(headings)} column names')
+                table.complain_of_width(k)
         table.refuse_errors()
+        table = table.without_units_in_cells(range(len(headings)))
         if not sheet.form.startswith('commas'):
             table, _ = table.with_decimal(range(len(headings)))
         return table
@@ -150,7 +143,7 @@ def column_name(heading: Heading) -> str:
     turned = [ROTATED[word] for word in before if word in ROTATED]
     if turned and last in ('x', 'y', 'z', 'w'):
         return turned[-1] + last
-    kept = [word for word in heading.words if word not in BESIDE] or [last]
+    kept = [word for word in heading.words if word not in BESIDE_POSE] or [last]
     # A logger's path to a coordinate: what is before it names the message.
     known = (*POSITION, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW)
     return kept[-1] if kept[-1] in known else ''.join(kept)

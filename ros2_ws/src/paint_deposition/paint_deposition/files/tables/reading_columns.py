@@ -4,12 +4,12 @@ Columns are known by the project's own names, by a few usual English and German 
 the user names them, see ``Layout``.
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 from paint_deposition.errors import did_you_mean
-from paint_deposition.files.tables.headings import Heading
+from paint_deposition.files.tables.headings import BESIDE, NOMINAL, Heading
 from paint_deposition.files.tables.sheets import Sheet
 from paint_deposition.files.tables.table import headings_in, shown, widest
 
@@ -24,17 +24,18 @@ ON_FACE = ('from_left', 'height')
 NORMALS = ('nx', 'ny', 'nz')
 LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
 # Headings without their unit, numbers of repeats and accents. A word that ends in 'dicke' is a
-# thickness too.
+# thickness too, but for these.
+OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')
 ALIASES = {
     'thickness': (
         'thickness', 'film thickness', 'coating thickness', 'film build', 'film', 'dft',
-        'reading', 'value', 'messwert',
+        'reading', 'value', 'messwert', 'epaisseur',
     ),
     'from_left': ('from left', 'left', 'von links', 'links'),
     'height': ('height', 'from bottom', 'hohe', 'hohe von unten', 'hoehe', 'von unten'),
     'point': (
         'point', 'location', 'spot', 'label', 'position', 'name', 'punkt', 'messpunkt',
-        'messstelle', 'stelle',
+        'messstelle', 'stelle', 'repere',
     ),
     'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
     'row': ('row', 'zeile', 'reihe'),
@@ -43,8 +44,8 @@ ALIASES = {
     'block': ('block', 'block no', 'block nr'),
     'unit': ('unit', 'units', 'einheit'),
 }  # fmt: skip
+QUANTITIES = (*AXES, *NORMALS, *ALIASES)
 QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
-BESIDE_AXIS = {'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', 'ist'}
 
 
 @dataclass(frozen=True)
@@ -67,9 +68,10 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
     own = {q: [k for k, t in enumerate(texts) if t == n] for q, n in OWN.items() if n in texts}
     at: dict[str, list[int]] = {}
     if not {*AXES, 'thickness'} <= {*own}:
-        for column, heading in enumerate(headings):
-            if quantity := _quantity(heading):
-                at.setdefault(quantity, []).append(column)
+        for quantities, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
+            found = [_quantity(heading, beside) for heading in headings]
+            for quantity in (q for q in quantities if q in found and q not in at):
+                at[quantity] = [k for k, one in enumerate(found) if one == quantity]
         if {*AXES} <= {*at}:
             at = {q: columns for q, columns in at.items() if q not in ON_FACE}
     at |= own
@@ -84,15 +86,17 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
     return at
 
 
-def _quantity(heading: Heading) -> str | None:
-    """What a heading names, None where it is not known."""
+def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
+    """What a heading names, None where it is not known; ``beside`` an axis means nothing."""
     words = [word for word in heading.words if not word.isdigit()]
-    letters = ''.join(word for word in words if word not in BESIDE_AXIS)
-    if letters in (*AXES, *NORMALS):
-        return letters
-    if (words and words[-1].endswith('dicke')) or QUANTITY.get(' '.join(words)) == 'thickness':
+    without = [word for word in words if word not in beside]
+    if ''.join(without) in (*AXES, *NORMALS):
+        return ''.join(without)
+    dicke = any(w.endswith('dicke') and not w.startswith(OTHER_DICKEN) for w in without[-1:])
+    known = QUANTITY.get(' '.join(words)) or QUANTITY.get(' '.join(without))
+    if dicke or known == 'thickness':
         return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
-    return QUANTITY.get(' '.join(words))
+    return known
 
 
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:

@@ -1,8 +1,6 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
-import re
-from bisect import bisect
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,18 +10,21 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables import reading_columns as known_columns
 from paint_deposition.files.tables import table as cells_of
 from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
+from paint_deposition.files.tables.misleading import (
+    headings_again,
+    refuse_cut_numbers,
+    refuse_merged,
+    refuse_rivals,
+)
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
+from paint_deposition.files.tables.reading_rows import orders_of, rows_of_readings
 from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.table import Table, is_nothing, is_value
+from paint_deposition.files.tables.summary_figures import figures_at_end
+from paint_deposition.files.tables.table import Table
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
 LARGEST_PART_M = 20.0
 GUESSED = 'no unit is given'
-STATISTIC = re.compile(
-    r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
-    r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
-    r'anzahl|sum|total|n|s|x)\b'
-)
 
 
 @dataclass(frozen=True)
@@ -34,8 +35,8 @@ class ReadingTable:
     # Columns of each quantity; several of the thickness where each row holds repeats.
     at: dict[str, list[int]]
     layout: Layout
-    # Number of each row from 1, those without a reading counted, and of all of them; then the same
-    # with blank rows counted, too.
+    # Number of each row from 1, those without a reading counted, and of all of them; of a workbook
+    # with one column then the same with blank rows, which are its empty cells.
     orders: tuple[tuple[list[int], int], ...]
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
@@ -53,11 +54,7 @@ class ReadingTable:
         numbers = [n for n in layout.columns.values() if isinstance(n, int)]
         numbered = 0 < len(numbers) == len(layout.columns)
 
-        def known(headings: list[Heading]) -> int:
-            at = known_columns.columns_of(headings, layout)
-            needed = (('thickness',),) if films else (AXES, ON_FACE)
-            return len(at) if any({*names} <= {*at} for names in needed) else 0
-
+        known = _known(films, layout)
         least = max(numbers) if numbered else 0
         sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet, least)
         first = 0 if numbered or header is None else header + 1
@@ -72,24 +69,26 @@ class ReadingTable:
             why = known_columns.not_found(sheet, named, films, layout)
             raise ReadingsError(f'{path}: {why}')
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
-        table = table.select(rows)
-        _refuse_rivals(table, at)
-        _refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
+        again = [] if header is None else headings_again(table, header, known)
+        table = table.select([row for row in rows if row not in again])
+        refuse_rivals(table, at)
+        refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
         if numbered and layout.decimal != '.':
-            _refuse_cut_numbers(table)
+            refuse_cut_numbers(table)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
+        table = table.without_units_in_cells(numeric)
         table, doubt = table.with_decimal(numeric, layout.decimal)
         if doubt:
             raise table.error(doubt)
         if films and layout.zero == 'missing':
             table = table.without_zeros(at['thickness'])
-        kept, missing, left_out = _rows_of_readings(table, at, films, numeric, {*labels})
+        kept, missing, left_out = rows_of_readings(table, at, films, numeric, {*labels})
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
         begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
-        orders = _orders(table.lines, kept, missing, begin)
+        orders = orders_of(table, kept, missing, begin)
         table = table.select(kept)
         return ReadingTable(
             table, at, layout, orders, _unit_beside(table, at, sheet, header or 0), left_out
@@ -160,6 +159,35 @@ class ReadingTable:
         metres = values / round(1.0 / unit) if metric else values * unit
         return metres, f'{", ".join(quantities)} in {UNIT_NAMES[unit]}{how}'
 
+    @property
+    def figures_at_end(self) -> str:
+        """What could be statistics at the end of readings in order, in words; '' for nothing."""
+        films, placed = self.at['thickness'], self.has(*AXES) or self.has(*ON_FACE)
+        if placed or self.labels or len(films) > 1 or np.isnan(self.numbers('thickness')).any():
+            return ''
+        return figures_at_end([text.replace(',', '.') for text in self.texts('thickness')])
+
+    @property
+    def doubts(self) -> tuple[str, ...]:
+        """What may have been meant otherwise, for the user."""
+        film, found = self.heading('thickness'), []
+        if figures := self.figures_at_end:
+            found.append(
+                f"'{film}': {figures}, and counts as a reading; delete it if so, or give a column "
+                "'point' with the labels of the points"
+            )
+        beside = max(self.at['thickness']) + 1
+        known = {column for columns in self.at.values() for column in columns}
+        if self.table.form.startswith('commas') and beside < len(self.table.headings):
+            cells = self.table.texts(beside)
+            whole = all(map(str.isdigit, [*self.texts('thickness'), *filter(None, cells)]))
+            if whole and any(cells) and beside not in known:
+                found.append(
+                    f"'{film}' has whole numbers only, as has '{self.table.headings[beside].text}'"
+                    ' beside it: if decimal commas are cut, put semicolons between the columns'
+                )
+        return tuple(found)
+
     def films_um(self) -> tuple[np.ndarray, np.ndarray, str]:
         """All readings (N,) [um], the row of each, and what they are in words.
 
@@ -168,8 +196,13 @@ class ReadingTable:
         films = self.at['thickness']
         values = np.column_stack([self.table.numbers(k, may_be_empty=True) for k in films])
         row, which = np.nonzero(np.isfinite(values))
-        unit = self.layout.unit.get('thickness', self.table.headings[films[0]].unit_m)
-        unit = unit or self.film_unit_m
+        given = self.layout.unit.get('thickness')
+        said = {given} if given else {self.table.headings[k].unit_m for k in films}
+        said |= set() if given else {self.film_unit_m}
+        if len(said - {None}) > 1:
+            found = ' and '.join(sorted(UNIT_NAMES[unit] for unit in said if unit))
+            raise self.table.error(f'the thickness is in {found}; give all of it in one of them')
+        unit = next(iter(said - {None}), None)
         headings = ', '.join(f"'{self.table.headings[k].text}'" for k in films)
         source = '' if headings == "'thickness_um'" else f' from {headings}'
         how = '' if unit else f' ({GUESSED})'
@@ -178,47 +211,20 @@ class ReadingTable:
         return values[row, which] * factor, row, words
 
 
-def _refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
-    """Refuse several columns of one quantity; those of the thickness may differ in a number."""
-    every = [heading.text for heading in table.headings]
-    for quantity, columns in at.items():
-        texts = [every[k] for k in columns]
-        if len({*texts}) < len(texts) or every.count(texts[0]) > 1:
-            raise table.error(f"two columns are called '{texts[0]}'; keep one")
-        stems = {re.sub(r'\d+', '', text) for text in texts}
-        if len(columns) > 1 and (quantity != 'thickness' or len(stems) > 1):
-            named = ', '.join(map(repr, texts))
-            raise table.error(
-                f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
-            )
+def holds_readings(path: Path) -> bool:
+    """Whether a file has a table in which a column is known as the thickness."""
+    return cells_of.find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
 
 
-def _refuse_merged(table: Table, films: list[int]) -> None:
-    """Refuse numbers without a heading right of the thickness's: it is merged over them."""
-    for column in range(max(films, default=len(table.headings)) + 1, len(table.headings)):
-        if table.headings[column].text:
-            return
-        for row, line in zip(table.rows, table.lines, strict=True):
-            if column < len(row) and is_value(row[column]):
-                raise table.error(
-                    f"'{table.headings[films[-1]].text}' stands over several columns or is a "
-                    f"title: '{text_of(row[column])}' beside it in line {line} has no heading; "
-                    'give each column one, or say columns: {thickness: ...} in the campaign'
-                )
+def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
+    """What counts the quantities that headings name, 0 where a needed one is missing."""
+    needed = (('thickness',),) if films else (AXES, ON_FACE)
 
+    def known(headings: list[Heading]) -> int:
+        at = known_columns.columns_of(headings, layout)
+        return len(at) if any({*names} <= {*at} for names in needed) else 0
 
-def _refuse_cut_numbers(table: Table) -> None:
-    """Refuse lines without headings that may be two numbers, or one with a decimal comma."""
-    cells = [text_of(cell) for row in table.rows for cell in row]
-    if (
-        table.form.startswith('commas')
-        and len(cells) == 2 * len(table)
-        and all(map(str.isdigit, cells))
-    ):
-        raise table.error(
-            f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
-            'decimal comma; say decimal: point if it is two, else put a heading over the column'
-        )
+    return known
 
 
 def _unit_beside(
@@ -237,63 +243,3 @@ def _unit_beside(
         if len(cells) > 1 and ' '.join(words_of(cells[0])) in known_columns.ALIASES['unit']:
             return length_of(cells[1])
     return None
-
-
-def _rows_of_readings(
-    table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
-) -> tuple[list[int], list[int], str]:
-    """Rows that are readings or points, rows without a reading, and in words what else there is.
-
-    A row with a place is one, whatever its label. One without a place, or in a table without
-    places, is a statistic if it begins with the name of one and not with the label of a listed
-    point.
-    """
-    kept: list[int] = []
-    unread: list[int] = []
-    nowhere: list[int] = []  # the last rows, if they have neither place nor label
-    count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
-    width = len(table.headings)
-    places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
-    both = 'point' not in at and {'row', 'column'} <= {*at}
-    (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
-    for k, row in enumerate(table.rows):
-        cells = [*row, *[''] * (width - len(row))]
-        values = [cells[c] for c in at['thickness']] if films else []
-        placed = any(is_value(cells[c]) for c in places)
-        begins = next(text_of(cell) for cell in cells if cell != '')
-        listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''
-        missing = bool(values) and all(map(is_nothing, values))
-        named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
-        if named and not placed and not listed:
-            count['of statistics'] += 1
-        elif not placed and not any(map(is_value, values)):
-            # A remark has no reading either, but no other number and no n/a in its place.
-            missing &= any(values) or any(map(is_value, cells))
-            count['without a reading' if missing else 'of other text'] += 1
-            unread += [k] * missing
-        elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
-            table.complain(k, f'{len(row)} values under {width} column names')
-        elif missing:
-            count['without a reading'] += 1
-            unread.append(k)
-        else:
-            kept.append(k)
-            homeless = not placed and (places or label >= 0) and cells[label] == ''
-            nowhere = [*nowhere, k] if homeless else []
-    # Apart from the table, a block of numbers without places or labels is its statistics.
-    if nowhere and nowhere[0] and table.lines[nowhere[0]] > table.lines[nowhere[0] - 1] + 1:
-        kept = kept[: -len(nowhere)]
-        count['of statistics'] += len(nowhere)
-    parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
-    return kept, unread, f'left out: {", ".join(parts)}' if parts else ''
-
-
-def _orders(
-    lines: list[int], kept: list[int], unread: list[int], begin: int
-) -> tuple[tuple[list[int], int], ...]:
-    """Numbers of the kept rows from 1 and the number of all, without and with blank rows."""
-    rows, end = sorted([*kept, *unread]), lines[max(kept)] + 1
-    blank = sorted({*range(begin, end)} - {*lines})
-    without = [bisect(rows, k) for k in kept]
-    with_blank = [n + bisect(blank, lines[k]) for n, k in zip(without, kept, strict=True)]
-    return (without, len(rows)), (with_blank, len(rows) + len(blank))

@@ -75,7 +75,7 @@ def read_rotations(
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
     if columns := table.find_all(pose_columns.ROTATION_VECTOR):
-        if rotation is None and table.units(columns) & {'deg', '°'}:
+        if rotation is None and 'deg' in table.units(columns):
             raise RecordingError(
                 f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
                 f'give --rotation: {ROTATION_WORDS}'
@@ -102,8 +102,8 @@ def _unit(
 ) -> str:
     """The unit of the angles: their headings', else the one given, else their maker's."""
     units = table.units(columns)
-    if units <= {'deg', '°'} or units == {'rad'}:
-        return 'rad' if units == {'rad'} else 'deg'
+    if units in ({'deg'}, {'rad'}):
+        return units.pop()
     if units != {''}:
         found = ', '.join(sorted(units))
         raise RecordingError(f'{table.written(columns)} in {found}; give all in deg or in rad')

@@ -19,6 +19,7 @@ MOST_COMPLAINTS_SHOWN = 8
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 # With one mark only, three digits behind it may be thousands.
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
+UNIT_BEHIND = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(
     r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
@@ -75,6 +76,7 @@ class Table:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
                 wanted += ', or n/a where there is none' if may_be_empty else ''
+                wanted += '; write the one unit in the heading' if _behind(cell) else ''
                 self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
                 self.complain(index, f'{name} is {cell}; expected a finite number')
@@ -97,6 +99,14 @@ class Table:
     def complain(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
         self._errors.setdefault(self.lines[row], text)
+
+    def complain_of_width(self, row: int) -> None:
+        """Note that a row has not as many values as there are headings."""
+        cells = self.rows[row]
+        text = f'{len(cells)} values under {len(self.headings)} column names'
+        if self.form.startswith('commas') and len(cells) > len(self.headings):
+            text += '; with decimal commas, put semicolons between the columns'
+        self.complain(row, text)
 
     def error(self, text: str) -> PaintError:
         """What is wrong with the file as a whole, as an error to raise."""
@@ -125,6 +135,31 @@ class Table:
             for row in self.rows
         ]
         return replace(self, rows=rows)
+
+    def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
+        """The table with the units behind all numbers of a column in its heading instead.
+
+        Units that differ, also from the heading's, stay where they are, to be complained of.
+        """
+        headings, rows = [*self.headings], self.rows
+        for k in columns:
+            if not any(_behind(_cell(row, k)) for row in rows[:MOST_LINES_ABOVE]):
+                continue
+            split = [_behind(_cell(row, k)) for row in rows]
+            bare = any(
+                not s and is_value(_cell(row, k)) for s, row in zip(split, rows, strict=True)
+            )
+            units = [unit_of(found[2]) for found in split if found]
+            all_units = {*units, headings[k].unit or ('' if bare else units[0])}
+            if len(all_units) > 1 or units[0] not in UNITS:
+                continue
+            text = headings[k].text if headings[k].unit else f'{headings[k].text} [{units[0]}]'
+            headings[k] = replace(headings[k], text=text, unit=units[0])
+            rows = [
+                [*row[:k], found[1], *row[k + 1 :]] if found else row
+                for row, found in zip(rows, split, strict=True)
+            ]
+        return replace(self, headings=headings, rows=rows)
 
     def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
         """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
@@ -192,7 +227,9 @@ def find_table(
     wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
     if columns and wide_enough:
         return wide_enough[0], None
-    return max(sheets, key=lambda s: len(widest(s))), None
+    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
+    by_marks = [s for s in apart if not s.form.startswith('blanks')]
+    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
 
 
 def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
@@ -248,6 +285,11 @@ def is_value(cell: Cell) -> bool:
 def is_nothing(cell: Cell) -> bool:
     """Whether a cell is blank or says that there is no reading."""
     return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None
+
+
+def _behind(cell: Cell) -> re.Match | None:
+    """A number and what stands behind it, such as its unit."""
+    return None if isinstance(cell, float) else UNIT_BEHIND.fullmatch(cell)
 
 
 def _cell(row: list[Cell], column: int) -> Cell:

@@ -11,6 +11,7 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.part.surface import Surface
 
 # The pattern has seven parameters, and a fit needs a few points more.
 FEWEST_POINTS = 10
@@ -152,8 +153,37 @@ def zeros_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
     return (
         f'{np.count_nonzero(rows)} of {len(readings)} readings are 0 where the model expects '
         f'{low:.0f} to {high:.0f} µm (points {named}), and count as bare; gauges write 0 for '
-        'what was not measured, too: say zero: missing, or zero: film if they are right'
+        'what was not measured, too: write n/a for these, or say zero: missing in the campaign '
+        '(zero: film if they are right)'
     )
+
+
+def film_unit_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
+    """A warning of films that agree with those expected (N,) [um] in another unit; '' for none."""
+    there = (expected_um > THINNEST_FILM_UM) & (readings.thickness_um > 0.0)
+    if not there.any():
+        return ''
+    ratio = float(np.median(readings.thickness_um[there] / expected_um[there]))
+    for unit, exact in UNITS.items():
+        for read_as, meant, factor in (('µm', unit, 1.0 / exact), (unit, 'µm', exact)):
+            if factor / UNIT_SLACK < ratio < factor * UNIT_SLACK:
+                return (
+                    f'the readings are {ratio:.3g} times what the model expects: they look like '
+                    f'{meant} read as {read_as}; write their unit in the heading, as in DFT [µm]'
+                )
+    return ''
+
+
+def readings_in_doubt(
+    surface: Surface, readings: Readings, expected_um: np.ndarray
+) -> tuple[str, ...]:
+    """Warnings of readings where film (N,) [um] is expected: their file, units and zeros."""
+    found = (
+        unit_in_doubt(surface, readings),
+        film_unit_in_doubt(readings, expected_um),
+        zeros_in_doubt(readings, expected_um),
+    )
+    return (*readings.doubts, *filter(None, found))
 
 
 def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]:
@@ -163,7 +193,7 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         model: its pattern and projection count, its effects do not.
 
     Returns:
-        Warnings of readings that say otherwise, see ``zeros_in_doubt``, and their unit.
+        Warnings of readings that say otherwise, see ``readings_in_doubt``.
     """
     doubts = []
     plain = model.model_copy(update={'effects': ()})
@@ -175,9 +205,9 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         painted = FilmIntegrator(one.measured_points, plain, 'double', parallel=False)
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
-            zeros = zeros_in_doubt(one.readings, painted.raw_um[one.means.owner])
-            unit = unit_in_doubt(one.surface, one.readings)
-            doubts += [f'{one.name}: {doubt}' for doubt in (unit, zeros) if doubt]
+            expected_um = painted.raw_um[one.means.owner]
+            odd = readings_in_doubt(one.surface, one.readings, expected_um)
+            doubts += [f'{one.name}: {doubt}' for doubt in odd]
             continue
         cause = 'the gun never sprays'
         if np.any(one.path.flow > 0.0):

@@ -27,6 +27,7 @@ class Readings:
         understood: how their file was read, in one line for the user; '' for none.
         zero_is_film: whether the user says that a reading of 0 is one.
         unit_is_guessed: whether nobody said what the unit of the positions is.
+        doubts: what in their file may be no reading, for the user.
     """
 
     positions_m: np.ndarray
@@ -40,6 +41,7 @@ class Readings:
     understood: str = ''
     zero_is_film: bool = False
     unit_is_guessed: bool = False
+    doubts: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         sessions = np.broadcast_to(self.session, len(self.thickness_um))

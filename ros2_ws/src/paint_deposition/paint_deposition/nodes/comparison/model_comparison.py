@@ -15,6 +15,7 @@ from paint_deposition.film.colour_scales import ColourScale, residual_scale
 from paint_deposition.inference.comparison.residual_field import interpolation_matrix, reached
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise
+from paint_deposition.inference.readings.plausibility import readings_in_doubt, zeros_in_doubt
 from paint_deposition.inference.readings.residuals import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.legend import legend
@@ -23,7 +24,7 @@ from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header
-from paint_deposition.nodes.runtime.node import OK, Status, Task
+from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     fixed_while_configured,
@@ -97,6 +98,8 @@ class ModelComparison(PaintingNode):
     def _set_surface(self, surface: Surface) -> None:
         self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
         super()._set_surface(surface)
+        for doubt in readings_in_doubt(surface, self._readings, np.zeros(len(self._readings))):
+            self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
@@ -184,6 +187,8 @@ class ModelComparison(PaintingNode):
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
             f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
         )
+        if doubt := zeros_in_doubt(self._readings, found.predicted_um):
+            line += f'; {doubt}'
         self.get_logger().info(line)
         return True, line
 
@@ -195,4 +200,7 @@ class ModelComparison(PaintingNode):
             'noise of the gauge [µm]': f'{self._noise.typical_um:.3f}',
             'noise known from': self._noise.source,
         }
-        return Status(OK, f'rms {found.rmse_um:.2f} µm at {len(found)} readings', values)
+        line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
+        if doubt := zeros_in_doubt(self._readings, found.predicted_um):
+            return Status(WARN, f'{line}; {doubt}', values)
+        return Status(OK, line, values)

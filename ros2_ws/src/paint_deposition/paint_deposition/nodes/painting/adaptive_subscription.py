@@ -8,6 +8,7 @@ from rclpy.callback_groups import CallbackGroup
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
+from paint_deposition.nodes.runtime.messages import SequenceNumbers
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import compatible_qos
 
@@ -39,9 +40,6 @@ class AdaptiveSubscription:
     Args:
         take: called by `take_pending` with each message and the time at which it was sent [ns].
         depth: of the queue.
-
-    Attributes:
-        lost: messages missing after the first, by the publishers' sequence numbers.
     """
 
     def __init__(
@@ -54,17 +52,21 @@ class AdaptiveSubscription:
         depth: int,
         latched: bool = False,
     ) -> None:
-        self.lost = 0
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._latched = latched
         self._group = PolledCallbackGroup()
-        self._numbers: dict[bytes, int] = {}
+        self._numbers = SequenceNumbers()
         self._taken: deque[tuple[int, bytes]] = deque(maxlen=REMEMBERED_MESSAGES)
         self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
         # At once as the publishers that are known: they would report one that does not match.
         self._profile = self._best_profile()
         self._subscription = self._create_subscription()
         node.create_steady_timer(QOS_PERIOD_S, self._match_qos)
+
+    @property
+    def lost(self) -> int:
+        """Messages missing after the first of each publisher."""
+        return self._numbers.lost
 
     def take_pending(self) -> None:
         """Take all messages in the queue."""
@@ -106,10 +108,7 @@ class AdaptiveSubscription:
     def _on_message(self, message: Any, info: Mapping[str, Any]) -> None:
         publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
         # Some middleware does not number messages.
-        number = info.get('publication_sequence_number') or 0
-        before = self._numbers.get(publisher, number)
-        self.lost += max(number - before - 1, 0)
-        self._numbers[publisher] = max(number, before)
+        self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
         # Publisher and time identify a message.
         identity = info['source_timestamp'], publisher
         if identity in self._taken:

@@ -26,6 +26,9 @@ TAKE_PERIOD_S = 0.02
 BATCH_PERIOD_S = 0.05
 POSES_PER_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
+# No robot announces a state so long before the pose at which it holds.
+AHEAD_NS = 1_000_000_000
+AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
 NO_FLOW = 'states that spray with flow 0'
 
 
@@ -75,6 +78,8 @@ class AtomizerInput:
         self.speed = SpeedNow()
         self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
+        # Stamp of a state that is ahead of the poses, and when it was sent [ns].
+        self._early: tuple[int, int] | None = None
         self._flushed_s = -math.inf
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
@@ -196,6 +201,10 @@ class AtomizerInput:
     def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
         self.poses_received += 1
         self._newest, self.sent_ns = message, sent_ns
+        if self._early and sent_ns > self._early[1]:
+            if self._early[0] - stamp_ns(message.header) > AHEAD_NS:
+                self.anomalies[AHEAD] += 1
+            self._early = None
         self.pose_s = time.monotonic()
         self._process(message, sent_ns)
         if self.poses_received % POSES_PER_BATCH == 0:
@@ -227,6 +236,10 @@ class AtomizerInput:
 
     def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
         self.states_received += 1
+        state_ns = stamp_ns(message.header)
+        # Before its poses after a pause, too: the next pose tells.
+        if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
+            self._early = state_ns, sent_ns
         self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:

@@ -10,14 +10,15 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM
+from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
-from paint_deposition.nodes.runtime.node import Task
+from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     fixed_while_configured,
@@ -61,6 +62,8 @@ SIMULATOR = PAINTING | {
         fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
 }
+# Less paint may fly past before the part.
+ENOUGH_CM3 = 5.0
 
 
 class DepositionSimulator(PaintingNode):
@@ -95,7 +98,18 @@ class DepositionSimulator(PaintingNode):
         self._saving.shutdown()
 
     def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
+        return painting_tasks(self, self.display.diagnostic_values) | {'part': self._part_status}
+
+    def _part_status(self) -> Status:
+        """The status of the part, and whether any of the paint lands on it."""
+        status, film = self.parts.status(), self.film.snapshot()
+        if status.level != OK or film.emitted_cm3 < ENOUGH_CM3 or film.raw_um.max() > NO_PAINT_UM:
+            return status
+        beside = (
+            f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
+            'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
+        )
+        return Status(WARN, beside, status.values)
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return surface.points()
@@ -110,6 +124,7 @@ class DepositionSimulator(PaintingNode):
             raise PaintError(
                 f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
             )
+        require_band(values['target_um'], values['target_tolerance_um'])
 
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""

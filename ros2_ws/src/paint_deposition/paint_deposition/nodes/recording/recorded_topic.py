@@ -18,7 +18,7 @@ from rosbags.interfaces import (
 )
 
 from paint_deposition.files.recordings.mcap_run import RunTopic
-from paint_deposition.nodes.runtime.messages import header_stamp_ns, message_class
+from paint_deposition.nodes.runtime.messages import SequenceNumbers, header_stamp_ns, message_class
 
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
@@ -54,7 +54,6 @@ class RecordedTopic:
     Attributes:
         run_topic: the topic as the run stores it; name: of the topic.
         messages: number of messages received, in all runs.
-        missed: messages lost after the first, by the gaps in the publishers' sequence numbers.
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
@@ -70,8 +69,8 @@ class RecordedTopic:
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
         self.messages = 0
+        self._sequence = SequenceNumbers()
         self.reset_counts(begun_ns)
-        self._sequence: dict[bytes, int] = {}
         self._log_time_ns = 0
         self.profile: QoSProfile | None = None
         self._node = node
@@ -83,9 +82,15 @@ class RecordedTopic:
     def reset_counts(self, begun_ns: int) -> None:
         """Set the counts of the run, which began then, to zero."""
         self._begun_ns = begun_ns
-        self.missed = self.unnumbered = self.gaps = 0
+        self._lost_before = self._sequence.lost
+        self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
         self._beginnings: dict[bytes, Beginning] = {}
+
+    @property
+    def missed(self) -> int:
+        """Messages lost in the run after the first one of their publisher."""
+        return self._sequence.lost - self._lost_before
 
     @property
     def unheard(self) -> int:
@@ -112,7 +117,7 @@ class RecordedTopic:
         """Take what is in the queue; what is sent until the next subscription is not missed."""
         self._end()
         self.profile = None
-        self._sequence.clear()
+        self._sequence.forget()
 
     def _end(self) -> None:
         if self._subscription is not None:
@@ -144,15 +149,11 @@ class RecordedTopic:
             self.unnumbered += 1
             return
         gid, sent_ns = gid['data'], info['source_timestamp']
-        previous = self._sequence.get(gid)
-        if previous is None:
+        if self._sequence.take(gid, number):
             waited_ns = info['received_timestamp'] - self._begun_ns
             self._beginnings[gid] = Beginning(number, sent_ns, waited_ns)
-        elif number > previous:
-            self.missed += number - previous - 1
         if gid in self._beginnings:
             self._beginnings[gid].add(number, sent_ns)
-        self._sequence[gid] = number
 
     def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
         gap_ns = stamp_ns - self.newest_stamp_ns

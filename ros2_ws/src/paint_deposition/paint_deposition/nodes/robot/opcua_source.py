@@ -38,7 +38,7 @@ class OpcuaSource(SignalSource):
 
     async def _follow(self, stopped: Callable[[], bool]) -> None:
         try:
-            from asyncua import Client
+            from asyncua.client.client import Client
         except ImportError:
             raise PaintError(
                 "asyncua is not installed; run: pip install 'paint_deposition[robot]'"

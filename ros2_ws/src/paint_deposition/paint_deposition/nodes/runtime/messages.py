@@ -49,6 +49,29 @@ def header_stamp_ns(cdr: bytes) -> int:
     return sec * 1_000_000_000 + nanosec
 
 
+class SequenceNumbers:
+    """The numbers that publishers give their messages, and how many did not arrive.
+
+    ``lost`` are those missing after the first of each publisher.
+    """
+
+    def __init__(self) -> None:
+        self.lost = 0
+        self._newest: dict[bytes, int] = {}
+
+    def take(self, publisher: bytes, number: int) -> bool:
+        """Take the number of a message; whether it is the first of its publisher."""
+        before = self._newest.get(publisher)
+        self._newest[publisher] = number if before is None else max(number, before)
+        if before is not None:
+            self.lost += max(number - before - 1, 0)
+        return before is None
+
+    def forget(self) -> None:
+        """What comes next is the first of its publisher."""
+        self._newest.clear()
+
+
 class ColouredMesh:
     """A TRIANGLE_LIST Marker as serialised bytes; only stamp and colours change.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import concurrent.futures
+import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -38,12 +39,13 @@ class PaintNode(Node):
 
     Attributes:
         loading: whether a node of this process is reading its files.
+        stopping: whether this process was asked to end.
         values: current values of the parameters, by name.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
     PARAMETERS: ParameterTable = MappingProxyType({})
-    loading = False
+    loading = stopping = False
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
@@ -66,10 +68,20 @@ class PaintNode(Node):
     def _load(self) -> None:
         """Read the files; SIGINT and SIGTERM interrupt it."""
         PaintNode.loading = True
+        PaintNode.end_if_loading()
         try:
             self._load_files()
         finally:
             PaintNode.loading = False
+
+    @classmethod
+    def end_if_loading(cls) -> None:
+        """End a process that is to stop and reads files, which takes minutes with a new model.
+
+        Nothing is lost. An exception instead could be swallowed by a library or by the compiler.
+        """
+        if PaintNode.stopping and PaintNode.loading:
+            os._exit(0)
 
     # --- for the subclass
 

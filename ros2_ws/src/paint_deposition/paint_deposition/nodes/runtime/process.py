@@ -1,6 +1,5 @@
 """The process of a node: it spins, closes the node once, and ends with an exit code."""
 
-import os
 import signal
 import sys
 import traceback
@@ -31,10 +30,8 @@ def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = Non
 
     def on_signal(number: int, _frame: object) -> None:
         received.append(number)
-        if PaintNode.loading:
-            # Nothing is lost when reading files is interrupted. An exception instead could be
-            # swallowed by a library or by the compiler.
-            os._exit(0)
+        PaintNode.stopping = True
+        PaintNode.end_if_loading()
 
     try:
         _handle_signals(on_signal)

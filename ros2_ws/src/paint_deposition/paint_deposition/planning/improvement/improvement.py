@@ -15,8 +15,9 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.films import evenness
-from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT
+from paint_deposition.planning.improvement.nodes import BEND, JOINT, LEAD, ROBOT
 from paint_deposition.planning.improvement.programme import Programme, speed_along
 from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.improvement.retiming import Retiming
@@ -137,6 +138,7 @@ class Improvement:
         program_difference: largest difference between the films of the robot program and of the
             bag, both read back, as a share of the greatest film.
         geometry_warnings: oddities of the motion over the part, each with its likely cause.
+        drive: of the robot that it was made for.
     """
 
     surface: Surface
@@ -151,6 +153,7 @@ class Improvement:
     after: FilmSummary
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
+    drive: Drive | None = None
 
     @property
     def target_um(self) -> float:
@@ -188,14 +191,14 @@ class Improvement:
     @property
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
-        found = list(self.geometry_warnings)
+        found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
         off = self.after.mean_um / self.target_um - 1.0
         if abs(off) > OFF_TARGET:
             thick = off > 0.0
             other = (
                 (LIMIT_NAMES['slowest'],)
                 if thick
-                else (LIMIT_NAMES[ROBOT], LIMIT_NAMES[BEND], LIMIT_NAMES[LEAD])
+                else tuple(LIMIT_NAMES[name] for name in (ROBOT, BEND, LEAD, JOINT))
             )
             names = [name for name in self.retiming.binding if name not in other]
             remedy = (
@@ -266,6 +269,7 @@ class Improvement:
             'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
             'passes': [change.to_dict() for change in self.changes],
             'request': self.request.model_dump(),
+            'robot': self.drive and self.drive.to_dict(),
             'warnings': list(self.warnings),
         }
 

@@ -114,7 +114,7 @@ class SpeedBounds:
     limit: np.ndarray
 
 
-ROBOT, BEND, LEAD = 'speed', 'bend', 'lead'
+ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
 def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBounds:
@@ -135,6 +135,10 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
     limit = np.full(len(nodes), ROBOT, dtype=object)
     bent = np.maximum(allowed, programmed) < greatest
     greatest[bent], limit[bent] = np.maximum(allowed, programmed)[bent], BEND
+    if programme.allowed:
+        by_joints = np.interp(places, *programme.allowed)
+        slower = by_joints < greatest
+        greatest[slower], limit[slower] = by_joints[slower], JOINT
     for number, ends in enumerate(zip(programme.ends_m, programme.around_m, strict=True)):
         rows = nodes.rows(number)
         for end, far, node in zip(*ends, (rows.start, rows.stop - 1), strict=True):

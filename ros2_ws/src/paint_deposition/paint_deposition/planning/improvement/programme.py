@@ -53,6 +53,8 @@ class Programme:
     duration_s: np.ndarray  # (N - 1,) time from each pose to the next
     openings: tuple[Opening, ...]  # in order, apart from each other
     original: Trajectory  # the motion that it was made from
+    # Travels and the speeds that the joints of a robot allow there; None: any.
+    allowed: tuple[np.ndarray, np.ndarray] | None = None
 
     @staticmethod
     def of(trajectory: Trajectory, max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S) -> 'Programme':
@@ -202,7 +204,7 @@ def _openings(
     # The halves of two sub-steps are rounded, each to a nanosecond.
     breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > ROUNDED_NS
     openings = []
-    for rows in np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks)):
+    for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
         on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
         if sprays[rows[0]] and off - on > STANDING_M:
             flow = float(np.average(path.flow[rows], weights=path.dwell_s[rows]))

@@ -15,7 +15,14 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.improvement.nodes import BEND, LEAD, ROBOT, Nodes, SpeedBounds
+from paint_deposition.planning.improvement.nodes import (
+    BEND,
+    JOINT,
+    LEAD,
+    ROBOT,
+    Nodes,
+    SpeedBounds,
+)
 from paint_deposition.planning.requests import ImproveRequest
 
 # Converged when the density changes by less than this share; largest number of rounds.
@@ -35,6 +42,7 @@ LIMIT_NAMES = {
     ROBOT: 'the greatest speed',
     BEND: 'the speed in bends',
     LEAD: 'the way to and from the opening of the gun',
+    JOINT: 'the speed of a joint of the robot',
     'slowest': 'the least speed',
     'acceleration': 'the acceleration',
     'jerk': 'the jerk',
@@ -199,7 +207,7 @@ def _constraints(problem: Problem, now: Density) -> list[Constraint]:
         Constraint('slowest', y - diags(1.0 / least) @ f),
         Constraint('positive', -y[closable]),
     ]
-    for name in (ROBOT, BEND, LEAD):  # y >= f / v
+    for name in (ROBOT, BEND, LEAD, JOINT):  # y >= f / v
         some = np.flatnonzero((problem.bounds.limit == name) & ~closable)
         rows.append(Constraint(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
     # Nodes from which the gun sprays on to the next one for certain.

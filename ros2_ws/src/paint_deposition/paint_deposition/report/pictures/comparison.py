@@ -124,8 +124,9 @@ def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFi
     _draw_film(film, data, profile)
     _draw_residual(residual, data, profile)
     bars_um = TWO_SIDED_95 * data.study.sigma_um
-    tops_um = [one.lines_um.max() for one in data.profiles if one.lines_um.size]
-    film.set(xlabel='', ylim=(0.0, 1.05 * max((data.study.measured_um + bars_um).max(), *tops_um)))
+    tops_um = [(data.study.measured_um + bars_um).max()]
+    tops_um += [one.lines_um.max() for one in data.profiles if one.lines_um.size]
+    film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
     reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
     residual.set_ylim(-reach_um, reach_um)
     return place

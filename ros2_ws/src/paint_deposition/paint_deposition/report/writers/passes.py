@@ -3,8 +3,10 @@
 import shutil
 import tempfile
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
@@ -16,11 +18,14 @@ from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.files.tool_path import write_tool_path
+from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 
-BAG, TABLE, PROGRAM = 'trajectory', 'passes.csv', 'passes.mod'
+BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
+TOOL_PATH = 'passes.yaml'
 COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
     'brush',
@@ -38,6 +43,7 @@ class Passes:
     # The robot's frame and the pose of the part in it; bag and table have their poses in that
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
+    joints: JointMotion | None = None  # that drive it
 
 
 def write_passes(folder: Path, passes: Passes) -> list[str]:
@@ -50,32 +56,50 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     folder.mkdir(parents=True, exist_ok=True)
     digest, part = model_digest(passes.model), passes.part
     _write_bag(folder / BAG, passes, digest)
-    write_table(folder / TABLE, _table(passes.moves, part))
+    write_table(folder / TABLE, _table(_in_frame(passes.moves, part)))
     comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
     module = module_text(passes.moves, [comment], part[1] if part else None)
     write_text(folder / PROGRAM, module)
+    write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
     write_model(folder / MODEL_FILE, passes.model)
-    return [BAG, TABLE, PROGRAM, MODEL_FILE]
+    if passes.joints:
+        write_table(folder / JOINTS, _joint_table(passes.joints))
+    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.joints else [])]
 
 
-def _table(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Iterator[Sequence[object]]:
+def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
+    if part is None:
+        return moves
+    poses = [part[1].applied(move.position_m, move.quaternion_xyzw) for move in moves]
+    return [
+        replace(move, position_m=position, quaternion_xyzw=quaternion)
+        for move, (position, quaternion) in zip(moves, poses, strict=True)
+    ]
+
+
+def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
     """A line a move of the TCP: where it ends, how fast, and what the gun does."""
     yield COLUMNS
     number, was_spraying = 0, False
     for move in moves:
         number += move.spraying and not was_spraying
         was_spraying = move.spraying
-        pose = move.position_m, move.quaternion_xyzw
-        position, quaternion = part[1].applied(*pose) if part else pose
         yield [
             max(number, 1),
-            *(f'{value:.6f}' for value in position),
-            *(f'{value:.8f}' for value in quaternion),
+            *(f'{value:.6f}' for value in move.position_m),
+            *(f'{value:.8f}' for value in move.quaternion_xyzw),
             f'{move.speed_m_per_s:.6g}',
             int(move.spraying),
             f'{move.flow:.6g}' if move.spraying else 0,
             move.brush,
         ]
+
+
+def _joint_table(joints: JointMotion) -> Iterator[Sequence[object]]:
+    units = np.where(joints.slides, 'm', 'rad')
+    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(joints.joints, units, strict=True))
+    for time_s, values in zip(joints.seconds, joints.values, strict=True):
+        yield [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
 
 
 def _write_bag(target: Path, passes: Passes, digest: str) -> None:
@@ -93,7 +117,7 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
         fresh = write_pose_bag(
             Path(aside) / target.name, placed,
             custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
-            part=(trajectory.frame_id, part[1]) if part else None,
+            part=(trajectory.frame_id, part[1]) if part else None, joints=passes.joints,
         )  # fmt: skip
         if target.exists():
             shutil.rmtree(target)

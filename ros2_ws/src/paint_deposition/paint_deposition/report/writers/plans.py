@@ -18,6 +18,7 @@ from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.part.orientation import across_axis
 from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
@@ -25,6 +26,7 @@ from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
+from paint_deposition.report.pictures.places import write_places
 from paint_deposition.report.pictures.planning import write_improvement_picture, write_uniformity
 from paint_deposition.report.writers.film import write_film
 from paint_deposition.report.writers.passes import Passes, write_passes
@@ -67,7 +69,8 @@ def _passes(
     surface, improved = result.surface, isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    passes = Passes(result.trajectory, result.moves, result.model, made, part)
+    joints = result.drive.joint_motion if result.drive else None
+    passes = Passes(result.trajectory, result.moves, result.model, made, part, joints)
     files = [folder / one for one in (name, *write_passes(folder, passes))]
     given = result.original.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
@@ -89,6 +92,26 @@ def _passes(
         title = 'Planned passes over the faces'
         write_geometry_picture(files[-1], surface, result.path, geometry, title)
     return [*files, save_picture(film, folder / f'film.{pictures}')]
+
+
+@written.register
+def _part_places(
+    result: PartPlaces,
+    folder: Path,
+    made_from: Mapping[str, Any] | None = None,
+    pictures: str = 'png',
+) -> list[Path]:
+    files = [folder / n for n in ('place.json', 'places.csv', f'place.{pictures}')]
+    write_json(files[0], result.to_dict() | with_provenance(dict(made_from or {}), None))
+    rows = np.ndindex(result.reached.shape)
+    table = [
+        (result.x_m[k], result.y_m[i], result.reached[i, k], result.speed[i, k], result.room[i, k])
+        for i, k in rows
+    ]
+    head = [('x_m', 'y_m', 'reached', 'speed', 'room')]
+    write_table(files[1], [*head, *([f'{v:.6g}' for v in row] for row in table)])
+    write_places(files[2], result)
+    return files
 
 
 @written.register

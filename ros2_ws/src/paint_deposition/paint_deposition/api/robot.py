@@ -1,0 +1,65 @@
+"""The robot that is to drive a motion, and where the part may stand for it."""
+
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from paint_deposition.errors import PlanError
+from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_pose
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.planning.driving import RobotCell
+from paint_deposition.planning.part_place import PartPlaces, part_places
+
+# Frames of poses that are relative to the part.
+PART_FRAMES = ('', 'part')
+
+
+def read_robot(
+    urdf: str | Path,
+    part_pose: Sequence[float],
+    tip_link: str | None = None,
+    base_link: str | None = None,
+    joint_acceleration: float | None = None,
+) -> RobotCell:
+    """Read the robot that is to drive a plan.
+
+    Args:
+        urdf: its description; every joint has a greatest speed.
+        part_pose: where the part stands in its base: x y z [m] and a quaternion qx qy qz qw.
+        tip_link, base_link: of the TCP and of the poses; default: tool0 or the last link, and the
+            root.
+        joint_acceleration: of every joint [rad/s2 or m/s2]; default: each reaches its full speed
+            in a quarter of a second.
+
+    Raises:
+        PaintError: the file cannot be read, or a joint has no greatest speed.
+    """
+    if not is_pose(part_pose):
+        raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
+    robot = Robot.read(Path(urdf), tip_link, base_link)
+    return RobotCell(robot.arm, Rigid.of(part_pose), joint_acceleration)
+
+
+def place(
+    trajectory: Trajectory,
+    cell: RobotCell,
+    x_m: Sequence[float] | np.ndarray,
+    y_m: Sequence[float] | np.ndarray,
+    free_roll: bool = False,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> PartPlaces:
+    """Look where a part may stand so that the robot drives a motion over it.
+
+    Args:
+        trajectory: the motion, in the frame of the part, ``part`` or without a name, or in that of
+            the robot's base with the part at ``cell.part``.
+        cell: the robot, with height and turn of the part.
+        x_m, y_m: places of the part to try in the robot's base [m].
+        free_roll: the tool may be turned about its own axis, as where the pattern is round.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+    """
+    if trajectory.frame_id not in PART_FRAMES:
+        trajectory = at_part(trajectory, cell.part.values, 'part')
+    return part_places(trajectory, cell, np.array(x_m), np.array(y_m), free_roll, progress)

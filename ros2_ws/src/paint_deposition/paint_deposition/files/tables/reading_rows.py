@@ -1,0 +1,82 @@
+"""Which rows of a table are readings or points, which lack one, and their order."""
+
+from bisect import bisect
+
+from paint_deposition.files.tables.headings import words_of
+from paint_deposition.files.tables.reading_columns import AXES, ON_FACE
+from paint_deposition.files.tables.sheets import text_of
+from paint_deposition.files.tables.summary_figures import STATISTIC
+from paint_deposition.files.tables.table import Table, is_nothing, is_value
+
+
+def rows_of_readings(
+    table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
+) -> tuple[list[int], list[int], str]:
+    """Rows that are readings or points, rows without a reading, and in words what else there is.
+
+    A row with a place is one, whatever its label. One without a place, or in a table without
+    places, is a statistic if it begins with the name of one and not with the label of a listed
+    point.
+    """
+    kept: list[int] = []
+    unread: list[int] = []
+    nowhere: list[int] = []  # the last rows, if they have neither place nor label
+    count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
+    width = len(table.headings)
+    places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
+    both = 'point' not in at and {'row', 'column'} <= {*at}
+    (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
+    thick = at['thickness'] if films else []
+    # The other columns in which the first reading has a number.
+    measured = (row for row in table.rows if any(c < len(row) and is_value(row[c]) for c in thick))
+    first = next(measured, [])[:width]
+    numbered = [c for c, cell in enumerate(first) if is_value(cell) and c not in thick]
+    for k, row in enumerate(table.rows):
+        cells = [*row, *[''] * (width - len(row))]
+        values = [cells[c] for c in thick]
+        placed = any(is_value(cells[c]) for c in places)
+        begins = next(text_of(cell) for cell in cells if cell != '')
+        listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''
+        missing = bool(values) and all(map(is_nothing, values))
+        named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
+        if named and not placed and not listed:
+            count['of statistics'] += 1
+        elif not placed and not any(map(is_value, values)):
+            # A remark has no reading either, but not all other numbers and no n/a in its place.
+            missing &= any(values) or (
+                bool(numbered) and all(is_value(cells[c]) for c in numbered)
+            )
+            count['without a reading' if missing else 'of other text'] += 1
+            unread += [k] * missing
+        elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
+            table.complain_of_width(k)
+        elif missing:
+            count['without a reading'] += 1
+            unread.append(k)
+        else:
+            kept.append(k)
+            homeless = not placed and (places or label >= 0) and cells[label] == ''
+            nowhere = [*nowhere, k] if homeless else []
+    # Apart from the table, a block of numbers without places or labels is its statistics.
+    if nowhere and nowhere[0] and table.lines[nowhere[0]] > table.lines[nowhere[0] - 1] + 1:
+        kept = kept[: -len(nowhere)]
+        count['of statistics'] += len(nowhere)
+    parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
+    return kept, unread, f'left out: {", ".join(parts)}' if parts else ''
+
+
+def orders_of(
+    table: Table, kept: list[int], unread: list[int], begin: int
+) -> tuple[tuple[list[int], int], ...]:
+    """Numbers of the kept rows from 1 and the number of all; of cells also with blank rows.
+
+    A blank line of a text, or a blank row beside other columns, may part two groups of readings.
+    """
+    lines = table.lines
+    rows, end = sorted([*kept, *unread]), lines[max(kept)] + 1
+    without = [bisect(rows, k) for k in kept]
+    if not table.form.startswith('sheet') or sum(bool(h.text) for h in table.headings) > 1:
+        return ((without, len(rows)),)
+    blank = sorted({*range(begin, end)} - {*lines})
+    with_blank = [n + bisect(blank, lines[k]) for n, k in zip(without, kept, strict=True)]
+    return (without, len(rows)), (with_blank, len(rows) + len(blank))

@@ -1,0 +1,98 @@
+"""The kinematic chain of a robot: where its tip is, and how its joints move it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Arm:
+    """J joints from a base to a tip.
+
+    Attributes:
+        joints: names of the joints.
+        frames: (J + 1, 4, 4) each joint at zero in the moved frame of the one before it, the first
+            in the base; the last is the tip in the frame of the last joint.
+        axes: (J, 3) unit axis of each joint in its frame.
+        slides: (J,) bool, whether it moves along its axis instead of turning about it.
+        lower, upper: (J,) limits [rad or m], infinite where there are none.
+        fastest: (J,) greatest speeds [rad/s or m/s], infinite where none is known.
+    """
+
+    joints: tuple[str, ...]
+    frames: np.ndarray
+    axes: np.ndarray
+    slides: np.ndarray
+    lower: np.ndarray
+    upper: np.ndarray
+    fastest: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.joints)
+
+    def room(self, values: np.ndarray) -> np.ndarray:
+        """(..., J) distance of joints (..., J) from the nearer limit, as a share of the range."""
+        nearer = np.minimum(values - self.lower, self.upper - values)
+        span = self.upper - self.lower
+        return np.where(np.isfinite(span), nearer / span, 1.0)
+
+    def tips(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Positions (..., 3) [m] and axes (..., 3, 3) of the tip for joints (..., J)."""
+        position, axes, _, _ = self._chain(np.asarray(values, dtype=float))
+        return position, axes
+
+    def jacobians(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions and axes of the tip, and its velocity (..., 6, J) per speed of each joint.
+
+        The rows are the velocity of the tip and its rate of turn, in the base's frame.
+        """
+        position, axes, along, origin = self._chain(np.asarray(values, dtype=float))
+        turning = np.cross(along, position[..., np.newaxis, :] - origin)
+        slides = self.slides[:, np.newaxis]
+        moved = np.where(slides, along, turning)
+        turned = np.where(slides, 0.0, along)
+        return position, axes, np.concatenate([moved, turned], axis=-1).swapaxes(-1, -2)
+
+    def _chain(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Tip as in ``tips``; axes (..., J, 3) and places (..., J, 3) of the joints."""
+        shape = values.shape[:-1]
+        position, turn = np.zeros((*shape, 3)), np.broadcast_to(np.eye(3), (*shape, 3, 3))
+        along, origin = np.empty((*values.shape, 3)), np.empty((*values.shape, 3))
+        for j, frame in enumerate(self.frames):
+            position = position + turn @ frame[:3, 3]
+            turn = turn @ frame[:3, :3]
+            if j == len(self):
+                break
+            along[..., j, :], origin[..., j, :] = turn @ self.axes[j], position
+            value = values[..., j]
+            if self.slides[j]:
+                position = position + value[..., np.newaxis] * along[..., j, :]
+            else:
+                turn = turn @ _turns(self.axes[j], value)
+        return position, turn, along, origin
+
+
+def _turns(axis: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
+    """(..., 3, 3) rotations about a unit axis (3,) (Rodrigues)."""
+    x, y, z = axis
+    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    sin, cos = np.sin(angle_rad)[..., None, None], np.cos(angle_rad)[..., None, None]
+    return np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross)
+
+
+@dataclass(frozen=True)
+class JointMotion:
+    """What drives a motion: the joints over time.
+
+    Attributes:
+        joints: names of the J joints.
+        slides: (J,) bool, whether the joint is in m, not rad.
+        seconds: (M,) since the first pose.
+        values, speeds: (M, J) [rad or m, and per second].
+    """
+
+    joints: tuple[str, ...]
+    slides: np.ndarray
+    seconds: np.ndarray
+    values: np.ndarray
+    speeds: np.ndarray

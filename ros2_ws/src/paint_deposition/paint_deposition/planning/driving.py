@@ -1,0 +1,274 @@
+"""A planned motion as a robot can drive it: its joints, and as slow as they need it to be."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.spatial.transform import Rotation, Slerp
+
+from paint_deposition.errors import PlanError
+from paint_deposition.motion.arm import Arm, JointMotion
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
+from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
+
+# Joints are looked at this often along the planned motion [s].
+STEP_S = 0.02
+# The way is chosen over poses that lie so far apart.
+APART_M, APART_RAD = 0.02, math.radians(3.0)
+# Poses of a motion that is only tried.
+TRIED = 150
+# A joint of which nothing more is known reaches its full speed in this time [s].
+FULL_SPEED_S = 0.25
+# Ways that come nearer to the limit of a joint than this share of its range are avoided.
+NEAR_LIMIT = 0.05
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A motion with the joints that drive it.
+
+    Attributes:
+        trajectory: the poses in the part's frame, timed as the joints allow, and rolled.
+        seconds: (M,) times of the joints from the first pose [s].
+        joints, speeds: (M, J) [rad or m, and per second].
+        limits: of passes that are slower than planned.
+        least_singular_value: of the tip's velocity by those of the joints, m and rad alike.
+    """
+
+    arm: Arm
+    trajectory: Trajectory
+    seconds: np.ndarray
+    joints: np.ndarray
+    speeds: np.ndarray
+    limits: tuple[PassLimit, ...]
+    least_singular_value: float
+
+    @property
+    def to_limit(self) -> tuple[float, str]:
+        """How near a joint comes to its limit, as a share of its range, and which."""
+        share = self.arm.room(self.joints).min(axis=0)
+        nearest = int(np.argmin(share))
+        return float(share[nearest]), self.arm.joints[nearest]
+
+    @property
+    def joint_motion(self) -> JointMotion:
+        """The joints over time, with their speeds."""
+        arm = self.arm
+        return JointMotion(arm.joints, arm.slides, self.seconds, self.joints, self.speeds)
+
+    @property
+    def sentence(self) -> str:
+        """How the robot drives it, in a sentence."""
+        room, joint = self.to_limit
+        slow = (
+            f'with {len(self.limits)} of its passes slowed down' if self.limits else 'as planned'
+        )
+        return (
+            f'driven {slow}; {joint} comes within {100 * room:.0f} % of its range of a limit; '
+            f'nearest singularity {self.least_singular_value:.2g} m/s per rad/s'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures by name."""
+        room, joint = self.to_limit
+        return {
+            'joints': list(self.arm.joints),
+            'nearest_to_limit': {'joint': joint, 'share_of_range': room},
+            'least_singular_value': self.least_singular_value,
+            'limits': [vars(limit) for limit in self.limits],
+        }
+
+
+@dataclass(frozen=True)
+class RobotCell:
+    """A robot and where the part stands in its base.
+
+    ``acceleration`` is that of every joint [rad/s2 or m/s2]; None: each reaches its full speed in
+    a quarter of a second.
+    """
+
+    arm: Arm
+    part: Rigid
+    acceleration: float | None = None
+
+    def __post_init__(self) -> None:
+        unknown = [
+            n for n, v in zip(self.arm.joints, self.arm.fastest, strict=True) if v == math.inf
+        ]
+        if unknown:
+            raise PlanError(
+                f'the URDF has no greatest speed of {" ".join(unknown)}; give each a limit, as '
+                '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
+            )
+
+    def drive(self, trajectory: Trajectory, free_roll: bool) -> Drive:
+        """The joints that drive a motion in the frame of the part.
+
+        The way through all poses is the one that the joints can drive the fastest. Where they
+        cannot keep up the motion is slowed down, each pass as a whole. With ``free_roll`` the tool
+        may be turned about its own axis, by one angle for the whole motion.
+
+        Raises:
+            PlanError: the robot does not reach all poses.
+        """
+        arm, begin_ns = self.arm, int(trajectory.stamps_ns[0])
+        times_s = _times(trajectory)
+        positions, turns = self.poses(trajectory, times_s)
+        joints, roll_rad = _joints(arm, positions, turns, times_s, free_roll)
+        most = arm.fastest / FULL_SPEED_S
+        if self.acceleration is not None:
+            most = np.full(len(arm), self.acceleration)
+        pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
+        opening = _openings(trajectory, times_s)
+        shares = pace.shares(opening)
+        reached_s, seconds, driven, speeds = pace.driven(shares)
+
+        def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
+            later_s = np.interp(1e-9 * (stamps_ns - begin_ns), times_s, reached_s)
+            return begin_ns + np.round(1e9 * later_s).astype(np.int64)
+
+        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(roll_rad)
+        slowed = replace(
+            trajectory,
+            stamps_ns=slowed_ns(trajectory.stamps_ns),
+            trigger_stamps_ns=slowed_ns(trajectory.trigger_stamps_ns),
+            quaternions_xyzw=rolled.as_quat(),
+        )
+        values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
+        limits = pace.limits(opening, shares)
+        return Drive(arm, slowed, seconds, driven, speeds, limits, float(values[:, -1].min()))
+
+    def allowed_speeds(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+        """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
+        at which a joint runs at its greatest speed.
+        """
+        times_s = _times(trajectory)
+        positions, turns = self.poses(trajectory, times_s)
+        joints, _ = _joints(self.arm, positions, turns, times_s, False)
+        steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
+        share = np.abs(np.diff(joints, axis=0)) / (1.0 - MARGIN) / self.arm.fastest
+        speed = steps_m / np.maximum(share.max(axis=1), 1e-9)
+        travel = np.append(0.0, np.cumsum(steps_m))
+        moving = steps_m > 1e-6
+        return 0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]
+
+    def tried(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
+        """How far a motion is followed, at which share of its speed, and with what room.
+
+        Of the whole, at the slowest moment, and of a joint's range; 0 where not all is reached.
+        Accelerations are not looked at.
+        """
+        times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
+        positions, turns = self.poses(trajectory, times_s)
+        _, ways = _ways(self.arm, positions, turns, free_roll)
+        if not len(ways.whole):
+            return float(ways.reached.max(initial=0)) / TRIED, 0.0, 0.0
+        joints = ways.joints[_best(self.arm, ways, times_s)]
+        speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
+        return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
+
+    def poses(self, trajectory: Trajectory, times_s: np.ndarray) -> tuple[np.ndarray, Rotation]:
+        """Positions (N, 3) and turns of the tool in the robot's base at times (N,)."""
+        clock_s = 1e-9 * (trajectory.stamps_ns - trajectory.stamps_ns[0])
+        places = PchipInterpolator(clock_s, trajectory.positions_m)(times_s)
+        turns = Slerp(clock_s, Rotation.from_quat(trajectory.quaternions_xyzw))(times_s)
+        stands = self.part.rotation
+        return (
+            places @ stands.T + self.part.translation_m, Rotation.from_matrix(stands) * turns
+        )  # fmt: skip
+
+
+def _joints(
+    arm: Arm, positions_m: np.ndarray, turns: Rotation, times_s: np.ndarray, free_roll: bool
+) -> tuple[np.ndarray, float]:
+    """Joints (N, J) for poses in the robot's base, and by how much the tool is rolled [rad]."""
+    rows = _apart(positions_m, turns)
+    way, roll_rad = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll)
+    axes = (turns * _roll(roll_rad)).as_matrix()
+    joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
+    if error.max() > REACHED:
+        raise PlanError(
+            f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m in '
+            'its base; let the part stand elsewhere, paint place shows where'
+        )
+    return joints, roll_rad
+
+
+def _roll(roll_rad: float) -> Rotation:
+    return Rotation.from_rotvec([0.0, 0.0, roll_rad])
+
+
+def _apart(positions_m: np.ndarray, turns: Rotation) -> np.ndarray:
+    """Rows of poses about APART from each other, both ends included."""
+    angle = (turns[:-1].inv() * turns[1:]).magnitude()
+    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / APART_M + angle / APART_RAD
+    steps = np.floor(np.append(0.0, np.cumsum(way)))
+    rows = np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0)
+    return np.union1d(rows, len(steps) - 1)
+
+
+def _best_way(
+    arm: Arm, positions_m: np.ndarray, turns: Rotation, times_s: np.ndarray, free_roll: bool
+) -> tuple[np.ndarray, float]:
+    """(N, J), of all ways through the poses the one that is driven the fastest, and its roll."""
+    begin, ways = _ways(arm, positions_m, turns, free_roll)
+    if not begin:
+        raise PlanError(
+            f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
+            'check --part-pose, or let paint place look where the part may stand'
+        )
+    if not len(ways.whole):
+        far = int(ways.reached.max())
+        raise PlanError(
+            f'the robot follows the motion to {times_s[far]:.1f} of {times_s[-1]:.1f} s and not '
+            f'beyond {_words(positions_m[far])} m in its base, in none of {len(begin)} '
+            'configurations; let paint place look where the part may stand'
+        )
+    best = _best(arm, ways, times_s)
+    return ways.joints[best], begin[best].roll_rad
+
+
+def _ways(
+    arm: Arm, positions_m: np.ndarray, turns: Rotation, free_roll: bool
+) -> tuple[list[Start], Ways]:
+    begin = starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    axes = np.reshape([(turns * _roll(one.roll_rad)).as_matrix() for one in begin],
+                      (len(begin), len(positions_m), 3, 3))  # fmt: skip
+    joints = np.reshape([one.joints for one in begin], (len(begin), len(arm)))
+    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
+    return begin, follow(arm, joints, positions, axes)
+
+
+def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
+    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
+    joints = ways.joints[ways.whole]
+    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
+    late = np.maximum(speeds.max(axis=2), 1.0)
+    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / NEAR_LIMIT, 0.0)
+    return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
+
+
+def _times(trajectory: Trajectory) -> np.ndarray:
+    """(N,) times at which the joints are looked at [s]."""
+    count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
+    return np.linspace(0.0, trajectory.duration_s, count)
+
+
+def _openings(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
+    """(N,) number of the opening of the gun in which each time lies, -1 for none."""
+    found = np.full(len(times_s), -1)
+    stamps_s = 1e-9 * (trajectory.trigger_stamps_ns - trajectory.stamps_ns[0])
+    ends_s, number = np.append(stamps_s, times_s[-1]), 0
+    for k, flow in enumerate(trajectory.trigger_flow):
+        if flow > 0.0:
+            found[(times_s >= ends_s[k] - STEP_S) & (times_s <= ends_s[k + 1] + STEP_S)] = number
+            number += 1
+    return found
+
+
+def _words(place_m: np.ndarray) -> str:
+    return '(' + ', '.join(f'{value:.2f}' for value in place_m) + ')'

@@ -1,0 +1,128 @@
+"""How fast a robot can drive a motion: its joints' speeds and accelerations along it."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import linprog
+from scipy.sparse import coo_array, vstack
+
+from paint_deposition.errors import PlanError
+
+# Speeds and accelerations keep this share below the limits where they are looked at.
+MARGIN = 0.03
+# No motion is slowed down to less than this share: the robot stands in a singularity there.
+SLOWEST = 0.01
+# Of the joints that are written.
+RATE_HZ = 250.0
+# Smaller losses of speed are not told.
+TOLD = 0.005
+
+
+@dataclass(frozen=True)
+class PassLimit:
+    """The joint that keeps a pass from its planned speed."""
+
+    number: int  # of the pass, from 1
+    share: float  # of the planned speed that is left
+    joint: str
+    of_speed: bool  # whether its speed limits, not its acceleration
+
+    def __str__(self) -> str:
+        what = 'speed' if self.of_speed else 'acceleration'
+        return (
+            f'pass {self.number} runs at {100 * self.share:.0f} % of the planned speed, which the '
+            f'{what} of {self.joint} allows'
+        )
+
+
+@dataclass(frozen=True)
+class JointPace:
+    """What the joints along a motion allow; they are a function of the planned time."""
+
+    names: tuple[str, ...]
+
+    times_s: np.ndarray
+    joints: CubicSpline
+    fastest: np.ndarray
+    most: np.ndarray
+
+    def shares(self, opening: np.ndarray) -> np.ndarray:
+        """(N,) share of the planned speed at the times, the greatest that the joints allow.
+
+        With b the square of the share the joints' accelerations are linear in b and its slope
+        (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
+        share, or its film would be uneven.
+        """
+        count, step = len(self.times_s), self.times_s[1]
+        column = np.where(opening >= 0, opening, opening.max() + 1 + np.cumsum(opening < 0))
+        # The neighbours count too: the share changes evenly between the times.
+        speed = maximum_filter1d(np.abs(self.joints(self.times_s, 1)), 3, axis=0) / (1.0 - MARGIN)
+        highest = np.minimum(1.0, (self.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
+        bound = np.ones(column.max() + 1)
+        np.minimum.at(bound, column, highest)
+        slopes, bends = self.joints(self.times_s, 1).T, self.joints(self.times_s, 2).T
+        row, sides, rows = np.arange(count - 1), [], []
+        # At both ends of every step: between them the acceleration is nearly linear.
+        for end in (row, row + 1):
+            for slope, bend, most in zip(slopes, bends, (1.0 - MARGIN) * self.most, strict=True):
+                change = 0.5 * slope[end] / step
+                part = coo_array(
+                    (
+                        np.concatenate([-change, change, bend[end]]),
+                        (np.tile(row, 3), column[np.concatenate([row, row + 1, end])]),
+                    ),
+                    shape=(count - 1, len(bound)),
+                )
+                rows += [part, -part]
+                sides += [np.full(count - 1, most)] * 2
+        weights = np.bincount(column, minlength=len(bound)).astype(float)
+        solved = linprog(
+            -weights, A_ub=vstack(rows).tocsr(), b_ub=np.concatenate(sides),
+            bounds=np.stack([np.full_like(bound, SLOWEST**2), bound], axis=1), method='highs',
+        )  # fmt: skip
+        if solved.x is None:
+            raise PlanError(
+                f'some joints have less than {100 * SLOWEST:.0f} % of the speed or acceleration '
+                'that the motion needs; let the part stand elsewhere, paint place shows where'
+            )
+        return np.sqrt(solved.x)[column]
+
+    def driven(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The joints at these shares (N,) of the planned speed.
+
+        Returned are the times (N,) at which the planned ones are reached; and times (M,) at an
+        even rate with the joints and their speeds (M, J) there. Between planned times the share
+        changes evenly. All is slower where the limits are not kept in between.
+        """
+        steps_s = 2.0 * np.diff(self.times_s) / (shares[1:] + shares[:-1])
+        reached_s = np.append(0.0, np.cumsum(steps_s))
+        seconds = np.linspace(0.0, reached_s[-1], math.ceil(reached_s[-1] * RATE_HZ) + 1)
+        step = np.clip(np.searchsorted(reached_s, seconds, side='right') - 1, 0, len(shares) - 2)
+        since = seconds - reached_s[step]
+        rise = (np.diff(shares) / steps_s)[step]
+        planned_s = self.times_s[step] + shares[step] * since + 0.5 * rise * since**2
+        share = (shares[step] + rise * since)[:, np.newaxis]
+        joints, slope = self.joints(planned_s), self.joints(planned_s, 1)
+        rate = self.joints(planned_s, 2) * share**2 + slope * rise[:, np.newaxis]
+        too_fast = (np.abs(slope * share) / self.fastest).max()
+        slower = max(1.0, float(too_fast), math.sqrt((np.abs(rate) / self.most).max()))
+        return slower * reached_s, slower * seconds, joints, slope * share / slower
+
+    def limits(self, opening: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
+        """Of the passes that are slower than planned, the joint that makes them so."""
+        slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
+        bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
+        found = []
+        for number in range(opening.max() + 1):
+            inside = opening == number
+            share = float(shares[inside].min())
+            if share > 1.0 - TOLD:
+                continue
+            speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
+            of_speed = speed.max() > rate.max()
+            joint = int(np.argmax(speed if of_speed else rate))
+            found.append(PassLimit(number + 1, share, self.names[joint], bool(of_speed)))
+        return tuple(found)

@@ -1,0 +1,61 @@
+"""`paint doctor`: what is there, and a self-test that can fail."""
+
+import json
+from importlib import metadata
+
+import pytest
+import rclpy
+
+from cli.command import paint
+from paint_deposition.cli import doctor
+
+
+def findings(code: int) -> dict[str, dict]:
+    done = paint('doctor', '--json')
+    assert (done.returncode, done.stderr) == (code, '')
+    told = json.loads(done.stdout)
+    assert told['well'] == (done.returncode == 0)
+    return {one['name']: one for one in told['findings']}
+
+
+@pytest.mark.slow
+def test_a_complete_installation_is_well():
+    found = findings(0)
+    assert f'numpy {metadata.version("numpy")}' in found['libraries']['found'].split(', ')
+    assert rclpy.get_rmw_implementation_identifier() in found['ROS 2']['found']
+    assert [found[name]['ok'] for name in ('libraries', 'known film', 'live = offline')] == [
+        True
+    ] * 3
+    assert not [one for one in found.values() if one['remedy'] and one['ok'] is not None]
+
+
+@pytest.mark.slow
+def test_a_film_that_is_not_the_known_one_is_an_error(monkeypatch):
+    monkeypatch.setattr(doctor, 'KNOWN_FILM_UM', doctor.KNOWN_FILM_UM * (1 + 2 * doctor.ROUNDING))
+    found = findings(1)
+    assert [one['name'] for one in found.values() if one['ok'] is False] == ['known film']
+    assert found['known film']['remedy']
+
+
+def test_a_library_that_is_missing_or_too_old_is_an_error_unless_an_extra_wants_it(monkeypatch):
+    wanted = ['click>=99', 'nowhere>=3', 'numpy', 'elsewhere>=2; extra == "many"']
+    monkeypatch.setattr(metadata, 'requires', lambda package: wanted)
+    monkeypatch.setattr(doctor, '_known_film', lambda: iter(()))
+    found = findings(1)
+    assert found['libraries']['remedy'] == "pip install 'click>=99' 'nowhere>=3'"
+    assert found['extra many'] == {
+        'name': 'extra many', 'found': 'elsewhere missing', 'ok': None,
+        'remedy': "pip install 'elsewhere>=2'",
+    }  # fmt: skip
+
+
+def test_what_cannot_be_looked_at_is_an_error_with_a_remedy(monkeypatch):
+    def broken():
+        raise RuntimeError("cannot cache function '_fill': no locator available")
+
+    monkeypatch.setattr(doctor, '_known_film', broken)
+    done = paint('doctor')
+    assert done.returncode == 1
+    assert 'BAD broken' in done.stdout
+    assert '-> set NUMBA_CACHE_DIR to a folder that can be written' in done.stdout
+    assert done.stdout.endswith('paint does not work as it should\n')

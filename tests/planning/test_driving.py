@@ -1,0 +1,194 @@
+"""Plans that a robot drives: its joints against the arm by the product of exponentials."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from rosbags.highlevel import AnyReader
+from scipy.interpolate import CubicHermiteSpline
+from scipy.spatial.transform import Rotation
+
+import paint_deposition as pd
+import robot_arm
+from cli.command import paint
+from paint_deposition.api.robot import place, read_robot
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.motion.part_frame import Rigid, at_part, moved
+from paint_deposition.planning.driven_plan import driven
+from paint_deposition.planning.plan import plan
+from paint_deposition.planning.requests import PlanRequest
+from planning.test_surface_map import sheet
+from scenes import painted
+
+pytestmark = pytest.mark.slow
+
+ROUND = DepositionModel(
+    planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
+)
+# The part lies on its back: the gun looks along its +y, which is down.
+LYING = (Rotation.from_euler('z', np.pi) * Rotation.from_euler('x', -np.pi / 2)).as_quat()
+PART_POSE = [0.9, 0.0, 0.5, *LYING]
+
+
+@pytest.fixture(scope='module')
+def urdf(tmp_path_factory):
+    path = tmp_path_factory.mktemp('robot') / 'arm.urdf'
+    path.write_text(robot_arm.urdf())
+    return path
+
+
+@pytest.fixture(scope='module')
+def cell(urdf):
+    return read_robot(urdf, PART_POSE)
+
+
+@pytest.fixture(scope='module')
+def planned():
+    flat = sheet(lambda x, z: 0.0 * x, half_m=0.15)
+    return plan(flat, ROUND, PlanRequest(speed_m_per_s=0.2), 'part')
+
+
+@pytest.fixture(scope='module')
+def on_robot(planned, cell):
+    return driven(planned, cell)
+
+
+def test_the_tip_moves_as_its_jacobian_says(cell):
+    joints = np.random.default_rng(2).uniform(-1.0, 1.0, (5, 6))
+    position, axes, jacobian = cell.arm.jacobians(joints)
+    expected, turns = robot_arm.tip_poses(joints)
+    np.testing.assert_allclose(position, expected, atol=1e-12)
+    np.testing.assert_allclose(axes, Rotation.from_quat(turns).as_matrix(), atol=1e-12)
+    step = 1e-6
+    for j in range(6):
+        ahead, turned = robot_arm.tip_poses(joints + step * np.eye(6)[j])
+        np.testing.assert_allclose((ahead - expected) / step, jacobian[:, :3, j], atol=1e-5)
+        turn = (Rotation.from_quat(turned) * Rotation.from_quat(turns).inv()).as_rotvec()
+        np.testing.assert_allclose(turn / step, jacobian[:, 3:, j], atol=1e-5)
+
+
+def test_the_joints_lay_the_film_of_the_plan_within_their_limits(planned, on_robot):
+    drive = on_robot.drive
+    path = CubicHermiteSpline(drive.seconds, drive.joints, drive.speeds)
+    every_ms = np.arange(0.0, drive.seconds[-1], 1e-3)
+    arm = drive.arm
+    assert (np.abs(path(every_ms, 1)) <= arm.fastest).all()
+    # A Hermite spline rings by some per cent where the acceleration jumps.
+    assert (np.abs(path(every_ms, 2)) <= 1.05 * arm.fastest / 0.25).all()
+    assert ((path(every_ms) >= arm.lower) & (path(every_ms) <= arm.upper)).all()
+    in_base = replace(
+        drive.trajectory, stamps_ns=np.round(1e9 + 1e9 * every_ms[::4]).astype(np.int64),
+        trigger_stamps_ns=drive.trajectory.trigger_stamps_ns
+        - drive.trajectory.stamps_ns[0] + 10**9,
+        **dict(zip(('positions_m', 'quaternions_xyzw'), robot_arm.tip_poses(path(every_ms[::4])),
+                   strict=True)),
+    )  # fmt: skip
+    motion = at_part(in_base, PART_POSE, 'part')
+    film_um = painted(planned.surface.points(), motion, ROUND).film_um
+    assert np.abs(film_um - on_robot.film_um).max() < 1e-3 * on_robot.film_um.max()
+
+
+def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
+    assert not on_robot.drive.limits
+    used = np.abs(on_robot.drive.speeds).max(axis=0)
+    busiest = int(used.argmax())
+    fastest = np.where(np.arange(6) == busiest, 0.1 * used, cell.arm.fastest)
+    slow = replace(cell, arm=replace(cell.arm, fastest=fastest), acceleration=4.0)
+    found = driven(planned, slow)
+    limits = found.drive.limits
+    assert limits
+    assert {limit.joint for limit in limits} == {cell.arm.joints[busiest]}
+    assert all(limit.of_speed and limit.share < 0.8 for limit in limits)
+    assert found.cycle_time_s > on_robot.cycle_time_s
+    assert [str(limit) for limit in limits] == list(found.warnings)[: len(limits)]
+    assert found.mean_um > 1.05 * on_robot.mean_um
+    # Within a pass the speed is even: the film along its middle is as the plan's, but thicker.
+    first = found.trajectory
+    on, off = first.trigger_stamps_ns[2 * limits[0].number - 2 : 2 * limits[0].number]
+    inside = (first.stamps_ns > on + 10**8) & (first.stamps_ns < off - 10**8)
+    step_m = np.linalg.norm(np.diff(first.positions_m[inside], axis=0), axis=1)
+    speed = step_m / (1e-9 * np.diff(first.stamps_ns[inside]))
+    assert speed.max() < 1.02 * speed.min()
+    assert speed.mean() == pytest.approx(0.2 * limits[0].share, rel=0.02)
+
+
+def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
+    lopsided = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
+    kept = driven(plan(planned.surface, lopsided, PlanRequest(speed_m_per_s=0.2), 'part'), cell)
+    for one, rolls in ((on_robot, True), (kept, False)):
+        plain = one.trajectory.quaternions_xyzw[0]
+        roll = Rotation.from_quat(plain).as_matrix()[:, 0] @ [1.0, 0.0, 0.0]
+        assert (abs(abs(roll) - 1.0) > 1e-3) == rolls
+
+
+@pytest.mark.parametrize(
+    ('place_m', 'words'),
+    [((5.0, 0.0), 'does not reach the first pose'), ((1.2, 0.2), 'follows the motion to')],
+)
+def test_what_cannot_be_driven_says_where(planned, cell, place_m, words):
+    part = Rigid.of([*place_m, *PART_POSE[2:]])
+    with pytest.raises(PlanError, match=words):
+        replace(cell, part=part).drive(planned.trajectory, free_roll=False)
+
+
+def test_a_robot_without_speeds_is_refused(urdf, tmp_path):
+    unknown = tmp_path / 'unknown.urdf'
+    unknown.write_text(urdf.read_text().replace(' velocity="1"', '', 1))
+    with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
+        read_robot(unknown, PART_POSE)
+    with pytest.raises(PaintError, match='give seven numbers'):
+        read_robot(urdf, [1.0, 2.0])
+
+
+def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
+    found = place(planned.trajectory, cell, [0.9, 5.0], [0.0])
+    assert found.reached.tolist() == [[1.0, 0.0]]
+    assert found.part_pose == pytest.approx(PART_POSE)
+    assert found.speed[0, 0] > 0.5
+    in_base = moved(planned.trajectory, cell.part, 'base_link')
+    assert place(in_base, cell, [0.9], [0.0]).room == pytest.approx(found.room[:, :1])
+
+
+def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path):
+    trimesh.Trimesh(planned.surface.vertices_m, planned.surface.faces, process=False).export(
+        tmp_path / 'flat.stl'
+    )
+    model = tmp_path / 'round.yaml'
+    pd.write_model(model, ROUND)
+    part = '--mesh', tmp_path / 'flat.stl', '--max-edge-length-m', 0.05
+    robot = '--urdf', urdf, '--tip-link', 'tool0', '--part-pose', *PART_POSE
+    done = paint('plan', *part, '--model', model, '--speed', 0.2, *robot, '-o', tmp_path / 'plan')
+    assert done.returncode == 0, done.stderr
+    assert 'driven as planned' in done.stdout
+    figures = json.loads((tmp_path / 'plan/plan.json').read_text())['robot']
+    assert figures['joints'] == list(cell.arm.joints)
+    table = np.loadtxt(tmp_path / 'plan/joints.csv', delimiter=',', skiprows=1)
+    with AnyReader([tmp_path / 'plan/trajectory']) as bag:
+        (message,) = [
+            bag.deserialize(raw, connection.msgtype)
+            for connection, _, raw in bag.messages()
+            if connection.topic == '/joint_trajectory'
+        ]
+    np.testing.assert_allclose([p.positions for p in message.points], table[:, 1:], atol=1e-6)
+    given = '--trajectory', tmp_path / 'plan/trajectory', *robot
+    done = paint('improve', *part, *given, '--model', model, '-o', tmp_path / 'better')
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / 'better/joints.csv').exists()
+    grid = '--x', 0.9, 1.0, '--y', 0.0, 0.05
+    done = paint('place', *given, *grid, '-o', tmp_path / 'place', '--json')
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)['reached'] == [[1.0]]
+    done = paint('place', *given[:2], '--urdf', urdf, '-o', tmp_path / 'place')
+    assert done.returncode == 2
+    assert '--part-pose' in done.stderr
+    # A tool path holds the passes: the same film, at its own speed.
+    passes = '--trajectory', tmp_path / 'plan/passes.yaml', '--part-pose', *PART_POSE
+    done = paint('simulate', *part, '--model', model, *passes, '-o', tmp_path / 'film')
+    assert 'no speeds' in done.stderr
+    film = json.loads((tmp_path / 'film/stats.json').read_text())
+    planned_um = json.loads((tmp_path / 'plan/stats.json').read_text())['mean_um']
+    assert film['mean_um'] == pytest.approx(planned_um * 0.2 / 0.3, rel=0.01)
