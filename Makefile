@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint docs format lock audit sbom clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -69,13 +69,19 @@ bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure
 bench-line: build  ## watch 500 virtual parts for a step and an effect too small for one, a worker killed
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page line $(ARGS)
 
+docs: build  ## build the site of the documentation into runs/site, links checked
+	@.venv/bin/uv pip install --quiet --require-hashes --python .venv/bin/python -r requirements/docs.txt
+	@$(IN_ENVIRONMENT) NO_MKDOCS_2_WARNING=true mkdocs build --quiet
+	@echo 'Built: runs/site/index.html; the search needs python -m http.server --directory runs/site'
+
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .
 
 lock: build  ## pin the newest library versions that all supported Pythons can use
 	$(PIN) requirements/core.in -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
-	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt -o requirements/ros.txt
+	$(PIN) requirements/docs.in -c requirements/core.txt -c requirements/dev.txt -o requirements/docs.txt
+	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt --excludes requirements/excluded.txt -o requirements/ros.txt
 
 audit: build  ## look the pinned libraries up among the known vulnerabilities (needs the network)
 	@setup/audit.sh

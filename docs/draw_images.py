@@ -128,6 +128,10 @@ def draw_results() -> None:
         paint('measure', '--mesh', SAMPLES / 'measured_door/door.stl', '--trajectory',
               SAMPLES / 'measured_door/door', '-o', folder / 'measure')  # fmt: skip
         keep(Image.open(folder / 'measure/points.png'), 'measure.png')
+        paint('inspect', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+              SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
+              '--out', folder / 'inspect.png')  # fmt: skip
+        keep(Image.open(folder / 'inspect.png'), 'inspect.png')
         paint('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
         paint('plan', '--mesh', SAMPLES / 'door.stl', '--model',

@@ -37,9 +37,11 @@ if [[ $("$venv/bin/uv" --version 2>>"$log") != "uv $uv_version"* ]]; then
     logged 'Installing the installer, uv' \
         "$venv/bin/python" -m pip install --disable-pip-version-check -r "$root/requirements/uv.txt"
 fi
+# An environment that was made before the ROS wheels did without it has it still.
+"$venv/bin/uv" pip uninstall --python "$venv/bin/python" lark-parser >>"$log" 2>&1
 logged "Installing $libraries" \
     "$venv/bin/uv" pip install --require-hashes --compile-bytecode --python "$venv/bin/python" \
-    "${requirements[@]}"
+    --excludes "$root/requirements/excluded.txt" "${requirements[@]}"
 logged 'Repairing the CMake exports of the wheels' \
     "$venv/bin/python" "$root/setup/repair_cmake_exports.py"
 

@@ -3,6 +3,7 @@
 import os
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -74,16 +75,22 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
-@pytest.fixture
-def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Pictures are composed and written blank: drawing them costs more than most commands.
-
-    For tests that do not look at them. Those of fixtures of a wider scope are drawn.
-    """
+@contextmanager
+def blank_pictures() -> Iterator[None]:
+    """Pictures are composed and written blank: drawing them costs more than most commands."""
     from matplotlib.figure import Figure
 
     save = Figure.savefig
-    monkeypatch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
+        yield
+
+
+@pytest.fixture
+def undrawn() -> Iterator[None]:
+    """For tests that do not look at pictures. Those of fixtures of a wider scope are drawn."""
+    with blank_pictures():
+        yield
 
 
 @pytest.fixture(scope='session')

@@ -23,7 +23,7 @@ from paint_deposition.nodes import executables
 PACKAGE = 'paint_deposition'
 NODES = (
     'atomizer_source', 'bag_player', 'deposition_simulator', 'egm_source', 'index_planner',
-    'model_comparison', 'opcua_source', 'run_recorder', 'rws_source',
+    'model_comparison', 'opcua_source', 'run_recorder', 'rws_source', 'web_view',
 )  # fmt: skip
 SOURCES = Path(__file__).resolve().parent.parent / 'ros2_ws' / 'src'
 
@@ -153,7 +153,8 @@ def launched(*arguments: str) -> subprocess.CompletedProcess:
 
 
 def test_launch_file_describes_every_node():
-    nodes = wanted(bag='run', record='runs', measurements='readings.csv', urdf='arm.urdf')
+    given = {'bag': 'run', 'record': 'runs', 'measurements': 'readings.csv', 'urdf': 'arm.urdf'}
+    nodes = wanted(**given, page='true')
     assert set(nodes) == set(NODES)
     for node, parameters in nodes.items():
         assert set(parameters) <= set(table_of(node))
@@ -167,7 +168,7 @@ def test_launch_file_describes_every_node():
         ({}, 1),
         ({'record': 'runs'}, 2),
         ({'measurements': "painter's.csv"}, 2),
-        ({'record': '1', 'measurements': 'readings.csv'}, 3),
+        ({'record': '1', 'measurements': 'readings.csv', 'page': 'true'}, 4),
         ({'wait_for_subscribers': '5'}, 5),
     ],
 )

@@ -18,6 +18,7 @@ from paint_deposition.nodes.robot.egm_source import EgmSource
 from paint_deposition.nodes.robot.opcua_source import OpcuaSource
 from paint_deposition.nodes.robot.rws_source import RwsSource
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.viewing.web_view import WebView
 from robot_arm import urdf
 
 PANEL = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
@@ -35,6 +36,7 @@ NODES = {
     'opcua_source': (OpcuaSource, {'trigger': 'i=1', 'url': 'opc.tcp://127.0.0.1:9'}),
     'rws_source': (RwsSource, {'trigger': 'doGun', 'url': 'http://127.0.0.1:9'}),
     'run_recorder': (RunRecorder, {'name': 'run'}),
+    'web_view': (WebView, PANEL | {'port': 0}),
 }
 # Where tf2 is installed, and with use_sim_time.
 NOT_ALWAYS = {'/tf', '/tf_static', '/tf2_frames', '/clock'}

@@ -111,7 +111,7 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20, '--speed-max', 0.1)
-    done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json')
+    done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
     assert done.returncode == 0, done.stderr
     content = json.loads(done.stdout)
     assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
@@ -123,9 +123,10 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert names == {
         MARKER, 'film.csv', 'film.ply', 'film.png', 'model.yaml', 'passes.csv', 'passes.mod',
-        'plan.json', 'stats.json', 'trajectory',
+        'passes.yaml', 'plan.json', 'stats.json', 'trajectory',
     }  # fmt: skip
-    assert read_program(tmp_path / 'plan' / 'passes.mod').moves
+    program = read_program(tmp_path / 'plan' / 'passes.mod')
+    assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
     assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000
     assert is_picture(tmp_path / 'plan' / 'film.png')
 

@@ -13,10 +13,10 @@ from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.files.rapid.program import read_program
+from paint_deposition.files.rapid.program import program_trajectory, read_program
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import read_trajectory
-from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.programmed import GunSwitch, Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
 HEAD = 'x_m,y_m,z_m,qx,qy,qz,qw'
@@ -129,8 +129,11 @@ def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
         'ENDPROC\nENDMODULE\n'
     )
     program = read_program(path)
-    assert [m.brush for m in program.moves if m.spraying] == [0, 3, 5, 7]
-    assert any('the plane of SetBrush is not followed' in note for note in program.notes)
+    assert [m.brush for m in program.moves if m.spraying] == [0, 3, 3, 7]
+    assert program.moves[2].switches == (GunSwitch(0.05, True, True, 5),)
+    trajectory = program_trajectory(program)
+    changes = [(round(ns * 0.6e-6), brush) for ns, _, brush in trajectory.triggers]
+    assert changes == [(0, 3), (100, 3), (150, 5), (200, 0), (300, 7)]
     path.write_text(path.read_text().replace('SetBrush 3', 'SetBrush 2.5'))
     with pytest.raises(RecordingError, match=r'line 5: setbrush takes the number of a brush, not'):
         read_program(path)

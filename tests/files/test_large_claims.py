@@ -85,7 +85,6 @@ def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
 
 NESTED = {
     'arrays of RAPID': ('rapid', lambda: RAPID.replace(b'[[0,0,0]', b'[' * 20_000 + b'[0,0,0]')),
-    'signs of RAPID': ('rapid', lambda: RAPID.replace(b'100*(1+2)', b'-' * 20_000 + b'1')),
     'lists of a model': ('model', lambda: b'effects: ' + b'[' * 4_000),
     'lists of a campaign': ('campaign', lambda: b'experiments: ' + b'[' * 4_000),
     'links of a URDF': ('urdf', lambda: b'<robot name="a">' + b'<link name="x">' * 20_000),

@@ -46,7 +46,24 @@ RAPID = rb"""MODULE Door
     IF n{1}=2 THEN
       WaitTime 1;
     ENDIF
+    FOR i FROM 1 TO 3 STEP 2 DO
+      rStroke i\brush:=Round(i/2);
+    ENDFOR
+    WHILE n{2}<3 AND NOT TestDI(di1) OR n{2}=2 DO
+      Incr n{2};
+    ENDWHILE
   ENDPROC
+  PROC rStroke(INOUT num i \num brush)
+    VelSet 50,800;
+    TEST i
+    CASE 1,2: SetBrush brush\X:=-10;
+    DEFAULT: p2.trans.x:=f(i);
+    ENDTEST
+    PaintL p2,v500,z10,tBell\WObj:=wobjDoor;
+  ENDPROC
+  FUNC num f(num i)
+    RETURN i mod 2;
+  ENDFUNC
 ENDMODULE
 """
 POSES = (
@@ -174,7 +191,7 @@ def targets() -> dict[str, Target]:
         'rapid': Target(
             '.mod', read_recording, [RAPID],
             r'PROC ENDPROC MoveL MoveC PaintL TriggL SetDO SetAO Offs( RelTool( wobj0 [[ ]] := '
-            '{1} .trans /0 not 9E9 -',
+            '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
         'readings': Target('.csv', read_readings, readings, cells),
         'measuring_points': Target(

@@ -1,13 +1,18 @@
 """RAPID programs: the real one, what programs are made of, and what cannot be followed."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.rapid import interpreter
 from paint_deposition.files.rapid.program import RapidProgram, read_program
 from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.programmed import GunSwitch, Move
+from robot_arm import TIP_M, urdf
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -41,7 +46,11 @@ def refusal(read, *arguments, **options) -> str:
 def test_the_real_program(shared_data):
     program = read_program(shared_data / 'rapid/ECL_Grey_T_ROB1.mod')
     assert len(program.moves) == 10
-    assert program.notes == ['line 13: moveabsj skipped: joint angles need the robot']
+    assert program.notes == [
+        'line 13: moveabsj skipped: joint angles need the robot',
+        'passed over, neither motion nor paint: confl (line 11), syncmoveon (line 12), '
+        'syncmoveoff (line 24)',
+    ]
     first, last = program.moves[0], program.moves[-1]
     assert first.instruction == 'movej'
     np.testing.assert_allclose(first.position_m, [0.61391, 2.32615, 1.04068], rtol=0, atol=1e-12)
@@ -68,7 +77,7 @@ def test_declared_targets_speeds_and_zones(read):
     VAR num step:=50;
     """
     body = r"""
-    MoveJ pStart, v1000, FINE, tool0;
+    MoveJ pStart, v1000, FINE, tBell;
     movel PEND, vslow, zOwn, tBell \WObj:=wobj0;
     MoveL row{2}, v600\V:=450, zStop, tBell;
     MoveL Offs(pEnd,0,step,-2*step), vmax, z0, tBell;
@@ -115,7 +124,7 @@ def test_outputs_and_triggers_switch_the_gun(read):
     TriggL {target(1)},v600,on,z50,tBell;
     TriggL {target(2)},v600,off,z50,tBell;
     MoveL {target(3)},v600,z50,tBell;
-    SetDO \SDelay:=0.1,doGun,high;
+    SetDO doGun,high;
     MoveL {target(4)},v600,z50,tBell;
     Reset doGun;
     MoveLDO {target(5)},v600,z50,tBell,doGun,1;
@@ -160,14 +169,33 @@ def test_conditions_without_moves_do_no_harm(read):
 @pytest.mark.parametrize(
     ('body', 'says'),
     [
-        ('FOR i FROM 1 TO 3 DO\nMoveL p,v1,fine,t;\nENDFOR', 'line 5: movel inside FOR'),
-        ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'paintl inside WHILE is not followed'),
-        ('IF reg1=1 MoveL p,v1,fine,t;', 'line 4: movel inside IF is not followed; unroll it'),
-        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in this module'),
-        ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in this module'),
+        ('FOR i FROM 1 TO n DO\nMoveL p,v1,fine,t;\nENDFOR',
+         'line 4: movel in line 5 is inside FOR and depends on n is not declared'),
+        ('WHILE TRUE DO\nPaintL p,v1,fine,t;\nENDWHILE', 'line 4: WHILE never ends; name the'),
+        ('WHILE reg1<1 DO\nreg2:=reg2+1;\nENDWHILE', 'line 4: WHILE never ends; name the'),
+        ('FOR i FROM 1 TO 1E9 DO\nStop;\nENDFOR', 'line 4: FOR takes 10000 turns or more'),
+        ('IF TestDI(di)\nMoveL p,v1,fine,t;', 'line 4: movel in line 5 is inside IF and depends'),
+        ('TEST GInput(gi)\nCASE 1:\nSetBrush 2;\nENDTEST', 'setbrush in line 6 is inside TEST'),
+        ('TPReadNum reg1,"Style";\nWHILE reg1>0 DO\nRETURN;\nENDWHILE', 'what tpreadnum reads in'),
+        ('MoveL pElse,v100,fine,tBell;', 'line 4: pelse is not declared in the modules given'),
+        ('MoveL row{2},v100,fine,tBell;', 'line 4: row is not declared in the modules given'),
+        (f'MoveLSync {target(1)},v100,fine,tBell,"rGun";', 'line 4: movelsync is not understood'),
+        ('SearchL di,p,p,v100,tBell;', 'line 4: searchl is not understood, and may move the'),
+        ('IF TestDI(di) Incr reg1;\nSetBrush reg1;', 'line 5: reg1, which depends on testdi()'),
+        (f'TriggL {target(1)},v1,on,z1,tBell;', 'line 4: on is not declared in the modules given'),
+        ('GOTO again;', 'line 4: goto is not understood'),
+        ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
+        ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
+        ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and joint'),
+        (f'PaintL {target(1)},v100,bdMain,z10,tBell;', 'line 4: paintl takes bdmain beside'),
+        ('UseBrushTab a;\nUseBrushTab b;', 'line 5: the brush table b after a: a number would'),
+        ('SetBrush 1\\T:=3;', 'line 4: setbrush with t: give one of X, Y and Z'),
+        (f'MoveExtJ [[0],[0]],v100,fine;MoveL {target(1)},v100,fine,tBell;',
+         'line 4: an external axis moves, and the work objects stand still'),
         ('p.trans.z:=7;', 'line 4: p has no such part to assign to'),
         (f'MoveL {target(1)},v100;', 'movel needs a target, a speed, a zone and a tool'),
-        (f'MoveL {target(1)},v100,fine,tBell', "line 5: ';' expected, found 'ENDPROC'"),
+        (f'MoveL {target(1)},v100,fine,tBell',
+         "line 5: 'endproc' is not expected here; is a ';' missing before it?"),
         ('main;', 'procedure main calls itself'),
         ('MoveL #;', "line 4: '#' is not RAPID"),
         ('', 'has no moves of the TCP; nothing to read'),
@@ -178,6 +206,36 @@ def test_what_cannot_be_followed_is_named(read, body, says):
     assert says in refusal(read, body)
 
 
+def test_loops_in_loops_end(read, monkeypatch):
+    monkeypatch.setattr(interpreter, 'MOST_STATEMENTS', 1000)
+    loops = 'FOR i FROM 1 TO 99 DO\nFOR j FROM 1 TO 99 DO\nreg1:=j;\nENDFOR\nENDFOR'
+    assert 'line 6: 1000 statements have run; check the loops' in refusal(read, loops)
+
+
+def test_joint_angles_give_the_tip_of_the_robot(read, tmp_path):
+    """The arm at rest, turned by a quarter about its upright axis; the gun may be open."""
+    (tmp_path / 'arm.urdf').write_text(urdf())
+    body = 'Set doGun;\nMoveAbsJ [[90,0,0,0,0,0],[9E9,0,0,0,0,0]],v100,fine,tBell;'
+    (move,) = read(body, robot=Robot.read(tmp_path / 'arm.urdf')).moves
+    x, y, z = TIP_M
+    np.testing.assert_allclose(move.position_m, [-y, x, z], atol=1e-12)
+    assert move.spraying
+
+
+@pytest.mark.parametrize(
+    ('how', 'refused', 'noted'),
+    [
+        ('tBell\\WObj:=wElse', 'it sprays in frames whose relation is not known', 'are left out'),
+        ('tOther', 'it sprays with', 'are taken as those'),
+    ],
+)
+def test_paint_in_two_frames_or_with_two_tools_is_refused(read, how, refused, noted):
+    way = f'MoveL {target(1)},v100,fine,{how};'
+    body = f'{{}}\n{way}\nSet doGun;\nMoveL {target(2)},v100,fine,tBell;'
+    assert any(noted in note for note in read(body.format('')).notes)
+    assert refused in refusal(read, body.format('Set doGun;'))
+
+
 def test_tools_and_parts_in_unusual_hands_are_refused(read):
     nowhere = '[[0,0,0],[1,0,0,0]]'
     still = f'PERS tooldata tGun:=[FALSE,{nowhere},[1,[0,0,1],[1,0,0,0],0,0,0]];'
@@ -186,23 +244,30 @@ def test_tools_and_parts_in_unusual_hands_are_refused(read):
     assert 'holds the work object w' in refusal(read, AT_W, held)
 
 
-def test_what_is_written_is_read_back(tmp_path):
+@pytest.mark.parametrize('paint_moves', [False, True])
+def test_what_is_written_is_read_back(tmp_path, paint_moves):
     rng, path = np.random.default_rng(4), tmp_path / 'passes.mod'
     moves = [
-        Move(rng.uniform(-3.0, 3.0, 3), turn, rng.uniform(0.01, 5.0), bool(k and rng.integers(2)))
+        Move(rng.uniform(-3.0, 3.0, 3), turn, rng.uniform(0.01, 5.0), bool(k and rng.integers(2)),
+             brush=int(rng.integers(1, 3)))
         for k, turn in enumerate(Rotation.random(60, random_state=5).as_quat())
-    ]
-    path.write_text(module_text(moves))
-    assert path.read_text().endswith('    SetDO doGun,0;\n  ENDPROC\nENDMODULE\n')
-    read = read_program(path).moves
-    assert [move.spraying for move in read] == [move.spraying for move in moves]
-    for planned, again in zip(moves, read, strict=True):
+    ]  # fmt: skip
+    path.write_text(module_text(moves, paint_moves=paint_moves))
+    end = 'SetBrush 0' if paint_moves else 'SetDO doGun,0'
+    assert path.read_text().endswith(f'    {end};\n  ENDPROC\nENDMODULE\n')
+    assert ('PaintL' in path.read_text()) == paint_moves
+    read = read_program(path)
+    gun = [(move.spraying, move.spraying * move.brush) for move in moves]
+    assert [(move.spraying, move.spraying * move.brush) for move in read.moves] == gun
+    for planned, again in zip(moves, read.moves, strict=True):
         # The module has three decimals.
         np.testing.assert_allclose(again.position_m, planned.position_m, rtol=0, atol=0.6e-6)
         turns = Rotation.from_quat([again.quaternion_xyzw, planned.quaternion_xyzw])
         assert (turns[0].inv() * turns[1]).magnitude() < 1e-6
         assert again.speed_m_per_s == pytest.approx(planned.speed_m_per_s, abs=1e-6)
         assert again.switches == ()
+    with pytest.raises(PlanError, match='flows of single passes need brushes of their own'):
+        module_text([replace(move, flow=0.8) for move in moves], paint_moves=True)
 
 
 @pytest.mark.parametrize('speed_m_per_s', [0.0, 10.0])
@@ -227,7 +292,7 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
         (f'MoveL {target(0)},v100,z1,tool0;MoveL {target(9)},v100\\T:=0,z1,tool0;', '',
          'line 4: a duration of 0 s; give one above 0'),
         (f'MoveL Offs({target(0)},0,0,[1]),v100,z10,tool0;', '',
-         'a displacement of offs is [1.0]; a number'),
+         '[0.0, 0.0, [1.0]] is no displacement; give three numbers'),
     ],
 )  # fmt: skip
 def test_values_of_the_wrong_shape_are_refused_in_a_line(read, body, data, message):

@@ -1,4 +1,4 @@
-"""A paint cell: simulator and index planner; optionally bag player, recorder and comparison.
+"""A paint cell: simulator and index planner; optionally player, recorder, comparison and page.
 
 ros2 launch paint_deposition paint_cell.launch.py
 ros2 launch paint_deposition paint_cell.launch.py bag:=run_1 record:=runs
@@ -59,6 +59,7 @@ ARGUMENTS = (
     ('publish_clock', 'true', 'Publish the time of the bag on /clock, which all cells share'),
     ('record', '', 'Folder to record the run in; empty: no recording [path]'),
     ('measurements', '', 'Gauge readings to compare with, CSV; empty: no comparison [path]'),
+    ('page', 'false', 'Show the film on a page for browsers'),
     # A node that is still loading when the replay starts would miss its first poses.
     (
         'wait_for_subscribers',
@@ -109,6 +110,7 @@ def node_parameters(given):
         raise ValueError('trigger and bag are given: state_topic names the trigger in a bag')
     mesh, model_file = {'mesh_file': given['mesh']}, {'model_file': given['model']}
     model = model_file | {'allow_user_effects': switched(given, 'allow_user_effects')}
+    page = switched(given, 'page')
     replay = {
         'bag': given['bag'],
         'pose_topic': given['pose_topic'],
@@ -117,7 +119,7 @@ def node_parameters(given):
         'publish_clock': switched(given, 'publish_clock'),
         'wait_for_subscribers': number(given, 'wait_for_subscribers', int)
         if given['wait_for_subscribers']
-        else 1 + bool(given['record']) + bool(given['measurements']),
+        else 1 + sum((bool(given['record']), bool(given['measurements']), page)),
     }
     nodes = {'deposition_simulator': mesh | model, 'index_planner': mesh | model}
     if given['urdf']:
@@ -140,6 +142,8 @@ def node_parameters(given):
         nodes['run_recorder'] = mesh | model_file | {'output_directory': given['record']}
     if given['measurements']:
         nodes['model_comparison'] = mesh | model | {'measurements_file': given['measurements']}
+    if page:
+        nodes['web_view'] = mesh
     return nodes
 
 

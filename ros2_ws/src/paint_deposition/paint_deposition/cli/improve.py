@@ -30,6 +30,7 @@ from paint_deposition.planning.requests import ImproveRequest
 @options_of(ImproveRequest)
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
+@options.PAINT_MOVES
 @options.JOINT_ACCELERATION
 @options.results_options(
     'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
@@ -40,6 +41,7 @@ def improve_command(
     trajectory: Path,
     model_file: Path | None,
     rivals: tuple[Path, ...],
+    paint_moves: bool,
     seed: int,
     motion: dict[str, Any],
     joint_acceleration: float | None,
@@ -79,7 +81,10 @@ def improve_command(
             'part_pose': motion.get('part_pose'),
         }
         show('writing and drawing')
-        results.write(result, made_from=made_from, part_pose=motion.get('part_pose'))
+        results.write(
+            result, made_from=made_from, part_pose=motion.get('part_pose'),
+            paint_moves=paint_moves,
+        )  # fmt: skip
     options.print_all('note', [*result.surface.notes, *recorded.notes])
     options.print_all('warning', result.warnings)
     results.print(_lines(result), model=chosen.words)

@@ -32,6 +32,7 @@ COMMANDS = {
     'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
+    'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
     'doctor': ('doctor', 'Say what is installed, and test it.'),

@@ -119,6 +119,10 @@ PART_POSE = click.option(
     '--part-pose', nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose,
     help='Where the part stands in the frame of the poses [m, unit quaternion].',
 )  # fmt: skip
+PAINT_MOVES = click.option(
+    '--paint-moves', is_flag=True,
+    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
+)  # fmt: skip
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
     click.option('--pose-topic',
@@ -134,6 +138,7 @@ MOTION = (
         '--gun-signal',
         help='Digital output that opens the gun, for a RAPID module that sets several.',
     ),
+    click.option('--procedure', help='Where a RAPID program starts; default: main.'),
     click.option(
         '--tf', nargs=2, metavar='TARGET SOURCE',
         callback=lambda ctx, param, given: None if given is None else list(given),
@@ -141,7 +146,7 @@ MOTION = (
     ),
     click.option(
         '--urdf', type=click.Path(),
-        help='Take the poses from this robot and its joints in a bag or a table.',
+        help='Take the poses from this robot and its joints in a bag, a table or RAPID.',
     ),
     click.option('--tip', '--tip-link', 'tip_link',
                  help='Link of the URDF that is the TCP; default: tool0, else its last link.'),

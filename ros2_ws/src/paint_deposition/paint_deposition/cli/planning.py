@@ -70,6 +70,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     help='Largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
+@options.PAINT_MOVES
 @options.results_options('the bag, passes.csv, passes.mod, plan.json and the film')
 def plan_command(
     request: PlanRequest,
@@ -82,6 +83,7 @@ def plan_command(
     frame_id: str | None,
     faces: str,
     face_angle_deg: float,
+    paint_moves: bool,
     results: options.Results,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
@@ -114,7 +116,10 @@ def plan_command(
             'part_pose': part_pose,
             'warnings': warnings,
         }
-        results.write(result, made_from=made_from, part_pose=part_pose, frame_id=frame_id)
+        results.write(
+            result, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
+            paint_moves=paint_moves,
+        )  # fmt: skip
     options.print_all('note', surface.notes)
     options.print_all('warning', warnings)
     results.print(_plan_lines(result), model=chosen.words)

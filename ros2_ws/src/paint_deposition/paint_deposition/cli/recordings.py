@@ -10,7 +10,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.inspected import box_words, mesh_in, readings_in
+from paint_deposition.cli.inspected import mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.json_files import json_text
@@ -48,10 +48,10 @@ def inspect_command(
 ) -> None:
     """Show what RECORDING holds, or how the gun ran over a part.
 
-    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID module (.mod, .prg):
-    targets, moves, speeds, where the gun is switched, and what could not be followed. Of a table
-    of poses (.csv, .tsv, .txt): what was understood. Of gauge readings: also their zeros and
-    repeats. Of a mesh: its size, unit and bodies.
+    Of a bag: topics, streams of poses and their gaps, triggers. Of a RAPID program (.mod, .prg,
+    .sys, .pgf or a folder of modules): moves, speeds, where the gun is switched, and what was left
+    out. Of a table of poses (.csv, .tsv, .txt): what was understood. Of gauge readings: also their
+    zeros and repeats. Of a mesh: its size, unit and bodies.
 
     With --mesh: passes, speed, distance and angle of the gun, the share of its paint over the
     part, and warnings of what is odd, each with its likely cause.
@@ -94,10 +94,11 @@ def _contents(
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
     source.require_kind(path, kind)
-    if any(value for name, value in motion.items() if name != 'gun_signal'):
+    of_program = {name: motion.pop(name) for name in ('gun_signal', 'procedure')}
+    if any(motion.values()):
         raise click.UsageError(f'how the motion of {kind} is read needs --mesh')
     if is_rapid(path):
-        program = read_program(path, gun_signal=source.gun_signal)
+        program = read_program(path, **of_program)
         return asdict(program), program_as_text(program)
     summary = summarise(path, max_pose_gap_s)
     streams = [source.to_dict() for source in summary.pose_streams]
@@ -118,11 +119,8 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
         'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
         **vars(quality),
     }  # fmt: skip
-    sides = ', '.join(
-        f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in zip('xyz', low, high, strict=True)
-    )
     frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {sides} m'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {box_words(low, high)}'
     return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 

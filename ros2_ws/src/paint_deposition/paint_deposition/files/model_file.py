@@ -113,6 +113,20 @@ def write_model(
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 
+def model_of(values: Mapping[str, Any]) -> DepositionModel:
+    """The model that the ``provenance`` of a result describes; its brushes are a list there.
+
+    Raises:
+        ModelError: it has an effect of a user's own, whose file is not named there.
+    """
+    about = {'number', 'interpolated'}
+    brushes = {
+        brush['number']: {key: value for key, value in brush.items() if key not in about}
+        for brush in values.get('brushes', ())
+    }
+    return _model_file({**values, 'brushes': brushes or None}, load_effect_file).model
+
+
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
     sections = checked(_Sections, 'model', content, ModelError)
     projection = checked(ProjectionSection, 'projection', sections.projection or {}, ModelError)

@@ -63,7 +63,9 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        recorded = program_trajectory(read_program(path, gun_signal=source.gun_signal))
+        robot = _robot(path, source)
+        program = read_program(path, source.gun_signal, source.procedure, robot)
+        recorded = program_trajectory(program)
     elif is_tool_path(path):
         source.require_kind(path, 'a tool path')
         recorded = read_tool_path(path)
@@ -79,9 +81,11 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
 
 
 def holds_joints(path: Path) -> bool:
-    """Whether the motion in a file is that of joints, for which the robot has to be known."""
-    if is_rapid(path) or is_tool_path(path) or is_pose_table(path):
+    """Whether the motion in a file may be that of joints, for which the robot has to be known."""
+    if is_tool_path(path) or is_pose_table(path):
         return False
+    if is_rapid(path):
+        return True
     with open_bag(path) as bag:
         return bool(bag.topics_of(JOINT_TYPE))
 

@@ -45,6 +45,7 @@ class MotionSource(BaseModel, extra='forbid'):
     pose_topic: Text | None = Field(None, description='the name of a topic of the recording')
     state_topic: Text | None = Field(None, description='the name of a topic of the recording')
     gun_signal: Text | None = Field(None, description='the name of a digital output')
+    procedure: Text | None = Field(None, description='the name of a procedure')
     tf: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = Field(
         None, description='[target, source], the frame of the poses and the frame of the TCP'
     )
@@ -82,7 +83,8 @@ PLURAL = {
 }  # fmt: skip
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
-    'pose_topic': 'bags', 'tf': 'bags', 'gun_signal': 'RAPID modules', 'rotation': 'tables',
-    **dict.fromkeys(('state_topic', 'urdf', 'tip_link', 'base_link'), 'bags and tables'),
+    'pose_topic': 'bags', 'tf': 'bags', 'state_topic': 'bags and tables', 'rotation': 'tables',
+    **dict.fromkeys(('gun_signal', 'procedure'), 'RAPID modules'),
+    **dict.fromkeys(('urdf', 'tip_link', 'base_link'), 'bags, tables and RAPID modules'),
     **dict.fromkeys(('joint_prefix', 'pose_unit', 'angle_unit'), 'bags and tables'),
 }  # fmt: skip

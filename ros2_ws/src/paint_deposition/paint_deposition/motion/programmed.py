@@ -27,6 +27,7 @@ class GunSwitch:
     distance_m: float
     from_start: bool
     on: bool
+    brush: int | None = None  # the one that it changes to, None: as before
 
     def __str__(self) -> str:
         place = 'after its start' if self.from_start else 'before its end'
@@ -47,6 +48,7 @@ class Move:
     line: int = 0  # where it stands in its file, 0 for none
     flow: float = 1.0  # of the gun while it is on, relative to the calibrated one
     brush: int = ONLY_BRUSH  # its number while it is on; 0 is the only one
+    wait_s: float = 0.0  # how long it takes at least
 
 
 def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
@@ -66,15 +68,17 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
         length_m, place_at = _track(before.position_m, move)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
-        duration_s = max(length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S)
+        duration_s = max(
+            length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S, move.wait_s
+        )
         if duration_s > LONGEST_MOVE_S:
             raise RecordingError(
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'
             )
         changes += [
-            (times_s[-1] + at * duration_s, on * move.flow, move.brush)
-            for at, on in [(0.0, move.spraying), *_switches(move, length_m)]
+            (times_s[-1] + at * duration_s, on * move.flow, brush)
+            for at, on, brush in [(0.0, move.spraying, move.brush), *_switches(move, length_m)]
         ]
         count = math.ceil(duration_s / POSE_PERIOD_S)
         share = np.arange(1, count + 1) / max(count, 1)
@@ -93,12 +97,15 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
     )  # fmt: skip
 
 
-def _switches(move: Move, length_m: float) -> list[tuple[float, bool]]:
-    """Share of the move at which the gun is switched, and whether on, in order."""
+def _switches(move: Move, length_m: float) -> list[tuple[float, bool, int]]:
+    """Share of the move at which the gun is switched, whether on, and its brush, in order."""
     at_m = [s.distance_m if s.from_start else length_m - s.distance_m for s in move.switches]
     shares = [min(max(at / length_m, 0.0), 1.0) if length_m > 0.0 else 0.0 for at in at_m]
-    pairs = zip(shares, (switch.on for switch in move.switches), strict=True)
-    return sorted(pairs, key=lambda pair: pair[0])
+    found = [
+        (share, switch.on, move.brush if switch.brush is None else switch.brush)
+        for share, switch in zip(shares, move.switches, strict=True)
+    ]
+    return sorted(found, key=lambda one: one[0])
 
 
 def _track(begin_m: np.ndarray, move: Move) -> tuple[float, Callable]:

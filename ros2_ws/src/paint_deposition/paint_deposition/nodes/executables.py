@@ -46,3 +46,4 @@ model_comparison = partial(_run, 'model_comparison', 'comparison', 'ModelCompari
 opcua_source = partial(_run, 'opcua_source', 'robot', 'OpcuaSource')
 run_recorder = partial(_run, 'run_recorder', 'recording', 'RunRecorder')
 rws_source = partial(_run, 'rws_source', 'robot', 'RwsSource')
+web_view = partial(_run, 'web_view', 'viewing', 'WebView')

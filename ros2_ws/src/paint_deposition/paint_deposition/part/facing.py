@@ -45,6 +45,16 @@ def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
     return toward_the_guns(surface, [(positions_m, z_axes)])
 
 
+def turned(surface: Surface) -> Surface:
+    """The part with its other side outward."""
+    return replace(
+        surface,
+        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
+        normals=-surface.normals,
+        curved_edges=surface.curved_edges.turned(),
+    )
+
+
 def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
     """The part with the side outward that these poses look at."""
     if seen.back > seen.front:
@@ -52,13 +62,7 @@ def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
             f'{seen.back} of {seen.back + seen.front} poses look at the back of the mesh: its '
             'triangles were turned round'
         )
-        surface = replace(
-            surface,
-            faces=np.ascontiguousarray(surface.faces[:, ::-1]),
-            normals=-surface.normals,
-            curved_edges=surface.curved_edges.turned(),
-            notes=(*surface.notes, note),
-        )
+        surface = replace(turned(surface), notes=(*surface.notes, note))
     if is_one_sided(surface.normals, surface.vertex_areas_m2):
         return surface
     gun_side = -axes.mean(axis=0)

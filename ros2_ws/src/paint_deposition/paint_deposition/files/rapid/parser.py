@@ -1,284 +1,170 @@
-"""ABB RAPID modules as data: declarations, and procedures as lists of instructions.
+"""ABB RAPID modules as data: declarations, and routines as trees of statements.
 
-RAPID ignores case: names are converted to lower case. Blocks (IF, FOR, WHILE, TEST) are not
-evaluated; an instruction inside one names it, so that the interpreter can refuse it.
+RAPID ignores case: all is converted to lower case.
 """
 
-import re
-from collections.abc import Iterator
-from dataclasses import dataclass, field
-from typing import NamedTuple, NoReturn
+import json
+from functools import cache
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
 from paint_deposition.errors import RecordingError
 
-# Backups begin with a block of controller information between %%%.
-TOKEN = re.compile(
-    r"""
-    (?P<space>\A\s*%%%(?s:.*?)%%%|\s+|!.*|%%%)
-  | (?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)
-  | (?P<string>"(?:[^"\n]|"")*")
-  | (?P<name>[A-Za-z_]\w*)
-  | (?P<symbol>:=|<=|>=|<>|[][(){},;:\\+\-*/=<>.?])
-  | (?P<unknown>.)
-    """,
-    re.VERBOSE,
-)
-# Precedence of the operators.
-PRECEDENCE = {
-    '=': 0, '<': 0, '>': 0, '<=': 0, '>=': 0, '<>': 0, 'and': 0, 'or': 0, 'xor': 0, 'div': 0,
-    'mod': 0, '+': 1, '-': 1, '*': 2, '/': 2,
-}  # fmt: skip
+GRAMMAR = Path(__file__).with_name('rapid.lark')
 
 
-class Token(NamedTuple):
-    kind: str
-    text: str
+class Node(NamedTuple):
+    """A statement or an expression: the name of its rule in the grammar, and its parts."""
+
+    rule: str
+    children: list[Any]
+
+
+class Instruction(NamedTuple):
+    """An instruction or a procedure call; an option without a value is True."""
+
+    name: str
     line: int
-
-    @property
-    def word(self) -> str:
-        """The text in lower case, for comparisons; strings keep their quotes."""
-        return self.text.lower()
-
-
-class Reference(NamedTuple):
-    """A reference to a datum by name, with indexes and components."""
-
-    name: str
-    indexes: tuple = ()
-    components: tuple = ()
-
-
-class Call(NamedTuple):
-    """A call of a function or operator: `offs`, '+', '-', '*', '/'."""
-
-    function: str
-    arguments: list
-    options: dict
-
-
-def tokenize(text: str, source: str) -> Iterator[Token]:
-    line = 1
-    for match in TOKEN.finditer(text):
-        if match.lastgroup == 'unknown':
-            raise RecordingError(f'{source} line {line}: {match[0]!r} is not RAPID')
-        if match.lastgroup != 'space':
-            yield Token(str(match.lastgroup), match[0], line)
-        line += match[0].count('\n')
-    yield Token('end', '', line)
-
-
-STORAGE = ('const', 'pers', 'var')
-BLOCK_END = {'if': 'endif', 'for': 'endfor', 'while': 'endwhile', 'test': 'endtest'}
-HEADER_END = {
-    'else': 'else', 'elseif': 'then', 'case': ':', 'default': ':', 'for': 'do', 'while': 'do',
-}  # fmt: skip
-SKIPPED_UNTIL = {'func': 'endfunc', 'trap': 'endtrap', 'record': 'endrecord', 'alias': ';'}
-HANDLERS = ('error', 'undo', 'backward')
-
-
-@dataclass(frozen=True)
-class Instruction:
-    """`name value, ...;` with options, or an assignment `:=` of the second value to the first."""
-
-    name: str
     values: list
-    options: dict
-    line: int
-    block: str = ''
+    options: dict[str, Any]
 
 
-@dataclass(frozen=True)
-class Declaration:
-    """The type, value (None without one) and line of a declared datum."""
-
-    type: str
-    value: object
-    line: int
-
-
-@dataclass
-class Module:
-    """The declarations of a module, local ones included, and its procedures."""
+class Declared(NamedTuple):
+    """A declared datum: type, sizes of an array and value, None without."""
 
     name: str
-    data: dict[str, Declaration] = field(default_factory=dict)
-    procedures: dict[str, list[Instruction]] = field(default_factory=dict)
+    type: str
+    sizes: list | None
+    value: Any
 
 
-class ModuleParser:
-    """A recursive-descent parser of a module; errors name the line."""
+class Parameter(NamedTuple):
+    """A parameter of a routine; what is assigned to a `shared` one reaches the caller."""
 
-    def __init__(self, text: str, source: str) -> None:
-        self._tokens = list(tokenize(text, source))
-        self._index = 0
-        self._source = source
+    name: str
+    type: str
+    optional: bool
+    shared: bool
 
-    @property
-    def _current(self) -> Token:
-        return self._tokens[self._index]
 
-    def _advance(self) -> Token:
-        token = self._current
-        self._index += token.kind != 'end'
-        return token
+class Routine(NamedTuple):
+    """A procedure, function or trap."""
 
-    def _accept(self, *words: str) -> bool:
-        taken = self._current.word in words
-        if taken:
-            self._advance()
-        return taken
+    name: str
+    parameters: list[Parameter]
+    body: Node
+    source: str
 
-    def _expect(self, word: str) -> None:
-        if not self._accept(word):
-            self._fail(f'{word!r} expected, found {self._current.text or "the end"!r}')
 
-    def _expect_name(self, what: str = 'a name') -> str:
-        if self._current.kind != 'name':
-            self._fail(f'{what} expected, found {self._current.text or "the end"!r}')
-        return self._advance().word
+class Module(NamedTuple):
+    """What a module declares: for all modules, and for itself alone."""
 
-    def _skip_past(self, word: str) -> None:
-        while not self._accept(word):
-            if self._advance().kind == 'end':
-                self._fail(f'{word} expected before the end')
+    name: str
+    source: str
+    shared: list[Declared | Routine]
+    local: list[Declared | Routine]
 
-    def _fail(self, reason: str) -> NoReturn:
-        raise RecordingError(f'{self._source} line {self._current.line}: {reason}')
 
-    # --- values
+@v_args(inline=True)
+class _Builder(Transformer):
+    """Constants, instructions and declarations as they are; all else as nodes."""
 
-    def _parse_expression(self, min_precedence: int = 0) -> object:
-        value = self._parse_operand()
-        while PRECEDENCE.get(self._current.word, -1) >= min_precedence:
-            operator = self._advance().word
-            value = Call(operator, [value, self._parse_expression(PRECEDENCE[operator] + 1)], {})
-        return value
+    number = float
 
-    def _parse_operand(self) -> object:
-        if self._accept('-'):
-            value = self._parse_operand()
-            return -value if isinstance(value, float) else Call('-', [0.0, value], {})
-        if self._accept('+'):
-            return self._parse_operand()
-        if self._accept('not'):
-            return Call('not', [self._parse_operand()], {})
-        if self._accept('['):
-            return self._parse_arguments(']')[0]
-        if self._accept('('):
-            value = self._parse_expression()
-            self._expect(')')
-            return value
-        if self._current.kind == 'number':
-            return float(self._advance().text)
-        if self._current.kind == 'string':
-            return self._advance().text[1:-1].replace('""', '"')
-        name = self._expect_name('a value')
-        if name in ('true', 'false'):
-            return name == 'true'
-        if self._accept('('):
-            return Call(name, *self._parse_arguments(')'))
-        return self._parse_reference(name)
+    def numbers(self, text: str) -> list:
+        return json.loads(text, parse_int=float)
 
-    def _parse_arguments(self, end: str) -> tuple[list, dict]:
-        """Values and options up to and including `end`; an option without a value is True."""
-        values: list = []
-        options: dict = {}
-        if self._accept(end):
-            return values, options
-        while True:
-            # Options follow their argument, or precede the first one.
-            if self._current.text != '\\':
-                values.append(self._parse_expression())
-            while end in (')', ';') and self._accept('\\'):
-                name = self._expect_name()
-                options[name] = self._parse_expression() if self._accept(':=') else True
-            if not self._accept(','):
-                self._expect(end)
-                return values, options
+    def string(self, text: str) -> str:
+        return text[1:-1].replace('""', '"')
 
-    def _parse_reference(self, name: str) -> Reference:
-        indexes = self._parse_arguments('}')[0] if self._accept('{') else []
-        components = []
-        while self._accept('.'):
-            components.append(self._expect_name())
-        return Reference(name, tuple(indexes), tuple(components))
+    def true(self) -> bool:
+        return True
 
-    # --- declarations and procedures
+    def false(self) -> bool:
+        return False
 
-    def module(self) -> Module:
-        """Parse the module."""
-        self._expect('module')
-        module = Module(self._expect_name())
-        if self._accept('('):
-            self._skip_past(')')
-        while not self._accept('endmodule'):
-            word = self._current.word
-            if self._accept(*STORAGE):
-                self._parse_declaration(module.data)
-            elif self._accept('proc'):
-                self._parse_procedure(module)
-            elif word in SKIPPED_UNTIL:
-                self._skip_past(SKIPPED_UNTIL[word])
-            elif not self._accept('local', 'task'):
-                self._fail(f'{self._current.text or "the end"!r} is no declaration')
-        return module
+    def items(self, *items: Any) -> list:
+        return [*items]
 
-    def _parse_declaration(self, data: dict[str, Declaration]) -> None:
-        line, kind = self._current.line, self._expect_name()
-        while True:
-            name = self._expect_name()
-            if self._accept('{'):
-                self._skip_past('}')
-            value = self._parse_expression() if self._accept(':=') else None
-            data[name] = Declaration(kind, value, line)
-            if not self._accept(','):
-                break
-        self._expect(';')
+    def sign(self, sign: str, value: Any) -> Any:
+        if isinstance(value, float):
+            return -value if sign == '-' else value
+        return Node('operation', [0.0, sign, value])
 
-    def _parse_procedure(self, module: Module) -> None:
-        name = self._expect_name()
-        self._expect('(')
-        self._skip_past(')')
-        body: list[Instruction] = []
-        module.procedures[name] = body
-        blocks: list[str] = []
-        while not self._accept('endproc'):
-            if self._accept(*STORAGE):
-                self._parse_declaration(module.data)
-            elif self._current.word in HANDLERS and not blocks:
-                self._skip_past('endproc')
-                break
-            else:
-                self._parse_statement(blocks, body)
+    def aggregate(self, items: list) -> Any:
+        return Node('aggregate', [items]) if any(isinstance(i, Node) for i in items) else items
 
-    # --- statements
+    def option(self, name: str, value: Any) -> dict[str, Any]:
+        return {str(name): True if value is None else value}
 
-    def _parse_statement(self, blocks: list[str], body: list[Instruction]) -> None:
-        word = self._current.word
-        if blocks and self._accept(BLOCK_END[blocks[-1]]):
-            blocks.pop()
-            self._accept(';')
-        elif word in HEADER_END:
-            if word in BLOCK_END:
-                blocks.append(word)
-            self._skip_past(HEADER_END[word])
-        elif self._accept('if', 'test'):
-            self._parse_expression()
-            if word == 'if' and not self._accept('then'):
-                body.append(self._parse_instruction('if'))  # the compact form
-            else:
-                blocks.append(word)
-        elif self._current.kind == 'name' and self._tokens[self._index + 1].text == ':':
-            self._index += 2  # a label
+    def argument(self, *parts: Any) -> list:
+        return [*parts]
+
+    def arguments(self, *arguments: list | None) -> tuple[list, dict]:
+        parts = [part for argument in arguments for part in argument or ()]
+        options = {k: v for part in parts if isinstance(part, dict) for k, v in part.items()}
+        return [part for part in parts if not isinstance(part, dict)], options
+
+    def instruction(self, name: Token, arguments: tuple[list, dict]) -> Instruction:
+        return Instruction(str(name), name.line, *arguments)
+
+    def datum(self, name: str, sizes: list | None, value: Any) -> Declared:
+        return Declared(str(name), '', sizes, value)
+
+    def declaration(self, kind: str, *data: Declared) -> Node:
+        return Node('declaration', [datum._replace(type=str(kind)) for datum in data])
+
+    def parameter(self, optional: str | None, mode: str | None, kind: str, name: str) -> Parameter:
+        return Parameter(str(name), str(kind), optional is not None, mode is not None)
+
+    def parameters(self, *parameters: Parameter | None) -> list:
+        return [parameter for parameter in parameters if parameter]
+
+    def routine(self, *parts: Any) -> Routine:
+        names = [str(part) for part in parts if isinstance(part, str)]
+        parameters = next((part for part in parts if isinstance(part, list)), [])
+        body = next(part for part in parts if isinstance(part, Node) and part.rule == 'block')
+        return Routine(names[-1], parameters, body, '')
+
+
+@cache
+def _grammar() -> Lark:
+    text = GRAMMAR.read_text(encoding='utf-8')
+    options: dict[str, Any] = {'parser': 'lalr', 'maybe_placeholders': True, 'tree_class': Node}
+    return Lark(text, transformer=_Builder(), **options)
+
+
+def parse_modules(text: str, source: str) -> list[Module]:
+    """The modules in a text.
+
+    Raises:
+        RecordingError: it is not RAPID, in one line with source, line and what is wrong there.
+    """
+    try:
+        (*modules,) = cast(Node, _grammar().parse(text.lower())).children
+    except UnexpectedInput as error:
+        token = getattr(error, 'token', None)
+        if token is None:
+            reason = f'{text.lower()[error.pos_in_stream]!r} is not RAPID'
         else:
-            body.append(self._parse_instruction(blocks[-1] if blocks else ''))
+            reason = f'{str(token) or "the end"!r} is not expected here'
+            reason += (
+                "; is a ';' missing before it?"
+                if 'SEMICOLON' in getattr(error, 'expected', ())
+                else ''
+            )
+        raise RecordingError(f'{source} line {error.line}: {reason}') from None
+    return [_module(module, source) for module in modules]
 
-    def _parse_instruction(self, block: str) -> Instruction:
-        line = self._current.line
-        target = self._parse_reference(self._expect_name())
-        if self._accept(':='):
-            value = self._parse_expression()
-            self._expect(';')
-            return Instruction(':=', [target, value], {}, line, block)
-        return Instruction(target.name, *self._parse_arguments(';'), line, block)
+
+def _module(node: Node, source: str) -> Module:
+    name, *scopes = node.children
+    found: dict[str, list] = {'global': [], 'local': []}
+    for scope, (item, *_) in scopes:
+        if isinstance(item, Routine):
+            found[scope].append(item._replace(source=source))
+        elif isinstance(item, Node) and item.rule == 'declaration':
+            found[scope] += item.children
+    return Module(str(name), source, found['global'], found['local'])

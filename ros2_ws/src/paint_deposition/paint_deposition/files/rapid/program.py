@@ -1,42 +1,99 @@
 """ABB RAPID programs: read as moves of the TCP, as a trajectory, and as text."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.rapid.interpreter import Interpreter, RapidProgram
-from paint_deposition.files.rapid.parser import ModuleParser
+from paint_deposition.files.rapid.moves import RapidProgram, with_one_frame, with_one_tool
+from paint_deposition.files.rapid.painting import Painting
+from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
 from paint_deposition.motion.programmed import PROGRAMMED, timed
 from paint_deposition.motion.trajectory import Trajectory
 
-SUFFIXES = ('.mod', '.prg')
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+
+MODULES = ('.mod', '.prg', '.sys')
+LIST_OF_MODULES = '.pgf'
 
 
-def read_program(path: Path | str, gun_signal: str | None = None) -> RapidProgram:
-    """Read the moves of a RAPID module (.mod, .prg).
+def read_program(
+    path: Path | str,
+    gun_signal: str | None = None,
+    procedure: str | None = None,
+    robot: 'Robot | None' = None,
+) -> RapidProgram:
+    """Run a RAPID program, and read its moves.
 
-    The program starts in `main`, or in the only procedure; procedure calls must have no
-    arguments. ``gun_signal`` is the digital output that opens the gun; None: the only one set.
+    Args:
+        path: a module (.mod, .prg, .sys), a folder of the modules of a program, or the list that
+            the controller writes of them (.pgf).
+        gun_signal: the digital output that opens the gun; None: the only one set, or SetBrush
+            where there are paint moves.
+        procedure: where it starts; None: `main`, or the only procedure.
+        robot: gives the TCP for joint angles; without it such moves are left out, and refused
+            with the gun open.
 
     Raises:
-        RecordingError: a syntax error, a move inside a loop or condition, a value from outside the
-            module, a quaternion more than 1 % off; with file, line and remedy.
+        RecordingError: what is no RAPID, what depends on values that only the robot knows, and
+            every instruction that may act and is not understood; with file, line and remedy.
     """
     path = Path(path)
     try:
-        text = path.read_text(encoding='utf-8', errors='replace')
-    except OSError as error:
-        raise RecordingError(f'cannot read {path}: {error.strerror}') from None
-    try:
-        module = ModuleParser(text, str(path)).module()
-        return Interpreter(module, str(path), gun_signal).run()
+        modules = [m for file in _files(path) for m in parse_modules(_text(file), str(file))]
+        start = _start(modules, procedure, path)
+        painting = Painting(modules, start, gun_signal, robot)
+        painting.run(start)
+        program = painting.program
+        if not program.moves:
+            raise RecordingError(f'{path} has no moves of the TCP; nothing to read')
+        with_one_frame(program, str(path))
+        with_one_tool(program, painting.tools, str(path))
     except RecursionError:
         raise RecordingError(f'{path}: its values are nested too deeply to be RAPID') from None
+    return program
 
 
 def is_rapid(path: Path | str) -> bool:
-    """Whether a file has the suffix of a RAPID module."""
-    return Path(path).suffix.lower() in SUFFIXES
+    """Whether a path is that of RAPID modules: by its suffix, or a folder of them."""
+    path = Path(path)
+    if path.is_dir():
+        return any(file.suffix.lower() in MODULES for file in path.iterdir())
+    return path.suffix.lower() in (*MODULES, LIST_OF_MODULES)
+
+
+def _files(path: Path) -> list[Path]:
+    if path.is_dir():
+        return sorted(file for file in path.iterdir() if file.suffix.lower() in MODULES)
+    if path.suffix.lower() != LIST_OF_MODULES:
+        return [path]
+    names = re.findall(r'<Module>\s*(.*?)\s*</Module>', _text(path), re.IGNORECASE)
+    if not names:
+        raise RecordingError(f'{path} lists no modules; give the folder of the modules')
+    return [path.with_name(name) for name in names]
+
+
+def _text(file: Path) -> str:
+    try:
+        return file.read_text(encoding='utf-8', errors='replace')
+    except OSError as error:
+        raise RecordingError(f'cannot read {file}: {error.strerror}') from None
+
+
+def _start(modules: list[Module], procedure: str | None, path: Path) -> Routine:
+    routines = {
+        item.name: item
+        for module in modules for item in (*module.shared, *module.local)
+        if isinstance(item, Routine)
+    }  # fmt: skip
+    only = next(iter(routines)) if len(routines) == 1 else 'main'
+    start = procedure.lower() if procedure else only
+    if start not in routines:
+        words = ' '.join(routines) or 'none'
+        raise RecordingError(f'{path} has no procedure {start}; its procedures: {words}')
+    return routines[start]
 
 
 def program_trajectory(program: RapidProgram) -> Trajectory:
@@ -44,7 +101,8 @@ def program_trajectory(program: RapidProgram) -> Trajectory:
 
     The notes list the assumptions. A program that never switches the gun sprays throughout.
     """
-    recorded = timed(program.moves, bool(program.gun_signal))
+    paints = any(move.instruction.startswith('paint') for move in program.moves)
+    recorded = timed(program.moves, paints or bool(program.gun_signal))
     notes = [PROGRAMMED, 'speeds are taken as programmed; acceleration is left out']
     if any(move.zone_m for move in program.moves):
         notes.append('zones are not followed: corners are sharp')

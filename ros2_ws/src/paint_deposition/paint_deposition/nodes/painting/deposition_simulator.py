@@ -9,7 +9,6 @@ from typing import Any
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from paint_deposition.errors import PaintError
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
@@ -22,6 +21,7 @@ from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     fixed_while_configured,
+    require_colours,
     require_file_name,
     thickness_parameter,
 )
@@ -119,11 +119,7 @@ class DepositionSimulator(PaintingNode):
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)
-        low, high = values['color_min_um'], values['color_max_um']
-        if (low, high) != (0.0, 0.0) and low >= high:
-            raise PaintError(
-                f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
-            )
+        require_colours(values)
         require_band(values['target_um'], values['target_tolerance_um'])
 
     def reset(self) -> tuple[bool, str]:

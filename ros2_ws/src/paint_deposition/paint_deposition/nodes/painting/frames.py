@@ -55,8 +55,7 @@ class PartFrame:
 
         It is published on `part_pose`, so that recordings contain it.
         """
-        self._parent = parent_frame.lstrip('/')
-        self._from_parent = Rigid.of(part_pose).inverse() if len(part_pose) else None
+        self.take_part_pose(parent_frame, part_pose)
         if self._from_parent is None:
             return
         if self._publisher is None:
@@ -68,6 +67,11 @@ class PartFrame:
         t, q = placed.transform.translation, placed.transform.rotation
         t.x, t.y, t.z, q.x, q.y, q.z, q.w = Rigid.of(part_pose).values
         self._publisher.publish(placed)
+
+    def take_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
+        """The same as another node has published it."""
+        self._parent = parent_frame.lstrip('/')
+        self._from_parent = Rigid.of(part_pose).inverse() if len(part_pose) else None
 
     def is_own(self, frame_id: str) -> bool:
         """Whether poses in this frame need no transform."""

@@ -129,6 +129,15 @@ def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter
     return NodeParameter(default, description, (0.0, 10_000.0))
 
 
+def require_colours(values: Mapping[str, Any]) -> None:
+    """Raise PaintError where the ends of the colours are in the wrong order."""
+    low, high = values['color_min_um'], values['color_max_um']
+    if (low, high) != (0.0, 0.0) and low >= high:
+        raise PaintError(
+            f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
+        )
+
+
 def direction_parameter(description: str) -> NodeParameter:
     """A row for a direction of any length; empty is none."""
     return NodeParameter(

@@ -44,6 +44,7 @@ class Passes:
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
     joints: JointMotion | None = None  # that drive it
+    paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
 
 
 def write_passes(folder: Path, passes: Passes) -> list[str]:
@@ -58,7 +59,8 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     _write_bag(folder / BAG, passes, digest)
     write_table(folder / TABLE, _table(_in_frame(passes.moves, part)))
     comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
-    module = module_text(passes.moves, [comment], part[1] if part else None)
+    at = part[1] if part else None
+    module = module_text(passes.moves, [comment], at, passes.paint_moves)
     write_text(folder / PROGRAM, module)
     write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
     write_model(folder / MODEL_FILE, passes.model)

@@ -64,13 +64,16 @@ def _passes(
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
     frame_id: str = ROBOT_FRAME,
+    paint_moves: bool = False,
     pictures: str = 'png',
 ) -> list[Path]:
     surface, improved = result.surface, isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
     joints = result.drive.joint_motion if result.drive else None
-    passes = Passes(result.trajectory, result.moves, result.model, made, part, joints)
+    passes = Passes(
+        result.trajectory, result.moves, result.model, made, part, joints, paint_moves,
+    )  # fmt: skip
     files = [folder / one for one in (name, *write_passes(folder, passes))]
     given = result.original.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}

@@ -37,6 +37,8 @@ def write(result: Any, folder: str | Path, **more: Any) -> list[Path]:
         part_pose, frame_id: of a plan or an improvement, where the part stands in the robot's
             frame, [x y z qx qy qz qw], and the name of that frame; its files have their poses in
             that frame then. The first of them also of chosen points.
+        paint_moves: of a plan or an improvement, whether its RAPID module sprays by PaintL with
+            SetBrush instead of by MoveL with an output.
 
     Returns:
         The paths written.

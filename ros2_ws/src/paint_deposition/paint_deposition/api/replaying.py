@@ -1,0 +1,166 @@
+"""A recorded run, painted again on the live page."""
+
+import time
+from collections.abc import Sequence
+from threading import Event
+
+import numpy as np
+
+from paint_deposition.api.simulation import look_at_guns, require_brushes
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.motion_files import GunMotion
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.statistics import (
+    DEFAULT_PAINTED_ABOVE_UM,
+    film_statistics,
+    require_band,
+)
+from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.report.live.scene import Scene
+
+# The film is shown so often, and a motion without pauses is painted in steps so long [s].
+PERIOD_S = 0.2
+STEP_S = 1.0
+
+
+class Replay:
+    """Paints a recorded motion into a scene, as the simulator does a live one.
+
+    Args:
+        surface: the part; it is turned round if the gun looks at its back.
+        motions: of each gun, in the frame of the part.
+        models: of each gun.
+        rate: speed relative to the recording; 0: as fast as it can be painted.
+        target_um, tolerance_um: the film wanted and what it may differ [um].
+
+    Attributes:
+        scene: what is shown.
+        warnings: what is odd about the motion.
+
+    Raises:
+        PaintError: as for ``simulate``.
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        motions: Sequence[GunMotion],
+        models: Sequence[DepositionModel],
+        *,
+        rate: float = 1.0,
+        max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+        target_um: float = 0.0,
+        tolerance_um: float = 0.0,
+    ) -> None:
+        require_band(target_um, tolerance_um)
+        # Brushes between calibrated ones only for the look: live films make them as they come.
+        pairs = [
+            with_interpolated_brushes(m.trajectory, model)
+            for m, model in zip(motions, models, strict=True)
+        ]
+        for pair in pairs:
+            require_brushes(*pair)
+        trajectories, looked_with = zip(*pairs, strict=True)
+        seen = look_at_guns(surface, trajectories, looked_with, max_pose_gap_s=max_pose_gap_s)
+        self.warnings = tuple(
+            w for gun in seen for w in (*gun.trajectory.warnings, *gun.geometry.warnings)
+        )
+        self._surface, self._points = seen[0].surface, seen[0].surface.points()
+        self._motions, self._models, self._rate = motions, models, rate
+        self._gap_s, self._target = max_pose_gap_s, (target_um, tolerance_um)
+        # A stream that was restarted is painted in the order in which it was recorded.
+        self._times_ns = [np.maximum.accumulate(m.trajectory.stamps_ns) for m in motions]
+        self._start_ns = min(int(times[0]) for times in self._times_ns)
+        self._end_ns = max(int(times[-1]) for times in self._times_ns)
+        self._flows = [_flow_at_poses(motion.trajectory) for motion in motions]
+        self._paused, self._again = Event(), Event()
+        self.scene = Scene()
+        self.scene.show_part(self._surface)
+
+    def command(self, name: str) -> None:
+        """Do what the page asks for: 'pause', or go on; or 'again' from the start."""
+        if name == 'again':
+            self._again.set()
+        if name == 'again' or self._paused.is_set():
+            self._paused.clear()
+        else:
+            self._paused.set()
+        self.scene.tell('replay', paused=self._paused.is_set())
+
+    def run(self, stop: Event) -> None:
+        """Paint, again whenever that is asked for, until ``stop`` is set."""
+        while not stop.is_set():
+            self._again.clear()
+            self.paint(stop)
+            while not (stop.is_set() or self._again.is_set()):
+                stop.wait(PERIOD_S)
+
+    def paint(self, stop: Event) -> None:
+        """Paint once, until the end or until that is no longer wanted."""
+        self.scene.begin_again()
+        films = LiveFilms(tuple(map(self._unpainted, self._motions, self._models)))
+        self._show(films, 0.0)
+        shown_ns = now_ns = self._start_ns - 1
+        began_s = time.monotonic()
+        while now_ns < self._end_ns and not (stop.is_set() or self._again.is_set()):
+            if self._paused.is_set():
+                stop.wait(PERIOD_S)
+                began_s += PERIOD_S
+                continue
+            if self._rate:
+                stop.wait(PERIOD_S)
+                elapsed_s = (time.monotonic() - began_s) * self._rate
+            else:
+                elapsed_s = (now_ns - self._start_ns) * 1e-9 + STEP_S
+            now_ns = min(self._start_ns + round(elapsed_s * 1e9), self._end_ns)
+            for number, film in enumerate(films.guns):
+                self._feed(number, film, shown_ns, now_ns)
+            shown_ns = now_ns
+            self._show(films, (now_ns - self._start_ns) * 1e-9)
+
+    def _unpainted(self, motion: GunMotion, model: DepositionModel) -> LiveFilm:
+        """A film that knows when the gun will be switched, as it is offline."""
+        film = LiveFilm(
+            self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
+        )
+        recorded = motion.trajectory
+        for row, (stamp_ns, flow, brush) in enumerate(recorded.triggers):
+            film.add_trigger(TriggerChange(stamp_ns, flow, brush, recorded.set_points_of(row)))
+        return film
+
+    def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
+        """Pass on the poses of a gun in this time."""
+        motion, flow = self._motions[number].trajectory, self._flows[number]
+        first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
+        rows = slice(int(first), int(end))
+        batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
+        film.add_poses(batch.select(rows))
+        for row in range(*rows.indices(len(motion))):
+            for position, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
+                self.scene.move_gun(self._motions[number].name, position, z_axis, flow[row])
+
+    def _show(self, films: LiveFilms, time_s: float) -> None:
+        film, (target_um, tolerance_um) = films.snapshot(), self._target
+        film_um = film.film_um
+        figures = film_statistics(
+            film_um, self._surface.vertex_areas_m2, film.emitted_cm3,
+            target_um=target_um, target_tolerance_um=tolerance_um,
+        )  # fmt: skip
+        scale = film_scale(film_um)
+        self.scene.show_scale(scale, DEFAULT_PAINTED_ABOVE_UM, target_um, tolerance_um)
+        self.scene.show_film(film_um)
+        self.scene.add_figures(time_s, figures)
+
+
+def _flow_at_poses(motion: Trajectory) -> np.ndarray:
+    """(N,) relative flow at each pose; 1 without a trigger."""
+    if not len(motion.trigger_flow):
+        return np.ones(len(motion))
+    passed = np.searchsorted(motion.trigger_stamps_ns, motion.stamps_ns, side='right')
+    return np.concatenate([[0.0], motion.trigger_flow])[passed]

@@ -1,0 +1,154 @@
+"""The results of a command, on the live page."""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import trimesh
+
+from paint_deposition.api.inference import compare, compare_models
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.campaign_file import read_campaign
+from paint_deposition.files.model_file import model_of, read_model
+from paint_deposition.files.provenance import model_digest, sha256
+from paint_deposition.film.colour_scales import film_scale, residual_scale
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_statistics
+from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.part.surface import Surface
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.live.scene import FIGURES, Scene
+
+DIAGNOSIS, COMPARISON, FILM = 'diagnosis.json', 'comparison.json', 'film.ply'
+
+
+def is_results(folder: Path) -> bool:
+    """Whether a folder holds results that can be shown."""
+    return any((folder / name).is_file() for name in (DIAGNOSIS, COMPARISON, FILM))
+
+
+def results_scenes(folder: Path) -> tuple[list[Scene], list[str]]:
+    """The scenes of a folder of results, best model first, and warnings.
+
+    Of a comparison or a diagnosis each part is painted with each model, and its readings are
+    predicted, from the campaign that the results were made from. Other films are shown as written.
+
+    Raises:
+        PaintError: what the results were made from is not there, or cannot be read.
+    """
+    if (folder / DIAGNOSIS).is_file():
+        figures = _read(folder / DIAGNOSIS)
+        after = ' + '.join(['after', *figures['accepted']])
+        models = {
+            'before': read_model(folder / 'model_before.yaml'),
+            after: read_model(folder / 'model.yaml'),
+        }
+    elif (folder / COMPARISON).is_file():
+        figures = _read(folder / COMPARISON)
+        described = figures['provenance']['models'].items()
+        models = {name: _model(folder, name, values) for name, values in described}
+    else:
+        return [_written_film(folder)], []
+    made_from = figures['provenance']
+    path = Path(made_from['campaign'])
+    if not path.is_file():
+        raise PaintError(
+            f'{folder}: its campaign {path} is not there; run the command in the folder in which '
+            'the results were made'
+        )
+    changed = [f['file'] for f in made_from['files'] if not _unchanged(f)]
+    warnings = [f'{file} is not what {folder} was made from' for file in changed]
+    campaign = read_campaign(path)
+    if len(models) == 1:
+        ((name, model),) = models.items()
+        return _scenes({name: compare(campaign, model)}), warnings
+    return _scenes(compare_models(campaign, models).by_name), warnings
+
+
+def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
+    """Each part with each model, the last model first."""
+    data = ReportData.of(SideBySide(by_model))
+    wanted = data.target_um or 0.0, data.tolerance_um or 0.0
+    scenes = []
+    for row, (experiment, painted) in enumerate(zip(data.experiments, data.painted, strict=True)):
+        films = [film.film_um for film in painted]
+        at = data.rows_of(row)
+        residuals = [comparison.points.select(at) for comparison in data.comparisons]
+        span = residual_scale(np.concatenate([found.residual_um for found in residuals]))
+        errors = [
+            {'model': name, 'rmse_um': found.rmse_um}
+            for name, found in zip(data.names, residuals, strict=True)
+        ]
+        for name, film_um, film, found in [
+            *zip(data.names, films, painted, residuals, strict=True)
+        ][::-1]:
+            scene = Scene(experiment.name, name)
+            scene.show_part(experiment.surface)
+            scene.tell('about', text=experiment.name)
+            scene.show_scale(film_scale(np.concatenate(films)), DEFAULT_PAINTED_ABOVE_UM, *wanted)
+            scene.show_film(film_um)
+            figures = film_statistics(
+                film_um, experiment.surface.vertex_areas_m2, film.emitted_cm3,
+                target_um=wanted[0], target_tolerance_um=wanted[1],
+            )  # fmt: skip
+            scene.add_figures(0.0, figures, found.rmse_um)
+            arrays = {
+                'positions': experiment.measured_points.positions_m,
+                'measured': found.measured_um,
+                'predicted': found.predicted_um,
+            }
+            scene.tell(
+                'readings',
+                {name: values.astype(np.float32) for name, values in arrays.items()},
+                names=experiment.readings.point[experiment.means.first].tolist(),
+                errors=errors, span=span.high, noise=data.study.noise.typical_um,
+            )  # fmt: skip
+            scenes.append(scene)
+    return scenes
+
+
+def _written_film(folder: Path) -> Scene:
+    """The film that a command wrote, with its figures."""
+    mesh = trimesh.load_mesh(folder / FILM, process=False)
+    film_um = mesh.metadata['_ply_raw']['vertex']['data']['thickness_um']
+    written = folder / 'stats.json'
+    figures = _read(written) if written.is_file() else {}
+    surface = Surface(
+        np.asarray(mesh.vertices, float), np.asarray(mesh.faces), np.asarray(mesh.vertex_normals),
+        np.ones(len(mesh.vertices)), np.array(figures.get('down', [0.0, 0.0, -1.0])),
+    )  # fmt: skip
+    scene = Scene()
+    scene.show_part(surface)
+    scene.tell('about', text=Path(figures.get('mesh_file', folder)).name)
+    scene.show_scale(
+        film_scale(film_um), figures.get('painted_above_um', DEFAULT_PAINTED_ABOVE_UM),
+        figures.get('target_um', 0.0), figures.get('target_tolerance_um', 0.0),
+    )  # fmt: skip
+    scene.show_film(film_um)
+    if 'mean_um' in figures:
+        scene.add_figures(0.0, SimpleNamespace(**{name: figures[name] for name in FIGURES}))
+    return scene
+
+
+def _model(folder: Path, name: str, values: dict[str, Any]) -> DepositionModel:
+    """The model that a comparison says it was made with."""
+    model = model_of({key: value for key, value in values.items() if key != 'sha256'})
+    if model_digest(model) != values['sha256']:
+        raise PaintError(
+            f'{folder}: its {COMPARISON} does not describe the model {name} in full; compare again'
+        )
+    return model
+
+
+def _unchanged(file: dict[str, str]) -> bool:
+    return Path(file['file']).exists() and sha256(file['file']) == file['sha256']
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text(encoding='utf-8'))
+    except ValueError as error:
+        raise PaintError(f'{path} is no JSON: {error}; make the results again') from None

@@ -1,0 +1,236 @@
+"""What a RAPID program does to the robot and the gun: its moves of the TCP."""
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
+from paint_deposition.files.rapid.gun import Gun, Spray, gun_signal, name_of
+from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
+from paint_deposition.files.rapid.moves import RapidMove, RapidProgram
+from paint_deposition.files.rapid.parser import Instruction, Module, Routine
+from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
+
+if TYPE_CHECKING:
+    from paint_deposition.files.recordings.joint_states import Robot
+
+# Instruction -> number of its targets; the last is where it ends.
+MOVES = {
+    'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
+    'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
+}  # fmt: skip
+TRIGGERS = tuple(f't{number}' for number in range(2, 9))
+MOST_JOINTS = 6
+HOME = frame(NOWHERE)
+
+
+class Painting(Interpreter):
+    """Collects the moves of a `RapidProgram` while it runs."""
+
+    def __init__(
+        self, modules: list[Module], start: Routine, signal: str | None, robot: 'Robot | None'
+    ) -> None:
+        super().__init__(modules)
+        signal = gun_signal(list(self.reached(start.body)), signal, start.source)
+        name = next(module.name for module in modules if module.source == start.source)
+        self.program = RapidProgram(name, signal)
+        self.tools: dict[str, Frame | None] = {}  # frame of each tool on the flange [mm], if known
+        self._gun = Gun(self, self.program)
+        self._robot = robot
+        # Name of the frame and pose of the TCP in it [mm], None where it is not known.
+        self._at: tuple[str, Frame] | None = None
+        self._displacement = HOME
+        self._speed_share, self._fastest_mm_per_s = 1.0, np.inf
+        self._external_line = 0
+
+    def run(self, start: Routine) -> str:
+        passed_over = super().run(start)
+        if self._gun.planes:
+            self.line = self._gun.planes[0].line
+            self.fail('the TCP never passes this plane while it paints; check its value')
+        if self._external_line and any(not move.frame for move in self.program.moves):
+            self.line = self._external_line
+            self.fail(
+                'an external axis moves, and the work objects stand still; give the work object '
+                'its mechanical unit (ufmec), or take this out'
+            )
+        if passed_over:
+            self.program.note(f'passed over, neither motion nor paint: {passed_over}')
+        return passed_over
+
+    def acts(self, i: Instruction) -> bool:
+        if i.name.startswith('wait'):
+            return self._gun.is_open
+        return i.name not in PASSED_OVER or bool(self._gun.commanded(i))
+
+    def act(self, i: Instruction) -> bool:
+        if i.name in MOVES:
+            self._move(i)
+        elif do := getattr(self, f'do_{i.name}', getattr(self._gun, f'do_{i.name}', None)):
+            do(i)
+        elif what := self._gun.commanded(i):
+            self._gun.command(i, what)
+        elif i.name.startswith('wait') and self._gun.is_open:
+            self.fail(f'{i.name} waits with the gun open, how long only the robot knows')
+        else:
+            return False
+        return True
+
+    # --- instructions
+
+    def do_velset(self, i: Instruction) -> None:
+        self._speed_share = self._gun.number(i, 0) / 100.0
+        self._fastest_mm_per_s = self._gun.number(i, 1)
+
+    def do_pdispset(self, i: Instruction) -> None:
+        self._displacement = self._frame(i.values[0] if i.values else None)
+
+    def do_pdispoff(self, _: Instruction) -> None:
+        self._displacement = HOME
+
+    def do_waittime(self, i: Instruction) -> None:
+        """Stand still, with the gun as it is."""
+        wait_s = self._gun.number(i, 0)
+        if self.program.moves and wait_s > 0.0:
+            still = replace(
+                self.program.moves[-1], instruction=i.name, line=i.line, via_m=None,
+                wait_s=wait_s, **self._gun.now._asdict(),
+            )  # fmt: skip
+            self.program.moves.append(still)
+
+    def do_moveextj(self, i: Instruction) -> None:
+        self._external_line = i.line
+        self.program.note(f'line {i.line}: moveextj moves an external axis, not the TCP')
+
+    def do_moveabsj(self, i: Instruction) -> None:
+        if self._robot is None:
+            if self._gun.is_open:
+                self.fail('moveabsj sprays, and joint angles need the robot; give its --urdf')
+            self.program.note(f'line {i.line}: moveabsj skipped: joint angles need the robot')
+            self._at = None
+            return
+        (target, *how), _ = self._arguments(i, 1)
+        joints = len(self._robot.moving_joints)
+        if joints > MOST_JOINTS:
+            self.fail(f'{self._robot.path} has {joints} joints to its tip, robax {MOST_JOINTS}')
+        robax, _ = self._record(self.known(target), 'jointtarget')
+        angles = [self.number(one, 'a joint') for one in self._record(robax, 'robjoint')[:joints]]
+        (position_m,), (quaternion,) = self._robot.poses(np.radians([angles]))
+        self.program.note('joint angles give the tip of the URDF, in the frame of its base')
+        pose = position_m * 1e3, Rotation.from_quat(quaternion)
+        self._append(i, ('', pose), None, how, self._gun.in_move([]))
+
+    # --- moves
+
+    def _arguments(self, i: Instruction, targets: int) -> tuple[list, list]:
+        """Targets, speed, zone and tool; and what stands between speed and zone."""
+        values = i.values[:-2] if i.name.endswith('do') else i.values
+        if len(values) < targets + 3:
+            self.fail(f'{i.name} needs a target, a speed, a zone and a tool')
+        between = values[targets + 1 : -2]
+        if between and not i.name.startswith('trigg'):
+            self.fail(
+                f'{i.name} takes {name_of(between[0]) or "a value"} beside target, speed, zone '
+                'and tool; brush and event data of a paint move are not followed: give the brush '
+                'a number, in SetBrush and in the brushes of the model'
+            )
+        return [*values[: targets + 1], *values[-2:]], between
+
+    def _move(self, i: Instruction) -> None:
+        targets = MOVES[i.name]
+        parts, between = self._arguments(i, targets)
+        name, base = self._work_object(i)
+        displaced = product(base, self._displacement)
+        poses = [product(displaced, self._frame(part)) for part in parts[:targets]]
+        if i.name.startswith('paint'):
+            track = None
+            if targets == 1 and self._at and self._at[0] == name:
+                track = np.array([
+                    product(inverse(base), end)[0] for end in (self._at[1], poses[-1])
+                ])  # fmt: skip
+            spray = self._gun.in_paint_move(track)
+        else:
+            named = [*between, *(at for name, at in i.options.items() if name in TRIGGERS)]
+            spray = self._gun.in_move([self.known(node) for node in named])
+        via_m = poses[0][0] * 1e-3 if targets == 2 else None
+        self._append(i, (name, poses[-1]), via_m, parts[targets:], spray)
+        if i.name.endswith('do') and self._gun.commanded(i) == 'gun':
+            self._gun.is_open = self._gun.level(i)
+
+    def _append(
+        self, i: Instruction, at: tuple[str, Frame], via_m: np.ndarray | None, how: list,
+        spray: Spray,
+    ) -> None:  # fmt: skip
+        speed, zone, tool = how
+        name, (position, rotation) = at
+        move = RapidMove(
+            position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at), via_m=via_m,
+            line=i.line, instruction=i.name, zone_m=self._zone_m(zone), tool=self._tool(tool),
+            work_object=name_of(i.options.get('wobj')) or 'wobj0', frame=name, **spray._asdict(),
+        )  # fmt: skip
+        self.program.moves.append(move)
+        self._at = at
+
+    def _frame(self, node: object) -> Frame:
+        try:
+            return frame(self.known(node))
+        except ValueError as error:
+            self.fail(str(error))
+
+    def _work_object(self, i: Instruction) -> tuple[str, Frame]:
+        """The frame that the poses are given in, '' for the world, and the work object in it."""
+        node = i.options.get('wobj')
+        value = self.value(node) if node else PREDEFINED['wobj0']
+        if isinstance(value, Unknown):
+            self.program.note(
+                f'work object {value.name} is not in the module: poses are in its frame'
+            )
+            return value.name, HOME
+        held, fixed, unit, user, own = self._record(value, 'wobjdata')
+        if held:
+            self.fail(f'the robot holds the work object {name_of(node)}; give a fixed one')
+        if fixed or not unit:
+            return '', product(self._frame(user), self._frame(own))
+        self.program.note(
+            f'work object {name_of(node)} moves with {unit}: poses are in its frame, which moves '
+            'with the part'
+        )
+        return unit, self._frame(own)
+
+    def _tool(self, node: object) -> str:
+        value, name = self.value(node), name_of(node)
+        if isinstance(value, Unknown):
+            self.tools[value.name] = None
+            return value.name
+        held, tool_frame, _ = self._record(value, 'tooldata')
+        if held is False:
+            self.fail(f'tool {name} stands still; only tools the robot holds are read')
+        self.tools[name] = self._frame(tool_frame)
+        return name
+
+    def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:
+        if 't' in i.options and self._at and self._at[0] == at[0]:
+            duration_s = self.number(i.options['t'], 'the duration')
+            if not duration_s > 0.0:
+                self.fail(f'a duration of {duration_s:g} s; give one above 0')
+            length_mm = float(np.linalg.norm(at[1][0] - self._at[1][0]))
+            return length_mm * 1e-3 / duration_s * self._speed_share
+        if 'v' in i.options:
+            speed = self.number(i.options['v'], 'the speed')
+        else:
+            if name_of(node) == 'vmax':
+                self.program.note("vmax is the robot's own; 5 m/s assumed")
+            speed = self.number(self._record(self.known(node), 'speeddata')[0], 'the speed')
+        return min(speed * self._speed_share, self._fastest_mm_per_s) * 1e-3
+
+    def _zone_m(self, node: object) -> float:
+        """Radius in which the corner is cut; 0 for a stop point."""
+        stop, radius_mm, *_ = self._record(self.known(node), 'zonedata')
+        return 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
+
+    def _record(self, value: object, kind: str) -> list:
+        if not isinstance(value, list) or len(value) != len(RECORDS[kind]):
+            self.fail(f'{value!r} is no {kind}')
+        return value

@@ -1,0 +1,223 @@
+"""Node `web_view`: the film as it is painted, on a page for browsers."""
+
+import contextlib
+import time
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
+from paint_deposition.motion.part_frame import PART_POSE_TOPIC
+from paint_deposition.motion.pose_stream import PoseBatch
+from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
+from paint_deposition.nodes.painting.frames import NoTransform, PartFrame
+from paint_deposition.nodes.painting.painting_parameters import read_part
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    atomizers_parameter,
+    direction_parameter,
+    fixed_while_running,
+    mesh_parameters,
+    require_colours,
+    thickness_parameter,
+)
+from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.part.facing import turned
+from paint_deposition.report.live.scene import Scene
+from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
+
+# Poses are taken from their queue so often [s]; at 1 kHz half a second of them fits into it.
+TAKE_PERIOD_S = 0.05
+DEPTH = 500
+
+WEB_VIEW = dict(
+    **fixed_while_running(
+        'the page is served with it; restart the node with the new value',
+        **mesh_parameters(max_edge_length_m=0.01),
+        down=direction_parameter('As for deposition_simulator [-]'),
+        atomizers=atomizers_parameter('to show'),
+        host=NodeParameter(
+            DEFAULT_HOST,
+            'Address to listen on; any but that of this machine alone needs a token [name]',
+        ),
+        port=NodeParameter(DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)),
+        token=NodeParameter('', 'Token that browsers must give; empty: made where needed [name]'),
+    ),
+    color_min_um=thickness_parameter(
+        'Film at the lower end of the colours; both ends 0: automatic [µm]'
+    ),
+    color_max_um=thickness_parameter(
+        'Film at the upper end of the colours; both ends 0: automatic [µm]'
+    ),
+    painted_above_um=thickness_parameter(
+        'Thinner film is shown as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
+    ),
+    target_um=thickness_parameter('Film wanted; 0: none [µm]'),
+    target_tolerance_um=thickness_parameter('Allowed difference from the target [µm]'),
+)
+
+
+class WebView(PaintNode):
+    """Serves the live page with what the simulator publishes; it computes no film itself.
+
+    The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
+    """
+
+    PARAMETERS = WEB_VIEW
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('web_view', **kwargs)
+        results = topics.RESULTS
+        for message, topic, take, profile in (
+            (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
+            (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
+            (ThicknessField, 'thickness/field', self._take_field, results),
+            (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
+            (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+        ):
+            self.create_subscription(message, topic, take, profile)
+        self._inputs = [
+            AdaptiveSubscription(
+                self, message, gun_topic(name, topic), partial(take, name), depth=DEPTH,
+                latched=message is AtomizerState,
+            )
+            for name in self.values['atomizers'] or ['']
+            for message, topic, take in (
+                (AtomizerState, 'atomizer/state', self._take_state),
+                (PoseStamped, 'atomizer/pose', self._take_pose),
+            )
+        ]  # fmt: skip
+        self.create_steady_timer(TAKE_PERIOD_S, self._take_motion)
+        self._diagnostics = Diagnostics(self, {'page': self._status})
+
+    def _load_files(self) -> None:
+        self.scene = Scene()
+        self._frame = PartFrame(self, self.values['frame_id'])
+        self._flow: dict[str, float] = {}
+        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
+        self._newest_ns, self._time_s = 0, 0.0
+        self._rmse_um = float('nan')
+        self._problem = ''
+        self._sent = 0, time.monotonic()
+        self._show_part(self.values['mesh_file'])
+        values = self.values
+        self.page = Page([self.scene], values['host'], values['port'], values['token'])
+        self.get_logger().info(f'the page is at {self.page.url}')
+
+    def close(self) -> None:
+        self.page.close()
+
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        require_colours(values)
+        require_band(values['target_um'], values['target_tolerance_um'])
+
+    def _on_change(self, names: set[str]) -> None:
+        self._show_scale()
+
+    # --- the part and its film
+
+    def _show_part(self, mesh_file: str) -> None:
+        surface = read_part(self.values, mesh_file)
+        # The simulator may find that the guns paint its other side.
+        self._mesh_file, self._mesh_ids = mesh_file, {surface.mesh_id, turned(surface).mesh_id}
+        self.scene.show_part(surface)
+        self.scene.tell('about', text=Path(mesh_file).name)
+        self._film_um = np.zeros(0, np.float32)
+        self._show_scale()
+
+    def _take_part(self, part: Part) -> None:
+        self._newest_ns, self._time_s = 0, 0.0
+        if part.mesh_file == self._mesh_file:
+            self.scene.begin_again()
+        else:
+            try:
+                self._show_part(part.mesh_file)
+            except PaintError as error:
+                self._say(str(error))
+                return
+        serial = f'{part.serial}, ' if part.serial else ''
+        self.scene.tell('about', text=serial + Path(part.mesh_file).name)
+
+    def _take_field(self, field: ThicknessField) -> None:
+        if field.mesh_id not in self._mesh_ids:
+            self._say(
+                f'the film that comes is not on {self._mesh_file} as it is read here; give '
+                'web_view the mesh_file, mesh_scale and max_edge_length_m of the simulator'
+            )
+            return
+        self._say('')
+        self._film_um = np.asarray(field.thickness_um, np.float32)
+        self._show_scale()
+        self.scene.show_film(self._film_um)
+
+    def _show_scale(self) -> None:
+        values = self.values
+        scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
+        target = values['target_um'], values['target_tolerance_um']
+        self.scene.show_scale(scale, values['painted_above_um'], *target)
+
+    def _take_stats(self, stats: ThicknessStats) -> None:
+        now_ns = stamp_ns(stats.header)
+        if now_ns:  # there was a pose
+            self._time_s += max(now_ns - (self._newest_ns or now_ns), 0) * 1e-9
+            self._newest_ns = now_ns
+            self.scene.add_figures(self._time_s, stats, self._rmse_um)
+
+    def _take_comparison(self, stats: ComparisonStats) -> None:
+        self._rmse_um = stats.rmse_um
+
+    def _say(self, problem: str) -> None:
+        """Tell what keeps the film from being shown; '' is nothing."""
+        if problem:
+            self.get_logger().error(problem, once=True)
+        self._problem = problem
+        self.scene.tell('message', text=problem)
+
+    # --- the guns
+
+    def _take_motion(self) -> None:
+        for topic in self._inputs:
+            topic.take_pending()
+
+    def _take_part_pose(self, placed: TransformStamped) -> None:
+        t, q = placed.transform.translation, placed.transform.rotation
+        self._frame.take_part_pose(placed.header.frame_id, [t.x, t.y, t.z, q.x, q.y, q.z, q.w])
+
+    def _take_state(self, gun: str, state: AtomizerState, _sent_ns: int) -> None:
+        with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
+            self._flow[gun] = relative_flow(state.spraying, state.flow)
+
+    def _take_pose(self, gun: str, message: PoseStamped, _sent_ns: int) -> None:
+        p, q = message.pose.position, message.pose.orientation
+        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+        frame_id, stamp = message.header.frame_id, stamp_ns(message.header)
+        if not self._frame.is_own(frame_id):
+            try:
+                pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
+            except NoTransform:  # the simulator, which cannot paint it, says why
+                return
+        batch = PoseBatch(np.array([stamp]), pose[0][None], pose[1][None])
+        for position, z_axis in zip(*batch.finite_axes(), strict=True):
+            # Without any state the gun is taken to spray, as the simulator does.
+            self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
+
+    def _status(self) -> Status:
+        sent, now_s = self.page.bytes_sent, time.monotonic()
+        rate = (sent - self._sent[0]) / max(now_s - self._sent[1], 1e-9)
+        self._sent = sent, now_s
+        browsers = len(self.page.browsers)
+        values = {'browsers': browsers, 'sent to all of them [kB/s]': f'{rate / 1e3:.0f}'}
+        if self._problem:
+            return Status(WARN, self._problem, values)
+        return Status(OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values)

@@ -1,0 +1,215 @@
+"""The live page without ROS: what travels, who may look, runs painted again, results."""
+
+import json
+from threading import Event
+from urllib.error import HTTPError
+from urllib.request import Request, urlopen
+
+import numpy as np
+import pytest
+
+import paint_deposition as pd
+from chromium import CHROMIUM, Chromium
+from paint_deposition.api.replaying import Replay
+from paint_deposition.api.shown_results import results_scenes
+from paint_deposition.cli.main import run
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.motion_files import GunMotion, read_recording
+from paint_deposition.report.live.scene import STEP_UM, Scene, Seen
+from paint_deposition.report.live.server import Page
+from paint_deposition.report.writers.write import write
+from small_campaign import small_campaign
+
+ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
+
+
+class Onlooker:
+    """What a browser makes of its messages."""
+
+    def __init__(self) -> None:
+        self.seen, self.film_um, self.rows, self.kinds = Seen(), np.empty(0), {}, []
+
+    def look(self, scene: Scene) -> 'Onlooker':
+        self.kinds = [self._take(message) for message in scene.lacking(self.seen)]
+        return self
+
+    def _take(self, message: bytes) -> str:
+        end = 4 + int.from_bytes(message[:4], 'little')
+        head, arrays = json.loads(message[4:end]), {}
+        for name, kind, count in head['arrays']:
+            arrays[name] = np.frombuffer(message, ARRAYS[kind], count, end)
+            end += arrays[name].nbytes
+        if head['kind'] == 'part':
+            self.film_um = np.zeros(len(arrays['vertices']) // 3)
+        elif head['kind'] == 'film':
+            mask = np.unpackbits(arrays['changed'], bitorder='little', count=len(self.film_um))
+            self.film_um[mask > 0] = arrays['um'].view(np.float16)
+        elif head['kind'] == 'rows':
+            kept = self.rows.get(head['series'], [])[: head['first']]
+            width = 11 - 1 if head['series'] == 'history' else 5
+            self.rows[head['series']] = kept + arrays['rows'].reshape(-1, width).tolist()
+        return head['kind']
+
+
+@pytest.fixture(scope='module')
+def door(repository):
+    """The sample door, coarse, and the motion over it."""
+    samples = repository / 'ros2_ws/src/paint_deposition/samples'
+    motion = read_recording(samples / 'door_horizontal', state_topic='/atomizer/state')
+    return pd.read_mesh(samples / 'door.stl', max_edge_length_m=0.05), motion
+
+
+@pytest.fixture
+def scene(door):
+    scene = Scene()
+    scene.show_part(door[0])
+    return scene
+
+
+@pytest.fixture
+def serve(scene):
+    """`serve(**options)`: a page on a free port."""
+    pages = []
+
+    def serve(**options) -> Page:
+        pages.append(Page([scene], port=0, **options))
+        return pages[-1]
+
+    yield serve
+    for page in pages:
+        page.close()
+
+
+def test_only_what_changed_travels_and_whoever_comes_late_gets_all(scene, door):
+    early, late = Onlooker().look(scene), Onlooker()
+    assert early.kinds == ['part']
+    random = np.random.default_rng(4)
+    film_um = np.zeros(len(door[0].vertices_m))
+    for step in range(4):
+        some = random.choice(len(film_um), 50, replace=False)
+        film_um[some] += random.uniform(0.0, 80.0, 50)
+        scene.show_film(film_um)
+        scene.move_gun('', np.array([0.1 * step, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]), step % 2)
+        if step != 2:  # a slow link, on which nothing is lost
+            early.look(scene)
+            assert set(early.kinds) == {'film', 'guns', 'rows'}
+    assert early.look(scene).kinds == []
+    late.look(scene)
+    for onlooker in (early, late):
+        np.testing.assert_allclose(onlooker.film_um, film_um, rtol=2**-11, atol=STEP_UM / 2)
+        assert [row[4] for row in onlooker.rows['track']] == [0.0, 1.0, 0.0, 1.0]
+    scene.begin_again()
+    assert early.look(scene).rows['track'] == []
+
+
+def test_a_run_is_painted_as_simulate_paints_it(door):
+    surface, motion = door
+    film = pd.simulate(surface, motion, target_um=20.0, tolerance_um=3.0)
+    wanted = {'rate': 0.0, 'target_um': 20.0, 'tolerance_um': 3.0}
+    replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], **wanted)
+    shown = []
+    replay.scene.show_film = shown.append
+    replay.paint(Event())
+    np.testing.assert_array_equal(shown[-1], film.film_um)
+    assert not shown[0].any()
+    history = Onlooker().look(replay.scene).rows['history']
+    assert history[-1][1:3] == pytest.approx([film.statistics.mean_um, film.statistics.std_dev_um])
+    assert history[-1][6] == pytest.approx(film.statistics.within_target)
+    assert np.all(np.diff([row[0] for row in history]) > 0.0)
+
+
+def status(url: str, **headers: str) -> int:
+    try:
+        return urlopen(Request(url, headers=headers)).status
+    except HTTPError as error:
+        return error.code
+
+
+def test_a_page_with_a_token_is_for_those_who_have_it(serve):
+    page = serve(token='secret')
+    bare = page.url.split('?')[0]
+    assert page.url == f'{bare}?token=secret'
+    assert status(page.url) == status(bare, Cookie=f'{page.cookie}=secret') == 200
+    for path in ('', 'part.js', 'scene', '?token=wrong', 'scene?token=secre'):
+        assert status(bare + path) == 403
+    # Only the upgrade is missing.
+    assert status(f'{bare}scene?token=secret') == 400
+
+
+def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_its_names(serve):
+    assert len(serve(host='0.0.0.0').token) > 20
+    page = serve()
+    assert page.url.startswith('http://127.0.0.1:')
+    assert not page.token
+    assert status(page.url) == 200
+    assert status(page.url, Host='elsewhere.example') == 403
+    assert urlopen(page.url).headers['Content-Security-Policy'].startswith("default-src 'self'")
+    with pytest.raises(PaintError, match='in use; choose another port'):
+        Page(page.scenes, port=int(page.url.split(':')[2].strip('/')))
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
+def test_results_show_each_part_with_each_model(tmp_path):
+    from paint_deposition.effects.library.air_drift import AirDrift
+
+    campaign = small_campaign(tmp_path)
+    found = pd.refit(campaign, AirDrift)
+    write(found, tmp_path / 'results')
+    scenes, warnings = results_scenes(tmp_path / 'results')
+    assert not warnings
+    named = [(scene.part, scene.model) for scene in scenes]
+    names = [experiment.name for experiment in campaign.experiments]
+    assert named == [(n, m) for n in names for m in ('after + air_drift', 'before')]
+    looked = [Onlooker().look(scene) for scene in scenes]
+    assert all(onlooker.film_um.max() > 1.0 for onlooker in looked)
+    rmse = [onlooker.rows['history'][-1][9] for onlooker in looked]
+    errors = found.to_dict()['experiments']
+    assert rmse[::2] == pytest.approx([e['rmse_after_um'] for e in errors], rel=0.02)
+    # From one model to the other only the film and what is said of it travel.
+    changed = looked[0].look(scenes[1]).kinds
+    assert 'part' not in changed
+    assert 'film' in changed
+    # A comparison describes its model in its figures.
+    write(pd.compare(campaign, found.model), tmp_path / 'compared')
+    compared = Onlooker().look(results_scenes(tmp_path / 'compared')[0][0])
+    np.testing.assert_array_equal(compared.film_um, Onlooker().look(scenes[0]).film_um)
+    (tmp_path / 'campaign.yaml').unlink()
+    with pytest.raises(PaintError, match='run the command in the folder in which'):
+        results_scenes(tmp_path / 'results')
+
+
+@pytest.mark.parametrize(
+    ('words', 'reason'),
+    [
+        (['watch'], 'give RUN, or --live'),
+        (['watch', '--live'], 'give --mesh'),
+        (['watch', 'nowhere'], 'is not there; give a recorded run'),
+        (['watch', '.', '--port', '0'], 'does not name the mesh'),
+        (['watch', 'nowhere', '--tolerance-um', '2'], 'no --target-um'),
+    ],
+)
+def test_watch_says_what_it_lacks(words, reason, capsys):
+    assert run(words) == 2
+    assert reason in capsys.readouterr().err
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')
+def test_written_film_and_its_probe_in_a_browser(serve, scene, door, tmp_path):
+    surface, motion = door
+    film = pd.simulate(surface, motion)
+    write(film, tmp_path / 'results', made_from={'mesh_file': 'door.stl'})
+    ((shown,), _) = results_scenes(tmp_path / 'results')
+    page = Page([shown], port=0)
+    try:
+        with Chromium(tmp_path / 'browser') as browser:
+            tab = browser.tab(page.url, 390, 844)
+            tab.wait_until('globalThis.page?.view.film?.some((um) => um > 0)')
+            assert tab.evaluate('document.body.scrollWidth') == 390  # nothing is cut off
+            said = tab.evaluate("document.getElementById('figures').innerText")
+            assert f'{film.statistics.mean_um:.1f} µm' in said
+            assert tab.evaluate("document.getElementById('about').innerText") == 'door.stl'
+    finally:
+        page.close()
