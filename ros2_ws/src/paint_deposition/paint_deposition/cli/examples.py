@@ -1,7 +1,6 @@
 """An example of each command, for its help: as it runs in the folder of the samples."""
 
 EXAMPLES = {
-    'demo': '-o demo',
     'simulate': '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film',
     'calibrate': 'panel_study/campaign.yaml -o bell',
     'recommend': '--model bell/model.yaml --target-um 20 -o index',

@@ -10,7 +10,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.inspected import mesh_in, readings_in
+from paint_deposition.cli.inspected import box_words, mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.json_files import json_text
