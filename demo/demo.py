@@ -1,12 +1,10 @@
-"""Paint a door live, recommend an index, diagnose a measured door, paint a better one.
+"""`paint demo`, then what needs nodes or a shop that paints again.
 
-Starts the real nodes as processes, replays the sample trajectory onto the sample door, records
-the run, checks it against the offline film, asks the planner, diagnoses the measured door,
-settles another diagnosis by the spray that it proposes, and makes a door more even by what a
-diagnosis found. Takes two minutes.
+Starts the real nodes as processes, paints the door of `paint demo` live, records the run, checks
+it against the offline film, asks the planner, settles another diagnosis by the spray that it
+proposes, and paints a more even door by what a diagnosis found. Takes two minutes.
 """
 
-import json
 import os
 import shutil
 import subprocess
@@ -30,8 +28,7 @@ from paint_deposition.files.recordings.bags import read_trajectory
 PACKAGE = 'paint_deposition'
 PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE
 SAMPLES = Path(get_package_share_directory(PACKAGE)) / 'samples'
-DOOR, TRAJECTORY = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
-MEASURED = SAMPLES / 'measured_door'
+DOOR, TRAJECTORY = SAMPLES / 'measured_door/door.stl', SAMPLES / 'measured_door/door'
 # A folder with this file holds the results of a demo, which the next demo may replace.
 MARKER = '.paint_demo'
 
@@ -41,25 +38,22 @@ def main() -> None:
     if len(sys.argv) != 2:
         refuse('give one folder for the results')
     folder = fresh_folder(Path(sys.argv[1]).resolve())
+    paint('demo', '--no-open', '-o', folder, show=True)
     with domain_id() as domain:
         # The nodes talk among themselves, whatever else runs on this machine.
         os.environ['ROS_DOMAIN_ID'] = str(domain)
         rclpy.init()
         run, film_csv = paint_live(folder)
-        offline = paint_offline(folder)
-        compare_films(film_csv, run, offline / 'film.csv')
+        compare_films(film_csv, run, folder / 'film' / 'film.csv')
         recommend()
         rclpy.shutdown()
-    diagnose(folder)
     settled = settle(folder, paint, say)
     better = level(folder, paint, say)
     say('Results')
     for what, path in (
         ('the recorded run, for ros2 bag, Foxglove or rosbags', run),
         ('the painted door as a coloured mesh', film_csv.with_suffix('.ply')),
-        ('a picture of the painted door', offline / 'film.png'),
-        ('the report of the diagnosis, for a browser', folder / 'diagnosis' / 'report.html'),
-        ('the model with the missing effect', folder / 'diagnosis' / 'model.yaml'),
+        ('the story of that door, for a browser', folder / 'demo.html'),
         ('the report that says what to spray next', folder / 'one_door_diagnosis' / 'report.html'),
         ('the report after that spray', settled / 'report.html'),
         ('the programme of the more even door, for an ABB robot', better / 'passes.mod'),
@@ -88,7 +82,7 @@ def refuse(why: str) -> NoReturn:
 
 def paint_live(folder: Path) -> tuple[Path, Path]:
     """Paint the door through the nodes; returns the recorded run and the film's table."""
-    say('Painting a door live, through the nodes')
+    say('Painting the same door live, through the nodes')
     poses = len(read_trajectory(TRAJECTORY, state_topic='/atomizer/state'))
     with Cell(PREFIX) as cell:
         cell.start('deposition_simulator', mesh_file=DOOR, max_edge_length_m=0.01,
@@ -111,14 +105,6 @@ def paint_live(folder: Path) -> tuple[Path, Path]:
     return run, next(path for path in paths if path.suffix == '.csv')
 
 
-def paint_offline(folder: Path) -> Path:
-    """Paint the same film from the command line, for its picture and to check the nodes."""
-    output = folder / 'film'
-    paint('simulate', '--mesh', DOOR, '--trajectory', TRAJECTORY, '--state-topic',
-          '/atomizer/state', '-o', output, '--json')  # fmt: skip
-    return output
-
-
 def compare_films(live_csv: Path, run: Path, offline_csv: Path) -> None:
     """Print how far the live and the recorded film differ from the offline one."""
     offline = np.loadtxt(offline_csv, delimiter=',', skiprows=1)[:, 3]
@@ -139,23 +125,6 @@ def recommend() -> None:
         cell.start('index_planner')
         answer = cell.recommend_index(target_um=20.0, tolerance=0.05, width_m=0.9)
     print(answer.message)
-
-
-def diagnose(folder: Path) -> None:
-    """Diagnose a measured door, and judge the models on readings that no fit has seen."""
-    say('Diagnosing a measured door: what does the model of 2002 miss?')
-    output = folder / 'diagnosis'
-    paint('diagnose', MEASURED / 'campaign.yaml', '-o', output, show=True)
-    errors = []
-    for name in ('model_before.yaml', 'model.yaml'):
-        figures = paint('compare', MEASURED / 'unseen.yaml', '--model', output / name, '-o',
-                        folder / 'unseen' / Path(name).stem, '--json')  # fmt: skip
-        whole = json.loads(figures)['misfits'][0]
-        errors.append(whole['rmse_um'])
-    print(
-        f'{whole["readings"]} readings that no fit has seen: RMSE {errors[0]:.2f} µm before, '
-        f'{errors[1]:.2f} µm after'
-    )
 
 
 def paint(*arguments, show: bool = False) -> str:

@@ -40,13 +40,6 @@ def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedPr
     return checked(done, words)
 
 
-def installed_paint(*arguments: object) -> subprocess.CompletedProcess:
-    """Run the installed `paint` with these arguments as a process of its own."""
-    command = ['paint', *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    return checked(done, command[1:])
-
-
 def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:
     """Exit code 2, nothing on stdout, one line on stderr with these words in it."""
     assert done.returncode == 2, done.stderr

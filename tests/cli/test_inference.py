@@ -1,19 +1,37 @@
-"""`paint compare`, `paint diagnose` and `paint refit` as a user runs them, on the sample door."""
+"""`paint demo`, `compare`, `diagnose` and `refit` as a user runs them, on the sample door."""
 
 import csv
 import json
+import os
 import re
 import shutil
+import subprocess
 
 import pytest
 import yaml
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
+from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.files.model_file import read_model_file
+from paint_deposition.inference.diagnosis.model_space import SURE
+from paint_deposition.inference.diagnosis.verdict import percent
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
 HIDDEN = 'incidence_attraction'
+
+
+@pytest.fixture(scope='module')
+def demo(tmp_path_factory):
+    """`paint demo` piped, on a display whose browser notes the pages that it is to open."""
+    folder = tmp_path_factory.mktemp('demo')
+    (folder / 'browser').write_text(f'#!/bin/sh\necho "$1" >> "{folder}/opened"\n')
+    (folder / 'browser').chmod(0o755)
+    display = {'DISPLAY': ':7', 'BROWSER': f'{folder}/browser %s'}
+    command = ['paint', 'demo', '-o', folder / 'out']
+    done = subprocess.run(command, env=os.environ | display, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout, folder / 'out'
 
 
 @pytest.fixture(scope='module')
@@ -35,6 +53,86 @@ def door_alone(tmp_path_factory):
 def table(path) -> list[dict[str, str]]:
     with path.open(newline='') as file:
         return list(csv.DictReader(file))
+
+
+def content(file) -> dict:
+    return json.loads(file.read_text())
+
+
+@pytest.mark.slow
+def test_the_demo_finds_the_hidden_effect(demo):
+    printed, folder = demo
+    found = content(folder / 'diagnosis/diagnosis.json')
+    probability = found['classes'][0]['probability']
+    assert probability > SURE
+    assert f'incidence attraction:            {percent(probability)} probability\n' in printed
+    assert found['verdict'] == 'effect_missing'
+    assert found['accepted'] == [HIDDEN]
+    assert found['rmse_um']['holdout_after'] < found['rmse_um']['holdout_before']
+    # A model with it is expected beside one without: both can be simulated.
+    before, after = (
+        read_model_file(folder / f'diagnosis/{name}.yaml') for name in ('model_before', 'model')
+    )
+    assert before.model.effects == ()
+    assert [effect.id for effect in after.model.effects] == [HIDDEN]
+    assert [step['added'] for step in after.history] == ['pattern', HIDDEN]
+
+
+@pytest.mark.slow
+def test_the_page_of_the_demo_has_the_figures_of_the_files(demo):
+    """As does what is printed; the later models and films are the better ones."""
+    printed, folder = demo
+    page = (folder / 'demo.html').read_text()
+    shown = re.findall(
+        r'class="label">([^<]*)</span>\s*(?:<span class="was">([^<]*) &rarr; </span>)?'
+        r'<span class="value">([^<]*)</span>', page
+    )  # fmt: skip
+    shown = {label: (before, after) for label, before, after in shown}
+    for label, (before, after) in shown.items():
+        assert f'  {label + ":":32} {before + " -> " if before else ""}{after} ' in printed
+    film = content(folder / 'film/stats.json')
+    assert shown['Film'] == ('', f'{film["mean_um"]:.1f}')
+    errors = content(folder / 'diagnosis/diagnosis.json')['rmse_um']
+    unseen = [m['rmse_um'] for m in content(folder / 'unseen/comparison.json')['models']]
+    assert unseen[1] < 0.85 * unseen[0]
+    better = content(folder / 'improved/improvement.json')
+    assert better['sigma_n']['after'] < 0.5 * better['sigma_n']['before']
+    for label, before, after in (
+        ('RMSE, fitted points', f'{errors["before"]:.2f}', f'{errors["after"]:.2f}'),
+        ('RMSE, 60 unseen readings', *(f'{one:.2f}' for one in unseen)),
+        ('Standard deviation', *(f'{100 * better["sigma_n"][k]:.1f}' for k in better['sigma_n'])),
+    ):
+        assert shown[label] == (before, after)
+
+
+@pytest.mark.slow
+def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
+    printed, folder = demo
+    page = (folder / 'demo.html').read_text()
+    assert not re.findall(r'(?:src|href)="(?!data:)|<script|http-equiv="refresh"|url\(', page)
+    assert len(re.findall(r'<img src="data:image/png;base64,', page)) == 5
+    assert (folder.parent / 'opened').read_text() == f'{(folder / "demo.html").as_uri()}\n'
+    steps = ('paint simulate ', 'paint diagnose ', 'paint compare ', 'paint improve ')
+    places = [printed.index(f'$ {step}') for step in steps]
+    assert places == sorted(places)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_writes_all_that_it_says(demo):
+    folder = demo[1] / 'diagnosis'
+    names = {path.name for path in folder.iterdir()}
+    assert names == {
+        MARKER, 'diagnosis.json', 'model.yaml', 'model_before.yaml', 'residuals.csv',
+        'report.html', 'comparison.png',
+    }  # fmt: skip
+    rows = table(folder / 'residuals.csv')
+    readings = table(SAMPLES / 'measured_door/panel.csv') + table(
+        SAMPLES / 'measured_door/door.csv'
+    )
+    measured = [f'{float(reading["thickness_um"]):.3f}' for reading in readings]
+    assert [row['thickness_um'] for row in rows] == measured
+    residual = [float(row['thickness_um']) - float(row['predicted_um']) for row in rows]
+    assert [float(row['residual_um']) for row in rows] == pytest.approx(residual, abs=2e-3)
 
 
 @pytest.mark.slow

@@ -102,7 +102,7 @@ def test_every_example_is_taken_and_begins_with_samples_or_results(name, monkeyp
 
 def test_a_command_that_is_none_is_refused_with_the_nearest():
     assert_refused(paint('simulat'), "no command is called 'simulat'", "did you mean 'simulate'?")
-    assert_refused(paint('xyz'), 'there are: simulate, ')
+    assert_refused(paint('xyz'), 'there are: demo, simulate, ')
 
 
 @pytest.mark.slow

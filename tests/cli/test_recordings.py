@@ -67,9 +67,10 @@ def test_a_table_of_poses_says_what_was_understood(tmp_path):
     )
     done = paint('inspect', tmp_path / 'poses.csv')
     assert done.returncode == 0, done.stderr
-    first, understood = done.stdout.splitlines()
+    first, understood, stream = done.stdout.splitlines()
     assert first.startswith('2 poses in a frame that is not named over 0.020 s: x 0.015 to 0.095,')
     assert understood.startswith('2 poses: x y z in mm; Euler angles A [deg] B [deg] C [deg]')
+    assert stream.startswith('50.0 a second, 0 gaps, longest interval 0.020 s, 0 repeated and 0')
     told = json.loads(paint('inspect', tmp_path / 'poses.csv', '--json').stdout)
     assert told['high_m'] == [0.095, 0.0, 0.0]
 

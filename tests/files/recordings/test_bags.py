@@ -103,7 +103,7 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
         ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
         ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
-        ('evo_nav2_turtlebot.mcap', ('odom',), '/odom in .* is nav_msgs/msg/Odometry, not geom'),
+        ('evo_nav2_turtlebot.mcap', ('tf',), '/tf in .* is tf2_msgs/msg/TFMessage, not geom'),
         ('rosbag2_topics_and_services.mcap', (), 'it has no PoseStamped topic'),
         ('evo_none.mcap', (), 'no bag at .*evo_none.mcap'),
         ('../README.md', (), 'is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap'),

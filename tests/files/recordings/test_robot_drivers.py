@@ -156,7 +156,7 @@ DRIVERS = {
     'named topics': (
         BOTH, {'urdf': 'arm', 'pose_topic': '/egm/joint_states'}, '--pose-topic /egm/joint_states',
     ),
-    'millimetres': ((MILLIMETRES,), {'pose_unit': 'mm'}, 'give --pose-unit mm'),
+    'millimetres': ((MILLIMETRES,), {'pose_unit': 'mm'}, ''),
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
     'transform': ((poses('/vicon/bell', 'TransformStamped'),), {}, ''),
@@ -189,16 +189,23 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, folder, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ('every', 'times', 'words'),
+    ('stream', 'words'),
     [
-        (50, 1, r'/rws/joint_states: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate'),
-        (1, 3, r'/rws/joint_states: 480 of 751 samples repeat .* dropped, and 83.3 a second'),
+        (
+            joints('/rws', ABB_JOINTS, SWEEP, every=50),
+            '/rws: only 5 samples a second: .* 20 cm at 1 m/s, .* polling_rate',
+        ),
+        (
+            joints('/rws', ABB_JOINTS, SWEEP, times=3),
+            '/rws: 480 of 751 samples repeat .* dropped, and 83.3 a second',
+        ),
+        (MILLIMETRES, '/arm_PoseStamped: its positions reach 1277 .* give --pose-unit mm'),
     ],
 )
-def test_what_was_taken_in_silence_is_told(every, times, words, folder, tmp_path):
-    stream = joints('/rws/joint_states', ABB_JOINTS, SWEEP, every, times)
-    read = read_recording(bag(tmp_path / 'run', stream), urdf=str(folder / 'arm.urdf'))
-    (told,) = (line for line in read.warnings if '/rws' in line)
+def test_what_was_taken_in_silence_is_told(stream, words, folder, tmp_path):
+    given = {} if stream is MILLIMETRES else {'urdf': str(folder / 'arm.urdf')}
+    read = read_recording(bag(tmp_path / 'run', stream), **given)
+    (told,) = (line for line in read.warnings if line.startswith(('/rws: ', '/arm_')))
     assert re.match(words, told)
 
 

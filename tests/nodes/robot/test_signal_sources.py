@@ -111,7 +111,7 @@ class Supply:
         try:
             yield self
         finally:
-            self._wait(server.stop())
+            self._wait(self._end(server))
             self._loop.call_soon_threadsafe(self._loop.stop)
             thread.join()
 
@@ -126,6 +126,13 @@ class Supply:
             self._nodes[name] = await gun.add_variable(*called, value)
         await server.start()
         return server
+
+    async def _end(self, server: Server) -> None:
+        await server.stop()
+        left = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in left:
+            task.cancel()
+        await asyncio.gather(*left, return_exceptions=True)
 
     def set(self, name: str, value, at: datetime) -> None:
         data = ua.DataValue(ua.Variant(value), SourceTimestamp=at)

@@ -118,11 +118,14 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
         'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
         **vars(quality),
     }  # fmt: skip
-    line = f'poses: {_stream_words(quality, poses.frame_id, "m")}: {box_words(low, high)}'
-    return figures, '\n'.join([line, *poses.notes])
+    frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {box_words(low, high)}'
+    return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 
 def _bag_contents(summary: BagSummary) -> str:
+    from paint_deposition.files.recordings.message_definitions import TF_TYPES
+
     lines = [summary.path]
     width = max((len(topic.name) for topic in summary.topics), default=0)
     lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
@@ -130,6 +133,8 @@ def _bag_contents(summary: BagSummary) -> str:
         lines += _source_lines(source)
     if not summary.pose_streams:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
+    if {topic.type for topic in summary.topics} & {*TF_TYPES}:
+        lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
     lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
     return '\n'.join(lines)
 
@@ -138,31 +143,29 @@ def _source_lines(source: PoseSource) -> list[str]:
     """One source of poses: its figures, and whether it will do."""
     from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 
-    what = {JOINT_TYPE: 'joints on ', 'transforms': 'transforms from '}.get(
-        source.type, 'poses on '
-    )
+    kinds = {JOINT_TYPE: 'joints on', 'transforms': 'transforms from'}
+    what = f'{kinds.get(source.type, "poses on")} {source.topic}'
     if source.quality is None:
-        return [f'{what}{source.topic} will not do: {source.faults[0]}']
+        return [f'{what} will not do: {source.faults[0]}']
+    frame = f" in frame '{source.frame_id}'" if source.frame_id else ''
     return [
-        f'{what}{source.topic}: {_stream_words(source.quality, source.frame_id, source.unit)}',
+        f'{what}: {source.quality.poses}{frame} over {source.quality.duration_s:.3f} s, '
+        f'{_stream_words(source.quality)}, in {source.unit}',
         *(f'  warning: {fault}' for fault in source.faults),
         f'  {"to be used with care" if source.faults else "will do"}: {source.options}',
     ]
 
 
-def _stream_words(quality: StreamQuality, frame_id: str, unit: str) -> str:
-    frame = f" in frame '{frame_id}'" if frame_id else ' in a frame that is not named'
-    frame = '' if unit in ('rad', 'deg') else frame
+def _stream_words(quality: StreamQuality) -> str:
     lag = ''
     if quality.lag_s is not None and quality.lag_range_s is not None:
         low, high = quality.lag_range_s
         lag = f', logged {quality.lag_s:.3g} s after the stamp ({low:.3g} to {high:.3g})'
     return (
-        f'{quality.poses}{frame} over {quality.duration_s:.3f} s, '
         f'{quality.mean_rate_hz:.1f} a second, {quality.gaps} gaps, longest interval '
         f'{quality.longest_gap_s:.3f} s, {quality.repeated_stamps} repeated and '
-        f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated samples, '
-        f'in {unit}{lag}'
+        f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated '
+        f'samples{lag}'
     )
 
 

@@ -75,7 +75,7 @@ def _other_unit(view: GunView) -> str:
     if way > OTHER_UNIT * part:
         return (
             f'the poses look like millimetres: they span {way:.4g} m, the part {part:.3g} m; give '
-            'the poses in metres'
+            '--pose-unit mm, or the poses in metres'
         )
     if way > 0.0 and part > OTHER_UNIT * way and view.distance_m.min() > FAR_M:
         return (

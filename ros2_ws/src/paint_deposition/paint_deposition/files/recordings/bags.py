@@ -102,10 +102,12 @@ def motion_of(
         else:
             read, log_times_ns, name = read_poses(bag, pose_topic)
         if not pose_unit and looks_like_mm(read.positions_m):
-            raise RecordingError(
-                f'{name} in {bag.path} reaches {np.abs(read.positions_m).max():.4g} and is read '
-                'in m, as ROS has it: no part is so far away; give --pose-unit mm, or m if it is'
+            far = (
+                f'{name}: its positions reach {np.nanmax(np.abs(read.positions_m)):.4g} and are '
+                'read in m, as ROS has them: no part is so far away; give --pose-unit mm, or m '
+                'if it is'
             )
+            read = replace(read, warnings=(*read.warnings, far))
         read = replace(read, positions_m=read.positions_m * LENGTHS[pose_unit or 'm'])
     poses = np.hstack([read.positions_m, read.quaternions_xyzw])
     faults = StreamQuality.of(read.stamps_ns, poses).faults(name)

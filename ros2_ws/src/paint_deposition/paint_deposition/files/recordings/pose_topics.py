@@ -38,14 +38,14 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
     The only one is that of PoseStamped, or where there is none that of another type.
     """
+    kind = 'pose' if {topic.type for topic in pose_topics(bag)} - {POSE_TYPE} else 'PoseStamped'
     if not name:
         candidates = bag.topics_of(POSE_TYPE) or pose_topics(bag)
         if len(candidates) != 1:
-            others = bool(candidates) and candidates[0].type != POSE_TYPE
-            listed = listed_topics(candidates, 'pose' if others else 'PoseStamped')
+            listed = listed_topics(candidates, kind)
             raise RecordingError(f'{bag.path}: name a pose topic; {listed}{_other_motion(bag)}')
         name = candidates[0].name
-    topic = bag.choose(_element(name)[0], tuple(POSES), 'pose')
+    topic = bag.choose(_element(name)[0], tuple(POSES), kind)
     if topic.message_count == 0:
         raise RecordingError(f'{topic.name} in {bag.path} has no messages; record it again')
     return topic

@@ -62,15 +62,9 @@ class PoseTable(Table):
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
-            path,
-            sheet.form,
-            headings,
-            sheet.rows,
-            sheet.lines,
-            RecordingError,
-            names=names,
+            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names,
             log=log,
-        ).select(below)
+        ).select(below)  # fmt: skip
         if not len(table):
             raise table.error('no poses below the row of headings')
         for k, row in enumerate(table.rows):

@@ -2,10 +2,11 @@
 
 import json
 from base64 import b64encode
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from datetime import datetime
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -36,13 +37,8 @@ def write_report(path: Path, data: ReportData) -> Path:
 
 def report_html(data: ReportData) -> str:
     """The page as text."""
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    environment = Environment(
-        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
-        trim_blocks=True, lstrip_blocks=True,
-    )  # fmt: skip
     filters: dict[str, Callable[..., str]] = {
         'um': words.fixed,
         'signed': lambda value: words.fixed(value, signed=True),
@@ -57,7 +53,6 @@ def report_html(data: ReportData) -> str:
         'step': words.step_words,
         'shares': tables.shares_in_words,
     }
-    environment.filters.update(filters)
     drawn = [
         charts.parity_figure(data),
         charts.covariate_figure(data),
@@ -70,7 +65,8 @@ def report_html(data: ReportData) -> str:
     figures = [figure for figure in drawn if figure]
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
     (places, sprays), git = data.proposals, git_version()
-    return environment.get_template('report.html.j2').render(
+    return from_template(
+        'report.html.j2', filters,
         data=data,
         headline=headline(data),
         key_figures=key_figures(data),
@@ -100,18 +96,30 @@ def report_html(data: ReportData) -> str:
         figures=[figure['name'] for figure in figures],
         content=content.replace('<', '\\u003c'),  # it stands inside a script element
         parts=[
-            list(map(_embedded, comparison.part_figures(data, k)))
+            list(map(embedded, comparison.part_figures(data, k)))
             for k in range(len(data.experiments))
         ],
-        profiles=list(map(_embedded, comparison.profile_figures(data))),
+        profiles=list(map(embedded, comparison.profile_figures(data))),
         profile_legend=comparison.profile_legend(data),
-        style=(TEMPLATES / 'report.css').read_text(encoding='utf-8'),
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
-    )
+    )  # fmt: skip
 
 
-def _embedded(figure: Figure) -> str:
+def from_template(name: str, filters: Mapping[str, Callable[..., str]], **given: Any) -> str:
+    """A page from its template, in the style that all pages share."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters.update(filters)
+    style = (TEMPLATES / 'report.css').read_text(encoding='utf-8')
+    return environment.get_template(name).render(style=style, **given)
+
+
+def embedded(figure: Figure) -> str:
     """A picture as the address of an image that needs no file."""
     content = BytesIO()
     figure.savefig(content, format='png', dpi=DOTS_PER_INCH, facecolor='white')

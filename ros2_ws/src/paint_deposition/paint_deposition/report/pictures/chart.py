@@ -15,6 +15,9 @@ from paint_deposition.film.colour_scales import TABLE, ColourScale
 from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
 
 DOTS_PER_INCH = 150
+# Pictures of a page are as wide as a phone or half a sheet of paper [in], so that their lettering
+# is that of the page.
+PAGE_IN, TEXT_PT = 3.8, 8.0
 MM = 1e3
 
 

@@ -7,29 +7,30 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 
 from paint_deposition.film.colour_scales import film_scale, residual_scale
-from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
 from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.chart import MM, colour_bar, new_figure, quiet
-from paint_deposition.report.pictures.part import HALO, PartPicture, draw_tool_path
+from paint_deposition.report.pictures.chart import (
+    MM,
+    PAGE_IN,
+    TEXT_PT,
+    colour_bar,
+    new_figure,
+    quiet,
+)
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import HALO, PartPicture
 from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
-# Pictures of the page are as wide as a phone or half a sheet of paper [in], so that their
-# lettering is that of the page.
-PAGE_IN, TEXT_PT = 3.8, 8.0
 # As many letters of a title fit over a chart; one that is longer is written smaller.
 TITLE_LETTERS = 48
 # A profile's two charts with the room around them, as shares of it, and that of the legend [in].
 PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
 PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
-# A part is drawn no higher than this [in]; few readings beyond the end of the colours do not take
-# the contrast from all others.
-HIGHEST_IN, SHOWN_SHARE = 4.2, 0.98
-# Room above and below the charts of a picture of the page [in].
-AROUND_IN = 1.3
+# Few readings beyond the end of the colours do not take the contrast from all others.
+SHOWN_SHARE = 0.98
 
 
 def part_figures(data: ReportData, index: int) -> list[Figure]:
@@ -37,11 +38,22 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
 
     Readings are dots; the film has the passes and the numbered places to measure next.
     """
+    experiment, part = data.experiments[index], PartPicture.of(data.experiments[index].surface)
+    film_um = data.painted[index][-1].film_um
+    title = f'film predicted, {data.model_names[-1]}'
+    film, axes = page_film(part, film_um, experiment.path, title, film_scale(film_um))
+    for number, place in enumerate(data.proposals[0], start=1):
+        if place.experiment == experiment.name:
+            _draw_place(axes, part, number, place)
+    return [*residual_figures(data, index, part), film]
+
+
+def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Figure]:
+    """A part with the residuals of each model, all on one scale; readings are dots."""
     experiment, rows = data.experiments[index], data.rows_of(index)
     surface, count = experiment.surface, len(experiment)
     points = experiment.points
     positions, normals = points.positions_m[:count], points.normals[:count]
-    part = PartPicture.of(surface)
     room = 0.03 * (part.high_m - part.low_m).max()
     largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), SHOWN_SHARE))
     scale = residual_scale(np.array([largest]))
@@ -49,7 +61,7 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
     figures = []
     for name, residual_um in zip(data.model_names, data.residuals_um, strict=True):
         field = interpolate_over_surface(surface, positions, normals, residual_um[rows])
-        figure, axes = _of_part(part, part.low_m - room, part.high_m + room, f'residual, {name}')
+        figure, axes = part.on_page(part.low_m - room, part.high_m + room, f'residual, {name}')
         part.draw(axes, scale.rgba(np.clip(field, -largest, largest), np.isfinite(field)))
         shown_um = np.clip(residual_um[rows], -largest, largest)
         colours = scale.rgba(shown_um, np.ones(count, dtype=bool)) / 255.0
@@ -57,29 +69,7 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
         axes.scatter(x, y, s=14, c=colours, edgecolors=INK, linewidths=0.6, zorder=4)
         colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
         figures.append(figure)
-    film_um = data.painted[index][-1].film_um
-    films = film_scale(film_um)
-    low, high = part.window(experiment.path)
-    figure, axes = _of_part(part, low, high, f'film predicted, {data.model_names[-1]}')
-    part.draw(axes, films.rgba(film_um, film_um > NO_PAINT_UM))
-    draw_tool_path(axes, experiment.path, part.view, low, high)
-    for number, place in enumerate(data.proposals[0], start=1):
-        if place.experiment == experiment.name:
-            _draw_place(axes, part, number, place)
-    colour_bar(figure, [axes], 'film [µm]', films)
-    return [*figures, figure]
-
-
-def _of_part(
-    part: PartPicture, low: np.ndarray, high: np.ndarray, title: str
-) -> tuple[Figure, Axes]:
-    """A picture as wide as the page has room for, and its axes over a part to these corners."""
-    across, upward = high - low
-    figure = new_figure(PAGE_IN, min((PAGE_IN - 0.8) * upward / across, HIGHEST_IN) + AROUND_IN)
-    axes = figure.subplots()
-    part.dress(axes, low, high)
-    axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
-    return figure, axes
+    return figures
 
 
 def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:

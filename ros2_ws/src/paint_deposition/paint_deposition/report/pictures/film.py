@@ -9,10 +9,11 @@ from matplotlib.gridspec import SubplotSpec
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import colours_of, new_figure, quiet
+from paint_deposition.report.pictures.chart import colour_bar, colours_of, new_figure, quiet
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
 
@@ -51,6 +52,26 @@ def film_picture(
     figure.suptitle(title, x=0.02, ha='left', fontsize=13, color=INK)
     axes[0].set_title(fill(subtitle, 110), loc='left', fontsize=9, color=MUTED)
     return figure
+
+
+def page_film(
+    part: PartPicture,
+    film_um: np.ndarray,
+    spray: SprayPath,
+    title: str,
+    scale: ColourScale,
+    corners: tuple[np.ndarray, np.ndarray] | None = None,
+) -> tuple[Figure, Axes]:
+    """A painted part as wide as a page has room for, with its bar of colours, and its axes.
+
+    The picture is of the part with its passes, or up to ``corners`` [m].
+    """
+    low, high = corners or part.window(spray)
+    figure, axes = part.on_page(low, high, title)
+    part.draw(axes, scale.rgba(film_um, film_um > NO_PAINT_UM))
+    draw_tool_path(axes, spray, part.view, low, high)
+    colour_bar(figure, [axes], 'film [µm]', scale)
+    return figure, axes
 
 
 def draw_film(

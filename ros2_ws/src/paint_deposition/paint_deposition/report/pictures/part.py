@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, TriMesh
+from matplotlib.figure import Figure
 from matplotlib.markers import MarkerStyle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
@@ -14,6 +15,7 @@ from matplotlib.tri import Triangulation
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
 from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
 
@@ -23,6 +25,8 @@ MARGIN_IN_PARTS = 1.0
 LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
+# On a page a part is drawn no higher than this, with this room above and below [in].
+HIGHEST_IN, AROUND_IN = 4.2, 1.3
 WAY_OFF = '#3a4048'
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 
@@ -72,6 +76,16 @@ class PartPicture:
             high = np.minimum(np.maximum(high, gun.max(axis=0)), high + margin)
         room = 0.03 * (high - low).max()
         return low - room, high + room
+
+    def on_page(self, low: np.ndarray, high: np.ndarray, title: str) -> tuple[Figure, Axes]:
+        """A picture as wide as a page has room for, and its axes to these corners [m]."""
+        across, upward = high - low
+        height = min((PAGE_IN - 0.8) * upward / across, HIGHEST_IN)
+        figure = new_figure(PAGE_IN, height + AROUND_IN)
+        axes = figure.subplots()
+        self.dress(axes, low, high)
+        axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
+        return figure, axes
 
     def draw(self, axes: Axes, rgba: np.ndarray) -> None:
         """The part in colours of its vertices, (V, 4) uint8: no light falls on them."""

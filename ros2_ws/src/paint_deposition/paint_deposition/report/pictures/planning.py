@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
@@ -19,6 +20,7 @@ from paint_deposition.report.pictures.chart import (
     quiet,
     save_picture,
 )
+from paint_deposition.report.pictures.film import page_film
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 
@@ -105,9 +107,7 @@ def draw_passes(axes: Axes, answer: Recommendation) -> None:
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
-    windows = [part.window(path) for path in result.paths]
-    low = np.minimum(windows[0][0], windows[1][0])
-    high = np.maximum(windows[0][1], windows[1][1])
+    low, high = _window(part, result)
     openings = result.retiming.programme.openings[:MOST_CHARTS]
     columns = min(len(openings), 4)
     rows = math.ceil(len(openings) / columns)
@@ -143,6 +143,22 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
     legend(charts[0, 0], loc='best')
     return save_picture(figure, path)
+
+
+def improved_figures(result: Improvement) -> list[Figure]:
+    """The film before and after for a page, in one scale."""
+    part, scale = PartPicture.of(result.surface), _scale(result)
+    films = zip(('before', 'after'), (result.before, result.after), result.paths, strict=True)
+    return [
+        page_film(part, of.film_um, path, name, scale, _window(part, result))[0]
+        for name, of, path in films
+    ]
+
+
+def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndarray]:
+    """Corners of a picture that holds the passes of both programmes [m]."""
+    lows, highs = zip(*(part.window(path) for path in result.paths), strict=True)
+    return np.minimum(*lows), np.maximum(*highs)
 
 
 def _scale(result: Improvement) -> ColourScale:
