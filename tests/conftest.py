@@ -3,7 +3,6 @@
 import os
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -75,22 +74,16 @@ def shared_data() -> Path:
     return SHARED_DATA
 
 
-@contextmanager
-def blank_pictures() -> Iterator[None]:
-    """Pictures are composed and written blank: drawing them costs more than most commands."""
+@pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures are composed and written blank: drawing them costs more than most commands.
+
+    For tests that do not look at them. Those of fixtures of a wider scope are drawn.
+    """
     from matplotlib.figure import Figure
 
     save = Figure.savefig
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
-        yield
-
-
-@pytest.fixture
-def undrawn() -> Iterator[None]:
-    """For tests that do not look at pictures. Those of fixtures of a wider scope are drawn."""
-    with blank_pictures():
-        yield
+    monkeypatch.setattr(Figure, 'savefig', lambda _, *to, **how: save(Figure((1, 1)), *to, **how))
 
 
 @pytest.fixture(scope='session')
