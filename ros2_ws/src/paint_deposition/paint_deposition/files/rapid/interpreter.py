@@ -7,7 +7,7 @@ from typing import Any
 
 from lark import Token
 
-from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine
+from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine, line_of
 from paint_deposition.files.rapid.values import Datum, Unknown, Values
 
 MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
@@ -164,7 +164,7 @@ class Interpreter(Values):
     def _if(self, *parts: Any) -> None:
         given = iter([part for part in parts if part is not None])
         for word in given:
-            self.line = word.line
+            self.line = line_of(word)
             condition = word == 'else' or self.value(next(given))
             body = next(given)
             if isinstance(condition, Unknown):
@@ -177,7 +177,7 @@ class Interpreter(Values):
     def _while(self, word: Token, condition: Any, body: Node) -> None:
         leaves = any(i.name in LEAVING for i in self.reached(body))
         for turn in count():
-            self.line = word.line
+            self.line = line_of(word)
             going_on = self.value(condition)
             if isinstance(going_on, Unknown):
                 return self._only_if_idle(word, going_on.reason, body)
@@ -189,7 +189,7 @@ class Interpreter(Values):
         return None
 
     def _for(self, word: Token, name: Token, *parts: Any) -> None:
-        self.line = word.line
+        self.line = line_of(word)
         *nodes, body = (part for part in parts if part is not None)
         bounds = [self.value(node) for node in nodes]
         for bound in bounds:
@@ -208,7 +208,7 @@ class Interpreter(Values):
         return None
 
     def _test(self, word: Token, node: Any, *cases: Node | None) -> None:
-        self.line = word.line
+        self.line = line_of(word)
         value, given = self.value(node), [case for case in cases if case]
         if isinstance(value, Unknown):
             return self._only_if_idle(word, value.reason, *given)
@@ -235,7 +235,7 @@ class Interpreter(Values):
                 name = reference.children[0]
                 unknown = Unknown(name, f'{name}, which depends on {reason}')
                 self.assign(Node('reference', [name]), unknown)
-        self._told(str(word), word.line)
+        self._told(str(word), line_of(word))
 
 
 def _assigned(node: Node) -> Iterator[Node]:

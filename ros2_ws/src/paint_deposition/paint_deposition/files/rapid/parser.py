@@ -73,6 +73,9 @@ class _Builder(Transformer):
 
     number = float
 
+    def __default__(self, rule: str, children: list, _place: Any) -> Node:
+        return Node(str(rule), children)
+
     def numbers(self, text: str) -> list:
         return json.loads(text, parse_int=float)
 
@@ -108,7 +111,7 @@ class _Builder(Transformer):
         return [part for part in parts if not isinstance(part, dict)], options
 
     def instruction(self, name: Token, arguments: tuple[list, dict]) -> Instruction:
-        return Instruction(str(name), name.line, *arguments)
+        return Instruction(str(name), line_of(name), *arguments)
 
     def datum(self, name: str, sizes: list | None, value: Any) -> Declared:
         return Declared(str(name), '', sizes, value)
@@ -129,11 +132,15 @@ class _Builder(Transformer):
         return Routine(names[-1], parameters, body, '')
 
 
+def line_of(token: Token) -> int:
+    """Where a word stands; those of a grammar without texts have none."""
+    return token.line or 0
+
+
 @cache
 def _grammar() -> Lark:
     text = GRAMMAR.read_text(encoding='utf-8')
-    options: dict[str, Any] = {'parser': 'lalr', 'maybe_placeholders': True, 'tree_class': Node}
-    return Lark(text, transformer=_Builder(), **options)
+    return Lark(text, parser='lalr', transformer=_Builder())
 
 
 def parse_modules(text: str, source: str) -> list[Module]:
@@ -147,7 +154,7 @@ def parse_modules(text: str, source: str) -> list[Module]:
     except UnexpectedInput as error:
         token = getattr(error, 'token', None)
         if token is None:
-            reason = f'{text.lower()[error.pos_in_stream]!r} is not RAPID'
+            reason = f'{text.lower()[error.pos_in_stream or 0]!r} is not RAPID'
         else:
             reason = f'{str(token) or "the end"!r} is not expected here'
             reason += (
