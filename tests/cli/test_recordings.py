@@ -1,6 +1,7 @@
 """`paint inspect` and `paint recover`, as a user runs them."""
 
 import json
+from importlib.util import find_spec
 
 import pytest
 import trimesh
@@ -129,3 +130,12 @@ def test_a_program_has_no_topics_and_a_bag_no_gun_signal(tmp_path):
     for command in (('inspect',), ('simulate', *given)):
         done = paint(*command, SAMPLES / 'door_horizontal', '--gun-signal', 'doGun')
         assert_refused(done, '--gun-signal is for RAPID modules')
+
+
+@pytest.mark.skipif(find_spec('rerun') is not None, reason='Rerun would open a window')
+@pytest.mark.parametrize(
+    ('run', 'words'),
+    [(SAMPLES, 'no .mcap file'), (SAMPLES / 'door_horizontal', 'pip install rerun-sdk')],
+)
+def test_a_run_that_rerun_cannot_show_says_why(run, words):
+    assert_refused(paint('view', run), words)

@@ -17,6 +17,7 @@ EXAMPLES = {
     'recover': 'my_broken_run -o recovered',
     'place': '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map',
     'watch': 'door_horizontal --mesh door.stl --trigger /atomizer/state',
+    'view': 'door_horizontal',
     'demo': '-o my_demo',
     'doctor': '--json',
 }

@@ -33,6 +33,7 @@ COMMANDS = {
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
     'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
+    'view': ('view', 'Open a recorded run in Rerun, where that is installed.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
     'doctor': ('doctor', 'Say what is installed, and test it.'),
