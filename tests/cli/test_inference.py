@@ -301,6 +301,6 @@ def test_zeros_where_film_is_expected_are_named_until_they_are_said_to_be_missin
         assert told[zero].returncode == 0, told[zero].stderr
     warning = f'warning: door: 12 of {len(rows)} readings are 0 where the model expects '
     assert warning in told[''].stderr
-    assert 'say zero: missing, or zero: film' in told[''].stderr
+    assert 'say zero: missing in the campaign' in told[''].stderr
     assert 'readings are 0' not in told['missing'].stderr
     assert '12 rows without a reading' in told['missing'].stderr
