@@ -184,6 +184,7 @@ def test_conditions_without_moves_do_no_harm(read):
         ('IF TestDI(di) Incr reg1;\nSetBrush reg1;', 'line 5: reg1, which depends on testdi()'),
         (f'TriggL {target(1)},v1,on,z1,tBell;', 'line 4: on is not declared in the modules given'),
         ('GOTO again;', 'line 4: goto is not understood'),
+        (r'MoveL p,v100,fine,tBell\Corr;', r'movel has no option \corr'),
         ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
         ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
         ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and joint'),
@@ -204,6 +205,12 @@ def test_conditions_without_moves_do_no_harm(read):
 )  # fmt: skip
 def test_what_cannot_be_followed_is_named(read, body, says):
     assert says in refusal(read, body)
+
+
+def test_a_misspelt_option_of_a_procedure_is_refused(read):
+    procedure = 'PROC rPaint(num n \\num Brush)\nSetBrush Brush;\nENDPROC'
+    says = refusal(read, 'rPaint 1\\Bursh:=2;', procedures=procedure)
+    assert "rpaint has no option \\bursh; did you mean 'brush'?" in says
 
 
 def test_loops_in_loops_end(read, monkeypatch):

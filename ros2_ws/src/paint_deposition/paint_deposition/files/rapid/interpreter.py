@@ -1,12 +1,13 @@
 """Running a RAPID program: its control flow and the calls of its routines."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from itertools import count
 from typing import Any
 
 from lark import Token
 
+from paint_deposition.errors import did_you_mean
 from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine, line_of
 from paint_deposition.files.rapid.values import Datum, Unknown, Values
 
@@ -63,6 +64,8 @@ class Interpreter(Values):
         needed = [one.name for one in routine.parameters if not one.optional]
         if len(needed) != len(values):
             self.fail(f'{routine.name} takes {len(needed)} arguments, not {len(values)}')
+        optional = [one.name for one in routine.parameters if one.optional]
+        self.only_options(routine.name, options, optional)
         given = dict(zip(needed, values, strict=True)) | options
         own = {
             one.name: Datum(one.type, self.value(given[one.name]))
@@ -80,6 +83,12 @@ class Interpreter(Values):
             if one.shared and isinstance(node, Node) and node.rule == 'reference':
                 self.assign(node, own[one.name].value)
         return result
+
+    def only_options(self, name: str, options: Iterable[str], known: Sequence[str]) -> None:
+        """Refuse an optional argument that is not known; a misspelt one would do nothing."""
+        for option in options:
+            if option not in known:
+                self.fail(f'{name} has no option \\{option}; {did_you_mean(option, known)}')
 
     def reached(self, node: Any, seen: frozenset[str] = frozenset()) -> Iterator[Instruction]:
         """All instructions in a block, and in the routines that it calls."""

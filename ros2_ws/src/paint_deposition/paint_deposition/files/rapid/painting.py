@@ -22,6 +22,9 @@ MOVES = {
     'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
 }  # fmt: skip
 TRIGGERS = tuple(f't{number}' for number in range(2, 9))
+# Of the options of moves what the film sees, and what it does not; a path that a sensor corrects
+# (`\Corr`) is not known.
+MOVE_OPTIONS = ('v', 't', 'wobj', *TRIGGERS, 'conc', 'id', 'z', 'inpos', 'tload')
 MOST_JOINTS = 6
 HOME = frame(NOWHERE)
 
@@ -140,6 +143,7 @@ class Painting(Interpreter):
 
     def _move(self, i: Instruction) -> None:
         targets = MOVES[i.name]
+        self.only_options(i.name, i.options, MOVE_OPTIONS)
         parts, between = self._arguments(i, targets)
         name, base = self._work_object(i)
         displaced = product(base, self._displacement)
