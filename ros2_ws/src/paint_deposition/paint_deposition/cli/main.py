@@ -18,7 +18,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # Command, the module with its function, COMMAND_command, and what the list of commands says.
 # Modules are only loaded when their command is used, so that help comes at once.
 COMMANDS = {
-    'demo': ('demo', 'A first film, and what readings make of it, in a minute.'),
+    'demo': ('demo', 'A first film, and what readings make of it, on one page.'),
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
     'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
     'recommend': ('planning', 'Recommend the index between passes.'),
