@@ -7,13 +7,10 @@ import numpy as np
 
 from paint_deposition.errors import PlanError
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_pose
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.part_place import PartPlaces, part_places
-
-# Frames of poses that are relative to the part.
-PART_FRAMES = ('', 'part')
 
 
 def read_robot(
@@ -60,6 +57,6 @@ def place(
         free_roll: the tool may be turned about its own axis, as where the pattern is round.
         progress: called with what is being done and the share of it that is done, 0 to 1.
     """
-    if trajectory.frame_id not in PART_FRAMES:
+    if not is_frame(trajectory.frame_id, 'part'):
         trajectory = at_part(trajectory, cell.part.values, 'part')
     return part_places(trajectory, cell, np.array(x_m), np.array(y_m), free_roll, progress)

@@ -6,6 +6,7 @@ where that of a bell points into it. There are no speeds, and no gun: it sprays 
 
 import itertools
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def read_tool_path(path: Path) -> Trajectory:
         'chooses speeds for it'
     )
     found = timed(moves, gun_known=True)
-    return Trajectory(**{**vars(found), 'warnings': (*found.warnings, warning)})
+    return replace(found, warnings=(*found.warnings, warning))
 
 
 def _segments(path: Path, node: Any) -> Iterator[list[list[float]]]:

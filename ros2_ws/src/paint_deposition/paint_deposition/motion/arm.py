@@ -78,21 +78,3 @@ def _turns(axis: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
     cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     sin, cos = np.sin(angle_rad)[..., None, None], np.cos(angle_rad)[..., None, None]
     return np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross)
-
-
-@dataclass(frozen=True)
-class JointMotion:
-    """What drives a motion: the joints over time.
-
-    Attributes:
-        joints: names of the J joints.
-        slides: (J,) bool, whether the joint is in m, not rad.
-        seconds: (M,) since the first pose.
-        values, speeds: (M, J) [rad or m, and per second].
-    """
-
-    joints: tuple[str, ...]
-    slides: np.ndarray
-    seconds: np.ndarray
-    values: np.ndarray
-    speeds: np.ndarray

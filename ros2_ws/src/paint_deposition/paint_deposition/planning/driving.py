@@ -9,8 +9,8 @@ from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
-from paint_deposition.motion.arm import Arm, JointMotion
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.arm import Arm
+from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
 from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
@@ -53,12 +53,6 @@ class Drive:
         share = self.arm.room(self.joints).min(axis=0)
         nearest = int(np.argmin(share))
         return float(share[nearest]), self.arm.joints[nearest]
-
-    @property
-    def joint_motion(self) -> JointMotion:
-        """The joints over time, with their speeds."""
-        arm = self.arm
-        return JointMotion(arm.joints, arm.slides, self.seconds, self.joints, self.speeds)
 
     @property
     def sentence(self) -> str:
@@ -173,13 +167,10 @@ class RobotCell:
 
     def poses(self, trajectory: Trajectory, times_s: np.ndarray) -> tuple[np.ndarray, Rotation]:
         """Positions (N, 3) and turns of the tool in the robot's base at times (N,)."""
-        clock_s = 1e-9 * (trajectory.stamps_ns - trajectory.stamps_ns[0])
-        places = PchipInterpolator(clock_s, trajectory.positions_m)(times_s)
-        turns = Slerp(clock_s, Rotation.from_quat(trajectory.quaternions_xyzw))(times_s)
-        stands = self.part.rotation
-        return (
-            places @ stands.T + self.part.translation_m, Rotation.from_matrix(stands) * turns
-        )  # fmt: skip
+        in_base = moved(trajectory, self.part, '')
+        clock_s = 1e-9 * (in_base.stamps_ns - in_base.stamps_ns[0])
+        turns = Slerp(clock_s, Rotation.from_quat(in_base.quaternions_xyzw))
+        return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
 
 
 def _joints(

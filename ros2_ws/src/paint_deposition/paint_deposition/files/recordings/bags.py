@@ -18,13 +18,13 @@ from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
 from paint_deposition.files.tables.headings import LENGTHS
-from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 from paint_deposition.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
+    from paint_deposition.planning.driving import Drive
 
 POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
@@ -121,13 +121,13 @@ def write_pose_bag(
     state_topic: str = STATE_TOPIC,
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
-    joints: JointMotion | None = None,
+    drive: Drive | None = None,
 ) -> Path:
     """Write a trajectory as a new rosbag2 folder (MCAP): PoseStamped and the trigger.
 
     The trigger is Bool, or AtomizerState for other flows than 0 and 1 and for numbered brushes.
-    ``part`` is name and pose of the part's frame, for /tf_static; ``joints`` drive the motion and
-    are written as one JointTrajectory.
+    ``part`` is name and pose of the part's frame, for /tf_static; the joints of ``drive`` are
+    written as one JointTrajectory.
     """
     poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     broken = np.flatnonzero(~np.isfinite(poses).all(axis=1))
@@ -157,10 +157,10 @@ def write_pose_bag(
             stamped = types.types['geometry_msgs/msg/TransformStamped'](header, child, transform)
             cdr = types.serialize_cdr(types.types[TF_TYPES[0]]([stamped]), TF_TYPES[0])
             run.write('/tf_static', bytes(cdr), begin_ns, begin_ns)
-        if joints:
+        if drive:
             begin_ns = int(trajectory.stamps_ns[0])
             _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
-            message = _joint_trajectory(types, _header(types, begin_ns, ''), joints)
+            message = _joint_trajectory(types, _header(types, begin_ns, ''), drive)
             cdr = types.serialize_cdr(message, JOINT_TRAJECTORY_TYPE)
             run.write(JOINT_TOPIC, bytes(cdr), begin_ns, begin_ns)
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
@@ -174,7 +174,7 @@ def write_pose_bag(
     return run.folder
 
 
-def _joint_trajectory(types: Typestore, header: Any, joints: JointMotion) -> Any:
+def _joint_trajectory(types: Typestore, header: Any, drive: Drive) -> Any:
     point, duration = (
         types.types[name]
         for name in ('trajectory_msgs/msg/JointTrajectoryPoint', 'builtin_interfaces/msg/Duration')
@@ -183,10 +183,10 @@ def _joint_trajectory(types: Typestore, header: Any, joints: JointMotion) -> Any
     points = [
         point(position, speed, none, none, duration(int(time_s), round(time_s % 1.0 * 1e9)))
         for time_s, position, speed in zip(
-            joints.seconds.tolist(), joints.values, joints.speeds, strict=True
+            drive.seconds.tolist(), drive.joints, drive.speeds, strict=True
         )
     ]
-    return types.types[JOINT_TRAJECTORY_TYPE](header, list(joints.joints), points)
+    return types.types[JOINT_TRAJECTORY_TYPE](header, list(drive.arm.joints), points)
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:

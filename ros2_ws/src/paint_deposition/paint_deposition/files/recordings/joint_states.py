@@ -103,11 +103,12 @@ class Robot:
                 frame = np.eye(4)
         axes = np.array([joint.joint_axis for joint in moving])
         lower, upper = np.array([joint.limits for joint in moving]).T
+        fastest = self._fastest()
         return Arm(
             tuple(self.moving_joints), np.array([*frames, frame]),
             axes / np.linalg.norm(axes, axis=1, keepdims=True),
             np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
-            np.array([self._fastest().get(name, np.inf) for name in self.moving_joints]),
+            np.array([fastest.get(name, np.inf) for name in self.moving_joints]),
         )  # fmt: skip
 
     def _fastest(self) -> dict[str, float]:

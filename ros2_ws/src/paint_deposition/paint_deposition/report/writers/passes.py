@@ -19,10 +19,10 @@ from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.files.tool_path import write_tool_path
-from paint_deposition.motion.arm import JointMotion
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.planning.driving import Drive
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
 TOOL_PATH = 'passes.yaml'
@@ -43,7 +43,7 @@ class Passes:
     # The robot's frame and the pose of the part in it; bag and table have their poses in that
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
-    joints: JointMotion | None = None  # that drive it
+    drive: Drive | None = None  # the joints that drive it
     paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
 
 
@@ -64,9 +64,9 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     write_text(folder / PROGRAM, module)
     write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
     write_model(folder / MODEL_FILE, passes.model)
-    if passes.joints:
-        write_table(folder / JOINTS, _joint_table(passes.joints))
-    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.joints else [])]
+    if passes.drive:
+        write_table(folder / JOINTS, _joint_table(passes.drive))
+    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.drive else [])]
 
 
 def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
@@ -97,10 +97,10 @@ def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
         ]
 
 
-def _joint_table(joints: JointMotion) -> Iterator[Sequence[object]]:
-    units = np.where(joints.slides, 'm', 'rad')
-    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(joints.joints, units, strict=True))
-    for time_s, values in zip(joints.seconds, joints.values, strict=True):
+def _joint_table(drive: Drive) -> Iterator[Sequence[object]]:
+    units = np.where(drive.arm.slides, 'm', 'rad')
+    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(drive.arm.joints, units, strict=True))
+    for time_s, values in zip(drive.seconds, drive.joints, strict=True):
         yield [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
 
 
@@ -119,7 +119,7 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
         fresh = write_pose_bag(
             Path(aside) / target.name, placed,
             custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
-            part=(trajectory.frame_id, part[1]) if part else None, joints=passes.joints,
+            part=(trajectory.frame_id, part[1]) if part else None, drive=passes.drive,
         )  # fmt: skip
         if target.exists():
             shutil.rmtree(target)

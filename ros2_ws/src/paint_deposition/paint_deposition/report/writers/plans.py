@@ -70,9 +70,8 @@ def _passes(
     surface, improved = result.surface, isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    joints = result.drive.joint_motion if result.drive else None
     passes = Passes(
-        result.trajectory, result.moves, result.model, made, part, joints, paint_moves,
+        result.trajectory, result.moves, result.model, made, part, result.drive, paint_moves,
     )  # fmt: skip
     files = [folder / one for one in (name, *write_passes(folder, passes))]
     given = result.original.notes if isinstance(result, Improvement) else ()
