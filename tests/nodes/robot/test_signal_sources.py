@@ -183,7 +183,9 @@ def test_variables_of_a_material_supply_count_from_their_own_time(
         )
         spin(node)
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
-        at = datetime.now(timezone.utc) - timedelta(milliseconds=80)
+        # Behind the state before, or the opening would count from that.
+        first_s = 1e-9 * stamp_ns(states.newest('atomizer/state').header)
+        at = datetime.fromtimestamp(first_s, timezone.utc) + timedelta(milliseconds=1)
         supply.set('Open', True, at)
         wait_until(lambda: len(states.heard['atomizer/state']) == 2, what='the opening')
         opened = states.newest('atomizer/state')
