@@ -93,14 +93,40 @@ class PartPicture:
         self._draw_edges(axes)
 
     def draw_bands(
-        self, axes: Axes, film_um: np.ndarray, ends_um: list[float], colours: list[str]
+        self,
+        axes: Axes,
+        film_um: np.ndarray,
+        ends_um: list[float],
+        colours: list[str],
+        shown: np.ndarray | None = None,
     ) -> None:
-        """The part with a colour for each band of the film, (V,) at the vertices [um]."""
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
+        """The part with a colour for each band of the film, (V,) at the vertices [um].
+
+        ``shown`` (n, 3) are the triangles to draw; default: all that are seen.
+        """
+        faces = self.faces[self.seen] if shown is None else shown
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], faces)
         least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
         levels = [least - 1.0, *ends_um, most + 1.0]
         axes.tricontourf(triangles, film_um, levels, colors=colours)
         self._draw_edges(axes)
+
+    def zones(self, number: np.ndarray) -> dict[int, np.ndarray]:
+        """The triangles (n, 3) that are seen of each zone, by numbers (V,) of the vertices."""
+        seen = self.faces[self.seen]
+        of = np.sort(number[seen], axis=1)[:, 1]  # that of two corners, if two agree
+        return {int(k): seen[of == k] for k in np.unique(of)}
+
+    def draw_zone(self, axes: Axes, faces: np.ndarray, name: str) -> None:
+        """The border of a zone's triangles (n, 3), and its name."""
+        edges, of_face = edges_of(faces)
+        border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
+        lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
+        axes.add_collection(lines, False)
+        centres = self.flat_m[faces].mean(axis=1)
+        middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
+        label = axes.annotate(name, centres[middle], fontsize=9, color=INK, ha='center', zorder=5)
+        label.set_path_effects(PALE_HALO)
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
