@@ -54,7 +54,9 @@ def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> 
     although it should be ``coloured``.
     """
     kind = path.suffix.lower()
-    if kind == '.stl' and not coloured and (triangles := _binary_stl(path)):
+    if kind == '.stl' and (triangles := _binary_stl(path)):
+        if coloured:
+            raise _no_colours(path)
         if body not in (None, path.stem):
             raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
         return Bodies(*triangles, 1.0, ())
@@ -156,7 +158,11 @@ def _colours(path: Path, visual: Any, faces: np.ndarray) -> np.ndarray:
         return visual.vertex_colors[faces, :3]
     if visual.kind == 'face':
         return np.repeat(visual.face_colors[:, np.newaxis, :3], 3, axis=1)
-    raise MeshError(
+    raise _no_colours(path)
+
+
+def _no_colours(path: Path) -> MeshError:
+    return MeshError(
         f'{path}: neither its vertices nor its faces have colours; export it with them, as PLY '
         'for instance'
     )

@@ -84,8 +84,9 @@ def film_writer(
         if any(gun.model.brushes for gun in film.guns):
             details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
         return write_film(
-            folder, surface, film_um, figures, zones=zones, stem=stem, statistics_file=f'{stem}.json',
-            details=details, color_range_um=(values['color_min_um'], values['color_max_um']),
+            folder, surface, film_um, figures, zones=zones, stem=stem,
+            statistics_file=f'{stem}.json', details=details,
+            color_range_um=(values['color_min_um'], values['color_max_um']),
         )  # fmt: skip
 
     return write
