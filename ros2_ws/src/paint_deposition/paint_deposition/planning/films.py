@@ -135,7 +135,7 @@ class PlannedFilm:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
         yield from map(str, self.drive.limits if self.drive else ())
-        yield from off_target(self.statistics)
+        yield from self.wanted.doubts(self.statistics)
         at_speed = request.speed_m_per_s and not self.wanted.zones
         if target and at_speed and abs(self.mean_um / target - 1.0) > NEAR:
             yield (
@@ -167,18 +167,6 @@ class PlannedFilm:
             'warnings': list(self.warnings),
             'robot': self.drive and self.drive.to_dict(),
         }
-
-
-def off_target(statistics: FilmStatistics) -> Iterator[str]:
-    """A line for each zone whose mean film lies outside its band."""
-    for name, zone in statistics.zones.items():
-        low, high = zone.band_um
-        if not low <= zone.mean_um <= high:
-            yield (
-                f'zone {name}: the mean film is {zone.mean_um:.1f} µm, outside of '
-                f'{low:g} to {high:g} µm: the passes over it reach its neighbours too; lay passes '
-                'along the border, or allow other speeds (--speed-min, --speed-max)'
-            )
 
 
 def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from paint_deposition.errors import PlanError
+from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 
@@ -29,7 +31,7 @@ class WantedFilm:
         target_um: mean target there; None: it is that of the film as it is.
         elsewhere_um: target outside of the zones, None: none.
         share: (V,) target of each vertex over the mean target.
-        zones: of the vertices, or None.
+        zones: of the vertices, or None. free_m2: what is painted and has no target [m^2].
     """
 
     region: np.ndarray
@@ -37,6 +39,7 @@ class WantedFilm:
     elsewhere_um: float | None
     share: np.ndarray
     zones: PointZones | None = None
+    free_m2: float = 0.0
 
     @staticmethod
     def of(
@@ -60,7 +63,26 @@ class WantedFilm:
         kinds, of = np.unique(targets, return_inverse=True)
         areas = np.bincount(of, area)
         mean = float((areas / areas.sum())[areas > 0.0] @ kinds[areas > 0.0])
-        return WantedFilm(counted, mean, target_um, np.where(counted, targets / mean, 1.0), zones)
+        return WantedFilm(
+            counted, mean, target_um, np.where(counted, targets / mean, 1.0), zones,
+            float(surface.vertex_areas_m2[region & ~counted].sum()),
+        )  # fmt: skip
+
+    def doubts(self, laid: FilmStatistics) -> Iterator[str]:
+        """What of the film that is laid may not be as expected, a line each."""
+        if self.free_m2:
+            yield (
+                f'{self.free_m2:.2g} m2 of what is painted are in no zone and have no target: any '
+                'film is taken there; give --target-um, or a zone over them'
+            )
+        for name, zone in laid.zones.items():
+            low, high = zone.band_um
+            if not low <= zone.mean_um <= high:
+                yield (
+                    f'zone {name}: the mean film is {zone.mean_um:.1f} µm, outside of {low:g} to '
+                    f'{high:g} µm: the passes over it reach its neighbours too; lay passes along '
+                    'the border, or allow other speeds (--speed-min, --speed-max)'
+                )
 
     def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
         """Those of vertices (V,); outside of zones the mean target and tolerance given hold."""

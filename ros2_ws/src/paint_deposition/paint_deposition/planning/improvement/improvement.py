@@ -16,7 +16,7 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
-from paint_deposition.planning.films import evenness, off_target
+from paint_deposition.planning.films import evenness
 from paint_deposition.planning.improvement.nodes import BEND, JOINT, LEAD, ROBOT
 from paint_deposition.planning.improvement.programme import Programme, speed_along
 from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
@@ -210,7 +210,7 @@ class Improvement:
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
         found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
-        found += off_target(self.after.statistics)
+        found += self.wanted.doubts(self.after.statistics)
         off = self.after.mean_um / self.target_um - 1.0
         if abs(off) > OFF_TARGET:
             thick = off > 0.0

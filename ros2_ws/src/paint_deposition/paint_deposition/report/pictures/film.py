@@ -122,8 +122,7 @@ def _draw_band(
                 colours.append(colour)
         colours.append(HIGH if wanted.target_um else NO_TARGET)
         part.draw_bands(axes, film_um, ends, colours, shown)
-        if name:
-            part.draw_zone(axes, shown, name)
+    part.draw_zones(axes, zones)
     draw_tool_path(axes, spray, part.view, low, high)
 
 

@@ -15,6 +15,7 @@ from matplotlib.tri import Triangulation
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
 from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
@@ -117,16 +118,23 @@ class PartPicture:
         of = np.sort(number[seen], axis=1)[:, 1]  # that of two corners, if two agree
         return {int(k): seen[of == k] for k in np.unique(of)}
 
-    def draw_zone(self, axes: Axes, faces: np.ndarray, name: str) -> None:
-        """The border of a zone's triangles (n, 3), and its name."""
-        edges, of_face = edges_of(faces)
-        border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
-        lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
-        axes.add_collection(lines, False)
-        centres = self.flat_m[faces].mean(axis=1)
-        middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
-        label = axes.annotate(name, centres[middle], fontsize=9, color=INK, ha='center', zorder=5)
-        label.set_path_effects(PALE_HALO)
+    def draw_zones(self, axes: Axes, zones: PointZones | None) -> None:
+        """The borders of the zones of the vertices, with their names and targets."""
+        for number, faces in self.zones(zones.number).items() if zones else ():
+            if number < 0:
+                continue
+            zone = zones.zones.zones[number]
+            edges, of_face = edges_of(faces)
+            border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
+            lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
+            axes.add_collection(lines, False)
+            centres = self.flat_m[faces].mean(axis=1)
+            middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
+            label = axes.annotate(
+                f'{zone.name}\n{zone.target_um:g} ± {zone.tolerance_um:g} µm', centres[middle],
+                fontsize=8.5, color=INK, ha='center', va='center', zorder=5,
+            )  # fmt: skip
+            label.set_path_effects(PALE_HALO)
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
