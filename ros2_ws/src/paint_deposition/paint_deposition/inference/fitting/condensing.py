@@ -52,7 +52,7 @@ def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
         part.with_readings(replace(part.readings, thickness_um=film_um[cells.experiment_of == k]))
         for k, part in enumerate(cells.experiments)
     )
-    return replace(campaign, experiments=tuple(made))
+    return replace(campaign, experiments=tuple(made), scanned=len(campaign.readings))
 
 
 def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
