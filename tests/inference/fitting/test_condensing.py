@@ -1,12 +1,14 @@
 """Scans are condensed to the means of small cells, and the user is told."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from inference.fitting.panels import ORDERS, painted_by, passes
+from inference.fitting.panels import ORDERS, column, painted_by, passes
 from paint_deposition.api.inference import compare
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.fitting.condensing import CELLS, condensed
+from paint_deposition.inference.fitting.condensing import CELLS, cells_by_part, condensed
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.report.words import count_words
@@ -39,8 +41,22 @@ def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean
     )
 
 
-def test_what_became_of_a_scan_is_said(scan):
-    study = compare(scan, MODEL).study
-    told = f'{SCANNED} readings were condensed to the means of {len(study)} cells'
+def test_a_few_readings_by_hand_beside_a_scan_are_kept_and_what_became_of_it_is_said(scan):
+    motion = passes(ORDERS[1], samples=80)
+    hand = replace(painted_by(MODEL, motion, column(), noise_um=NOISE_UM), name='by hand')
+    study = compare(Campaign((*scan.experiments, hand)), MODEL).study
+    assert np.array_equal(study.campaign.experiments[1].readings.thickness_um,
+                          hand.readings.thickness_um)  # fmt: skip
+    read = SCANNED + len(hand.readings)
+    told = f'{read} readings were condensed to the means of {len(study)} cells'
     assert any(note.startswith(told) for note in study.notes)
-    assert count_words(study) == f'{SCANNED} readings in {len(study)} cells on panel'
+    assert count_words(study) == f'{read} readings in {len(study)} cells on panel and by hand'
+
+
+@pytest.mark.parametrize(
+    ('points', 'cells'),
+    [((6000,), [300]), ((6000, 40), [260, 40]), ((9000, 20, 500), [140, 20, 140]),
+     ([60] * 12, [25] * 12), ([2] * 400, [1] * 400)],
+)  # fmt: skip
+def test_parts_share_the_cells_evenly(points, cells):
+    assert cells_by_part(points) == cells

@@ -165,7 +165,7 @@ class Study:
         if self.campaign.scanned:
             notes.append(
                 f'{self.campaign.scanned} readings were condensed to the means of {len(self)} '
-                'cells: all figures, and residuals.csv, are of the cells.'
+                'cells, but for parts with few: all figures, and residuals.csv, are of the cells.'
             )
         return (*notes, *self._facet_notes, *self.left_out)
 
