@@ -139,9 +139,9 @@ def read_campaign(
             entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
             experiment = _read_experiment(path.parent, name, entry, remark)
-            if of := entry.zones or file.zones:
-                of = path.parent / of
-            experiments.append(_with_zones(experiment, entry, zones or of))
+            named = entry.zones or file.zones
+            of = zones or (path.parent / named if named else None)
+            experiments.append(_with_zones(experiment, entry, of))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     start = None if file.model is None else str(path.parent / file.model)

@@ -120,10 +120,13 @@ class PartPicture:
 
     def draw_zones(self, axes: Axes, zones: PointZones | None) -> None:
         """The borders of the zones of the vertices, with their names and targets."""
-        for number, faces in self.zones(zones.number).items() if zones else ():
-            if number < 0:
+        if zones is None:
+            return
+        triangles = self.zones(zones.number)
+        for number, zone in enumerate(zones.zones.zones):
+            if number not in triangles:  # it is not seen from here
                 continue
-            zone = zones.zones.zones[number]
+            faces = triangles[number]
             edges, of_face = edges_of(faces)
             border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
             lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
