@@ -75,6 +75,12 @@ class WantedFilm:
                 f'{self.free_m2:.2g} m2 of what is painted are in no zone and have no target: any '
                 'film is taken there; give --target-um, or a zone over them'
             )
+        for one in self.zones.zones.zones if self.zones else ():
+            if one.name not in laid.zones:
+                yield (
+                    f'zone {one.name} is left out: the passes do not paint it, or hardly; give '
+                    'passes over it'
+                )
         for name, zone in laid.zones.items():
             low, high = zone.band_um
             if not low <= zone.mean_um <= high:
