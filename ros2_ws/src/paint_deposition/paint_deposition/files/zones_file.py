@@ -34,7 +34,7 @@ def _number_range(written: Any) -> tuple[int, int]:
     return first, last
 
 
-class _Zone(BaseModel, extra='forbid'):
+class ZoneEntry(BaseModel, extra='forbid'):
     """A zone as it is written; paths are relative to its file."""
 
     name: Annotated[str, BeforeValidator(str), Field(min_length=1, description='what to call it')]
@@ -56,7 +56,7 @@ class _Zone(BaseModel, extra='forbid'):
     )
 
     @model_validator(mode='after')
-    def _complete(self) -> '_Zone':
+    def _complete(self) -> 'ZoneEntry':
         try:
             require_band(self.target_um, self.tolerance_um)
         except PaintError as error:
@@ -95,7 +95,7 @@ def read_zones(
         raise PaintError(f"{path}: 'zones' is no list; begin each zone with a dash")
     zones: list[Zone] = []
     for number, written in enumerate(content['zones'], start=1):
-        entry = checked(_Zone, f'{path}: zone {number}', written, PaintError)
+        entry = checked(ZoneEntry, f'{path}: zone {number}', written, PaintError)
         if entry.name in [zone.name for zone in zones]:
             raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
         try:
@@ -107,7 +107,7 @@ def read_zones(
 
 
 def _regions(
-    folder: Path, entry: _Zone, part: Path, scale: float, body: str | None
+    folder: Path, entry: ZoneEntry, part: Path, scale: float, body: str | None
 ) -> tuple[Region, ...]:
     regions: list[Region] = [Box(np.array(entry.box))] if entry.box else []
     if entry.has_triangles:
