@@ -1,6 +1,6 @@
 """Figures and arrays that the report shows, computed once from the inference's results."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.coats import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
@@ -163,18 +164,16 @@ class ReportData:
         return slice(int(first), int(stop))
 
     @cached_property
-    def painted(self) -> list[list[FilmIntegrator]]:
-        """The surface painted: for each experiment, with each model."""
-        films = []
-        for experiment in self.experiments:
-            surface = experiment.surface
-            points = surface.points()
-            films.append([
-                FilmIntegrator(
-                    points, model.without(experiment.switched_off), 'double', surface.occluder
-                )
-                for model in self.models
-            ])  # fmt: skip
-            for film in films[-1]:
-                film.add(experiment.path)
-        return films
+    def films_um(self) -> list[np.ndarray]:
+        """(V,) film on the surface of each experiment that the last model predicts [um]."""
+        return [sum_um(_painted(one, self.models[-1])) for one in self.experiments]
+
+
+def _painted(experiment: Experiment, model: DepositionModel) -> Iterator[tuple[int, np.ndarray]]:
+    """The wet films (V,) whose sum is measured, each with its sign [um]."""
+    surface, acting = experiment.surface, model.without(experiment.switched_off)
+    points = surface.points()
+    for sign, rows in experiment.films:
+        film = FilmIntegrator(points, acting, 'double', surface.occluder)
+        film.add(experiment.path.select(rows))
+        yield sign, film.film_um

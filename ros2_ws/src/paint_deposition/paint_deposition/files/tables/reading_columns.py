@@ -17,7 +17,7 @@ from paint_deposition.files.tables.table import headings_in, shown, widest
 OWN = {
     'x': 'x_m', 'y': 'y_m', 'z': 'z_m', 'thickness': 'thickness_um', 'point': 'point',
     'group': 'group', 'session': 'session', 'sigma': 'sigma_um',
-    'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
+    'layer': 'layer', 'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
 }  # fmt: skip
 AXES = ('x', 'y', 'z')
 ON_FACE = ('from_left', 'height')
@@ -41,6 +41,7 @@ ALIASES = {
     'row': ('row', 'zeile', 'reihe'),
     'column': ('column', 'col', 'spalte'),
     'group': ('group', 'gruppe'),
+    'layer': ('layer', 'coat', 'coating layer', 'schicht', 'lage', 'lackschicht', 'couche'),
     'block': ('block', 'block no', 'block nr'),
     'unit': ('unit', 'units', 'einheit'),
 }  # fmt: skip
@@ -99,6 +100,12 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
     return known
 
 
+def _is_wet(heading: Heading) -> bool:
+    """Whether a heading names a wet film, as a comb shows it."""
+    words = heading.words
+    return bool({'wet', 'wft', 'nass'} & {*words}) or any(w.startswith('nass') for w in words)
+
+
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
     """Why a file has no such table, and what to do.
 
@@ -126,6 +133,11 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
             remedy += ', or say unit: {thickness: ...} and name it'
         elif likely:
             remedy = f'it may be {" or ".join(map(repr, likely))}: name one'
+        elif wet := [h.text for h in headings if _is_wet(h)]:
+            remedy = (
+                f"'{wet[0]}' is a wet film: say wet: true and solids: 0.45, or what it is, and "
+                'name it'
+            )
         return (
             f'no column is known as the thickness {shown(headings)}; {remedy} '
             'with columns: {thickness: ...} in the campaign'

@@ -17,8 +17,6 @@ from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.write import with_provenance, writable, written
 
-CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
-
 
 @written.register
 def _write_simulation(
@@ -32,8 +30,9 @@ def _write_simulation(
     found = {what: file for what, file in motions.items() if Path(file).exists()}
     about = with_provenance(result.to_dict() | dict(made_from or {}), models, found)
     files = write_film(
-        folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
-    )
+        folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True,
+        coats_um={coat.name: coat.film_um for coat in result.coats},
+    )  # fmt: skip
     if result.readings is not None and result.predicted_um is not None:
         files.append(folder / 'predicted.csv')
         write_predictions(files[-1], result.readings, result.predicted_um)
@@ -55,6 +54,7 @@ def write_film(
     *,
     stem: str = 'film',
     statistics_file: str = 'stats.json',
+    coats_um: Mapping[str, np.ndarray] | None = None,
     details: Mapping[str, Any] | None = None,
     color_range_um: tuple[float, float] = (0.0, 0.0),
     overwrite: bool = False,
@@ -64,6 +64,7 @@ def write_film(
     Args:
         folder: where to; made if it is not there.
         film_um: (V,) film at the vertices of the surface [um].
+        coats_um: (V,) what each coat adds to the film [um], by name: further columns.
         details: more to say in the statistics, such as counts of poses and the files used.
         color_range_um: ends of the colour map in the PLY [um]; both 0 is automatic.
 
@@ -80,9 +81,14 @@ def write_film(
     with writable(folder):
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
-        write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
-        rows = np.column_stack([surface.vertices_m, film_um])
+        films = {'thickness_um': film_um}
+        films |= {f'{name}_um': coat_um for name, coat_um in (coats_um or {}).items()}
+        write_mesh_ply(paths[0], surface, colours, **films)
+        rows, header = np.column_stack([surface.vertices_m, *films.values()]), ','.join(films)
         with replacing(paths[1]) as temporary:
-            np.savetxt(temporary, rows, '%.9g', ',', header=CSV_HEADER, comments='')
+            np.savetxt(
+                temporary, rows, '%.9g', ',', header=f'x_m,y_m,z_m,{header}', comments='',
+                encoding='utf-8',
+            )  # fmt: skip
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
