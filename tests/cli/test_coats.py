@@ -173,13 +173,28 @@ def test_a_column_of_wet_film_tells_the_remedy(folder):
     assert readings.thickness_um.tolist() == [20.0]
 
 
-@pytest.mark.slow
-def test_a_hidden_effect_is_found_through_the_layers(folder, tmp_path):
-    model = pd.DepositionModel().with_effect(AirDrift(shift_down_m=0.05))
-    write_readings(folder, model, ['base', 'total'], noise_um=0.4)
-    done = paint('diagnose', campaign(folder), '-o', tmp_path)
+def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):
+    """The same readings as experiments of their own, of one coat and of both guns together."""
+    hidden = pd.DepositionModel().with_effect(AirDrift(shift_down_m=0.05))
+    write_readings(folder, hidden, ['base', 'total'], noise_um=0.4)
+    header, *rows = (folder / 'readings.csv').read_text().splitlines()
+    motions = {name: {'trajectory': str(folder / name)} for name in COATS}
+    entries = []
+    for name, of_layer, laid in (
+        ('one', rows[:48], motions['base']), ('both', rows[48:], {'guns': [*motions.values()]})
+    ):  # fmt: skip
+        (tmp_path / f'{name}.csv').write_text('\n'.join([header, *of_layer]))
+        entries.append({'name': name, 'mesh': str(PANEL), 'measurements': f'{name}.csv'} | laid)
+    (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump({'experiments': entries}))
+    layered, apart = map(read_campaign, (campaign(folder), tmp_path / 'campaign.yaml'))
+    for model, off in ((hidden, False), (pd.DepositionModel(), True)):
+        one, other = (pd.compare(each, model).points for each in (layered, apart))
+        assert one.residual_um == pytest.approx(other.residual_um, abs=1e-9)
+        assert one.sigma_um == pytest.approx(other.sigma_um, rel=1e-9)
+        assert (one.rmse_um > 1.0) == off
+    write_model(tmp_path / 'hidden.yaml', hidden)
+    done = paint('compare', campaign(folder), '--model', tmp_path / 'hidden.yaml', '-o', tmp_path)
     assert done.returncode == 0, done.stderr
-    assert json.loads((tmp_path / 'diagnosis.json').read_text())['accepted'] == ['air_drift']
     header, *rows = (tmp_path / 'residuals.csv').read_text().splitlines()
     assert header.endswith(',layer')
     assert {(row.split(',')[0], row.split(',')[-1]) for row in rows} == {

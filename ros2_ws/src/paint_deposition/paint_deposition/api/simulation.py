@@ -218,15 +218,14 @@ def simulate(
     if readings is not None:
         progress('predicting the readings', 0.0)
         # Each reading by itself, in double precision, and the slope of the film around it.
-        by_layer = laid.by_layer(readings.layer)
-        no_layer = {'layer': np.array('')} if coats else {}
-        each = replace(readings, point=np.arange(len(readings)).astype(str), **no_layer)
+        each = replace(readings, point=np.arange(len(readings)).astype(str))
+        each = replace(each, layer=np.array('')) if coats else each
         part = Experiment.of('part', surface, seen[0].path, each)
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
         at_readings = LayeredFilm(at_points, laid)
         predicted_um = np.empty(len(part))
-        for layer, rows in by_layer.items():
-            predicted_um[rows] = at_readings.gauge_um(layer)[: len(part)][rows]
+        for layer, seeing in laid.by_layer(readings.layer).items():
+            predicted_um[seeing] = at_readings.gauge_um(layer)[: len(part)][seeing]
         doubts = readings_in_doubt(surface, readings, predicted_um)
     return Film(
         surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,

@@ -42,7 +42,7 @@ class PaintJob(_Gun):
     )
 
 
-class _Coat(PaintJob):
+class CoatEntry(PaintJob):
     """A coat as it is written; what it does not say holds for it as for the experiment."""
 
     wet_on_wet: bool = Field(
@@ -86,7 +86,7 @@ class LaidCoats:
             ReadingsError: naming the coat or the gun and the key at fault.
         """
         coats = [
-            checked(_Coat, f'coat {number}', one, ReadingsError)
+            checked(CoatEntry, f'coat {number}', one, ReadingsError)
             for number, one in enumerate(written, start=1)
         ]
         called = [coat.name for coat in coats]
@@ -94,7 +94,8 @@ class LaidCoats:
             raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
         guns: list[GunMotionFile] = []
         names: list[str] = []
-        for coat in coats or [entry]:
+        jobs: Sequence[PaintJob] = coats or [entry]
+        for coat in jobs:
             given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
             for number, one in enumerate(given, start=1):
                 gun = checked(_Gun, f'gun {number}', one, ReadingsError)
@@ -103,9 +104,7 @@ class LaidCoats:
                 guns.append(_motion(folder, (gun, coat, entry), whose))
             names += [coat.name] * len(given) * bool(coats)
         on_wet = {coat.name for coat in coats if coat.wet_on_wet}
-        solids = tuple(
-            entry.solids if coat.solids is None else coat.solids for coat in coats or [entry]
-        )
+        solids = tuple(entry.solids if coat.solids is None else coat.solids for coat in jobs)
         return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns), solids)
 
     def painted(self, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:

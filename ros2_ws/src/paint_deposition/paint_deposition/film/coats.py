@@ -3,6 +3,7 @@
 import re
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from itertools import accumulate, groupby
 
 import numpy as np
@@ -20,7 +21,7 @@ NAME = re.compile(r'[^\W\d][\w-]*')
 
 def sum_um(films: Iterable[tuple[int, np.ndarray]]) -> np.ndarray:
     """(V,) sum of films (V,) [um], each with its sign."""
-    return sum(sign * film_um for sign, film_um in films)
+    return reduce(np.add, (sign * film_um for sign, film_um in films))
 
 
 @dataclass(frozen=True)
