@@ -63,13 +63,13 @@ def tell(tmp_path_factory, diagnosis, comparisons):
 
     The films on its parts are those of the same models, and painted once.
     """
-    films_um = [ReportData(comparisons[:count]).films_um for count in (1, 2)]
+    painted = ReportData(comparisons).painted
 
     def tell(told, beside=comparisons, proposals=((), ()), older=()) -> Path:
         told = replace(told)
         vars(told).update(comparisons=beside, proposals=proposals)
         data = ReportData.of(told, older)
-        vars(data).update(films_um=films_um[len(beside) - 1])
+        vars(data).update(painted=[films[: len(beside)] for films in painted])
         return write_report(tmp_path_factory.mktemp('report') / 'report.html', data)
 
     return tell

@@ -1,6 +1,6 @@
 """Figures and arrays that the report shows, computed once from the inference's results."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -29,6 +29,13 @@ class Change(NamedTuple):
     least_um: float
     most_um: float
     rms_um: float
+
+
+class Painted(NamedTuple):
+    """The layer of a part that was measured, with one model."""
+
+    film_um: np.ndarray  # (V,) on the surface [um]
+    emitted_cm3: float  # solids that a part which catches everything would get [cm3]
 
 
 @dataclass(frozen=True)
@@ -164,16 +171,20 @@ class ReportData:
         return slice(int(first), int(stop))
 
     @cached_property
-    def films_um(self) -> list[np.ndarray]:
-        """(V,) film on the surface of each experiment that the last model predicts [um]."""
-        return [sum_um(_painted(one, self.models[-1])) for one in self.experiments]
+    def painted(self) -> list[list[Painted]]:
+        """The surface painted: for each experiment, with each model."""
+        return [[_painted(one, model) for model in self.models] for one in self.experiments]
 
 
-def _painted(experiment: Experiment, model: DepositionModel) -> Iterator[tuple[int, np.ndarray]]:
-    """The wet films (V,) whose sum is measured, each with its sign [um]."""
+def _painted(experiment: Experiment, model: DepositionModel) -> Painted:
     surface, acting = experiment.surface, model.without(experiment.switched_off)
     points = surface.points()
+    films = []
     for sign, rows in experiment.films:
         film = FilmIntegrator(points, acting, 'double', surface.occluder)
         film.add(experiment.path.select(rows))
-        yield sign, film.film_um
+        films.append((sign, film))
+    return Painted(
+        sum_um((sign, film.film_um) for sign, film in films),
+        sum(sign * film.emitted_cm3 for sign, film in films),
+    )

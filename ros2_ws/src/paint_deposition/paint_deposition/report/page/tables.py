@@ -155,9 +155,9 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     """For each part its readings, and its film as the best model predicts it."""
     rows = []
     for k, experiment in enumerate(data.experiments):
-        measured = data.study.measured_um[data.rows_of(k)]
+        measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
         film = film_statistics(
-            data.films_um[k], experiment.surface.vertex_areas_m2, 0.0,
+            painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
         )  # fmt: skip
         areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}

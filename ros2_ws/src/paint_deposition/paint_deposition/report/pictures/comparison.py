@@ -39,7 +39,7 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
     Readings are dots; the film has the passes and the numbered places to measure next.
     """
     experiment, part = data.experiments[index], PartPicture.of(data.experiments[index].surface)
-    film_um = data.films_um[index]
+    film_um = data.painted[index][-1].film_um
     title = f'film predicted, {data.model_names[-1]}'
     film, axes = page_film(part, film_um, experiment.path, title, film_scale(film_um))
     for number, place in enumerate(data.proposals[0], start=1):
