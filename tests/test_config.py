@@ -14,7 +14,7 @@ from paint_deposition.files.motion_source import MOTION_KINDS
 from paint_deposition.files.zones_file import ZoneEntry
 
 REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
-OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
+OPTIONAL = ('point', 'group', 'layer', 'sigma_um', 'nx', 'ny', 'nz')
 REPOSITORY = Path(__file__).resolve().parent.parent
 CONFIG = REPOSITORY / 'config'
 PACKAGE = REPOSITORY / 'ros2_ws/src/paint_deposition'
@@ -42,7 +42,7 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     text = re.sub(r'^ *sheet: .*\n', '', text, flags=re.M)  # a CSV file has no sheets
     entries = yaml.safe_load(text)['experiments']
     # Keys of other kinds of motion stand by themselves: no recording has them all.
-    others = {'sheet', 'frame_id', 'guns', *MOTION_KINDS} - {'pose_topic', 'state_topic'}
+    others = {'sheet', 'frame_id', 'guns', 'coats', *MOTION_KINDS} - {'pose_topic', 'state_topic'}
     assert set(_Entry.model_fields) - others <= set(entries[-1])
     campaign = tmp_path / 'campaign.yaml'
     campaign.write_text(text)

@@ -7,7 +7,7 @@ from pydantic import BaseModel
 from generated.markdown import table
 from paint_deposition.batch.line.runs import LineFile
 from paint_deposition.batch.sweep.sweep_file import Passes, Sample, SweepFile
-from paint_deposition.files import campaign_file, model_file
+from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
 from paint_deposition.files.tables.reading_columns import ALIASES, OWN
 from paint_deposition.files.zones_file import ZoneEntry
@@ -36,6 +36,8 @@ def text() -> str:
         '### An experiment of `experiments`\n',
         'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
         _keys(campaign_file._Entry, without=MOTION | PART),
+        '### A coat of `coats`\n', 'Also the keys of [a motion](#a-motion).\n',
+        _keys(campaign_coats.CoatEntry, without=MOTION),
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
         _keys(MotionSource),

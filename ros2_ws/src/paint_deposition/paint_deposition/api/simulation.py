@@ -1,6 +1,6 @@
 """The film that recorded motions leave on a part, and how the guns ran over it."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -8,8 +8,9 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
-from paint_deposition.film.common_film import CommonFilm, require_one_finish
-from paint_deposition.film.film import Film, GunFilm
+from paint_deposition.film.coats import TOTAL, Coats
+from paint_deposition.film.common_film import CommonFilm, LayeredFilm, require_one_finish
+from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
@@ -133,6 +134,8 @@ def simulate(
     model: DepositionModel | Sequence[DepositionModel] | None = None,
     *,
     names: Sequence[str] = (),
+    coats: Sequence[str] = (),
+    wet_on_wet: bool = False,
     readings: Readings | None = None,
     max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
     target_um: float = 0.0,
@@ -148,7 +151,12 @@ def simulate(
         trajectory: poses and trigger in the frame of the mesh; one for each gun.
         model: what the gun sprays, one for all or one for each; default: a 50 mm bell.
         names: of the guns, where there are several; default: gun 1, gun 2 and so on.
-        readings: places at which the gauge is to be predicted too, effects on it included.
+        coats: names of the coats that the motions lay, one for each motion in the order of
+            painting; several with one name are guns of one coat. Default: all lay one coat.
+        wet_on_wet: whether all coats are one wet film. Else each has dried before the next, and
+            what acts on the finished film, sag say, acts on each by itself.
+        readings: places at which the gauge is to be predicted too, effects on it included, of the
+            layer that each reading is of.
         max_pose_gap_s: a longer time between two poses counts as gun off [s].
         target_um, tolerance_um: the film wanted and what it may differ, for the figures [um].
         zones: regions of the part with targets of their own, from ``read_zones``.
@@ -159,7 +167,8 @@ def simulate(
             part; says why.
         ModelError: models of several guns that do not go together.
         ReadingsError: readings that are not on the part.
-        PaintError: a tolerance that is not less than the target, or a zone without a vertex.
+        PaintError: a tolerance that is not less than the target, a zone without a vertex, or names
+            of coats that do not go with the motions or the readings.
     """
     require_band(target_um, tolerance_um)
     motions = [trajectory] if isinstance(trajectory, Trajectory) else list(trajectory)
@@ -172,9 +181,13 @@ def simulate(
             f'{len(models)} models for {len(motions)} guns: give one for all, or one for each of '
             'them'
         )
+    laid = Coats.of_guns(coats, len(motions), coats if wet_on_wet else ())
     if len(motions) > 1:
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
-        require_one_finish(dict(zip(names, models, strict=True)))
+        named = list(zip(names, models, strict=True))
+        for _, rows in laid.films_of(TOTAL):
+            require_one_finish(dict(named[rows]))
+        require_one_finish(dict(named), ['on_gauge'])
     given = models
     pairs = list(map(with_interpolated_brushes, motions, models))
     for pair in pairs:
@@ -184,7 +197,8 @@ def simulate(
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None
     common = _painted(surface.points(), seen, models, surface, 'single', progress)
-    film_um = common.film_um
+    layers = LayeredFilm(common, laid)
+    film_um = layers.film_um()
     if film_um.max() < NO_PAINT_UM:
         geometry = seen[0].geometry
         cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
@@ -209,14 +223,27 @@ def simulate(
         progress('predicting the readings', 0.0)
         # Each reading by itself, in double precision, and the slope of the film around it.
         each = replace(readings, point=np.arange(len(readings)).astype(str))
+        each = replace(each, layer=np.array('')) if coats else each
         part = Experiment.of('part', surface, seen[0].path, each)
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
-        predicted_um = at_points.gauge_um[: len(part)]
+        at_readings = LayeredFilm(at_points, laid)
+        predicted_um = np.empty(len(part))
+        for layer, seeing in laid.by_layer(readings.layer).items():
+            predicted_um[seeing] = at_readings.gauge_um(layer)[: len(part)][seeing]
         doubts = readings_in_doubt(surface, readings, predicted_um)
     return Film(
         surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,
-        point_zones,
+        tuple(_coats(surface, guns, layers)) if coats else (), point_zones,
     )  # fmt: skip
+
+
+def _coats(surface: Surface, guns: Sequence[GunFilm], layers: LayeredFilm) -> Iterator[CoatFilm]:
+    """What each coat adds."""
+    for name in layers.coats.names:
+        rows = layers.coats.guns_of(name)
+        used, film_um = layers.guns.of_guns(rows).used, layers.film_um(name)
+        statistics = film_statistics(film_um, surface.vertex_areas_m2, used.emitted_cm3)
+        yield CoatFilm(name, tuple(guns[rows]), film_um, statistics, used)
 
 
 def _painted(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,6 +13,9 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import models_for
 from paint_deposition.cli.progress import Progress
+
+if TYPE_CHECKING:
+    from paint_deposition.film.statistics import FilmStatistics
 
 
 @click.command('simulate')
@@ -28,6 +31,16 @@ from paint_deposition.cli.progress import Progress
     help='Gun of a bag whose topics stand behind its name, NAME/atomizer/pose and '
     'NAME/atomizer/state; once for each gun.',
 )  # fmt: skip
+@click.option(
+    '--coat', 'coats', multiple=True, metavar='NAME',
+    help='Coat that a gun lays; once for each --trajectory or --atomizer, in the order of '
+    'painting, the same name again for another gun of a coat. Each has dried before the next.',
+)  # fmt: skip
+@click.option(
+    '--wet-on-wet',
+    is_flag=True,
+    help='All coats are one wet film: what acts on the finished film acts on their sum.',
+)
 @click.option(
     '--model', 'model_files', type=options.FILE, multiple=True,
     help='Deposition model, YAML, one for all guns or one for each; default: a 50 mm bell.',
@@ -50,6 +63,8 @@ def simulate_command(
     part: dict[str, Any],
     trajectories: tuple[Path, ...],
     atomizers: tuple[str, ...],
+    coats: tuple[str, ...],
+    wet_on_wet: bool,
     model_files: tuple[Path, ...],
     readings_file: Path | None,
     points_file: Path | None,
@@ -60,8 +75,10 @@ def simulate_command(
 ) -> None:
     """Compute the film on a part from a recorded trajectory.
 
-    film.csv and film.ply hold the film at the vertices of the refined mesh.
+    film.csv and film.ply hold the film at the vertices of the refined mesh, and that of each coat.
     """
+    if wet_on_wet and not coats:
+        raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
     if wanted['tolerance_um'] and not wanted['target_um']:
         raise click.UsageError('--tolerance-um has no --target-um; give both')
     with Progress('simulate') as show:
@@ -82,8 +99,8 @@ def simulate_command(
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
             surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
-            names=[gun.name for gun in guns], readings=readings, zones=zones, progress=show,
-            **wanted,
+            names=[gun.name for gun in guns], coats=coats, wet_on_wet=wet_on_wet,
+            readings=readings, zones=zones, progress=show, **wanted,
         )  # fmt: skip
         made_from = {
             'mesh_file': str(part['path']),
@@ -100,6 +117,14 @@ def simulate_command(
     results.print(_lines(film), model=words)
 
 
+def _film_line(what: str, s: FilmStatistics) -> str:
+    return (
+        f'{what} {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
+        f'{s.area_m2:.2f} m2'
+    )
+
+
 def _lines(film: pd.Film) -> Iterator[str]:
     s, counts = film.statistics, film.counts
     laid_cm3 = sum(gun.painted_volume_cm3 for gun in film.guns)
@@ -109,11 +134,10 @@ def _lines(film: pd.Film) -> Iterator[str]:
             yield f'{gun.name}: {100 * share:.1f} % of the paint; {gun.geometry.sentence}'
         else:
             yield gun.geometry.sentence
-    yield (
-        f'film {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
-        f'{s.area_m2:.2f} m2'
-    )
+    for coat in film.coats:
+        wet_film = '' if math.isnan(coat.mean_wet_um) else f', {coat.mean_wet_um:.1f} µm mean wet'
+        yield _film_line(f'coat {coat.name}', coat.statistics) + wet_film
+    yield _film_line('film', s)
     if s.has_target:
         band = f'{s.target_um:g} ± {s.target_tolerance_um:g} µm'
         cpk = '' if s.zones else f', Cpk {s.cpk:.2f}'

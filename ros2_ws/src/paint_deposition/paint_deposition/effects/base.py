@@ -203,8 +203,12 @@ class Effect(BaseModel):
     @property
     def acts_on_the_finished_film(self) -> bool:
         """Whether it acts on the film after it has arrived, or on the gauge."""
-        own = type(self)
-        return own.on_film is not Effect.on_film or own.on_gauge is not Effect.on_gauge
+        return self.acts('on_film', 'on_gauge')
+
+    @classmethod
+    def acts(cls, *places: str) -> bool:
+        """Whether it defines one of these places where effects act."""
+        return any(getattr(cls, place) is not getattr(Effect, place) for place in places)
 
     @property
     def absent(self) -> 'Effect':

@@ -3,37 +3,36 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any, Literal, get_args
+from typing import Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
+from paint_deposition.files.campaign_coats import LaidCoats, Name, PaintJob
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource, Number, OnePart, Text
+from paint_deposition.files.motion_source import Number, OnePart, Text
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
+from paint_deposition.film.coats import TOTAL
 from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.interruptions import checked_path
-from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.part.facing import toward_the_guns
 
 # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
 MAX_EDGE_LENGTH_M = 0.02
 
-Quantity = Literal['x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session']
+Quantity = Literal[
+    'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',
+]  # fmt: skip
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
-# A name or number, read as text.
-Name = Annotated[str, BeforeValidator(str)]
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
 # Keys for the head of the report only.
@@ -68,24 +67,20 @@ class _File(BaseModel, extra='forbid'):
         return self
 
 
-class _Gun(MotionSource):
-    """One of several guns; what it does not say holds for it as for the experiment."""
-
-    trajectory: Text | None = Field(None, description='the name of a recording, module or table')
-    brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
-        None, description='the number of the brush, where the recording names none'
-    )
-
-
-class _Entry(_Gun, OnePart):
+class _Entry(PaintJob, OnePart):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
     measurements: Text = Field(description='the name of a file of gauge readings')
-    guns: list[Any] = Field(
-        [], description='a list of guns that painted together, each with its motion'
+    coats: list[Any] = Field(
+        [], description='a list of coats in the order of painting, each with its name'
     )
-    name: Name = ''
+    wet: bool = Field(
+        False, description='true or false, whether the readings are of wet film, which solids dry'
+    )
+    under_um: Number = Field(
+        0.0, ge=0.0, description='film that was there before, part of all total readings [um]'
+    )
     zones: Text | None = Field(None, description="the name of a zones file, if not the campaign's")
     points: Text | None = Field(None, description='the name of a file of measuring points')
     columns: dict[Quantity, Text | int] = Field(
@@ -129,19 +124,20 @@ def read_campaign(
     content = read_yaml(path, 'campaign', ReadingsError)
     file = checked(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
+    names: list[str] = []
     for number, written in enumerate(file.experiments, start=1):
         entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
         name = entry.name or f'experiment_{number}'
-        if name in [e.name for e in experiments]:
+        if name in names:
             raise ReadingsError(f"{path}: two experiments are called '{name}'; rename one")
+        names.append(name)
         progress(f'reading {name}')
         if part_pose is not None and entry.part_pose is None:
             entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
-            experiment = _read_experiment(path.parent, name, entry, remark)
             named = entry.zones or file.zones
             of = zones or (path.parent / named if named else None)
-            experiments.append(_with_zones(experiment, entry, of))
+            experiments += _read_experiments(path.parent, name, entry, of, remark)
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     start = None if file.model is None else str(path.parent / file.model)
@@ -149,26 +145,21 @@ def read_campaign(
     return Campaign(tuple(experiments), start, str(path), head, file.target_um, file.tolerance_um)
 
 
-def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> Experiment:
+def _read_experiments(
+    folder: Path, name: str, entry: _Entry, zones: str | Path | None, remark: Remark
+) -> list[Experiment]:
+    """One for each layer that was measured; ``zones`` is the file of theirs."""
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
-    motions = _motions(folder, entry)
-    different = dict.fromkeys(file for file, *_ in motions)
-    for number, file in enumerate(different, start=1):
+    laid = LaidCoats.of(folder, entry, entry.coats)
+    for number, file in enumerate(dict.fromkeys(gun.file for gun in laid.guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
-    trajectories = [read_motion(file, source) for file, source, _ in motions]
+    trajectories = [read_motion(gun.file, gun.source) for gun in laid.guns]
     paths = []
-    for trajectory, (*_, brush) in zip(trajectories, motions, strict=True):
+    for trajectory, gun in zip(trajectories, laid.guns, strict=True):
         path, counts, odd = checked_path(trajectory, entry.max_pose_gap_s)
-        if brush is not None:
-            others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, brush}
-            if others:
-                raise ReadingsError(
-                    f'brush is {brush}, and the recording names {listed(others)}; leave it out'
-                )
-            path = path.with_(brush=np.full(len(path), brush))
-        paths.append(path)
+        paths.append(gun.with_brush(path))
         for warning in odd:
             remark('warning', name, warning)
         if counts.rejected:
@@ -188,10 +179,18 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
     settings: dict[str, float] = {}
     for trajectory in reversed(trajectories):
         settings |= trajectory.settings
-    return Experiment.of(
-        name, surface, SprayPath.of_guns(paths), readings, files, settings, off,
-        trajectories[0].frame_id,
-    )  # fmt: skip
+    made = []
+    for layer, rows in laid.coats.by_layer(readings.layer).items():
+        path, films = laid.painted(layer, paths)
+        of_layer = laid.dry(readings.select(rows), layer, entry.wet, entry.under_um)
+        experiment = Experiment.of(
+            f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
+            surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,
+        )  # fmt: skip
+        experiment = replace(experiment, layer=layer)
+        # What is wanted is the whole film.
+        made.append(_with_zones(experiment, entry, zones) if layer == TOTAL else experiment)
+    return made
 
 
 def _with_zones(experiment: Experiment, part: OnePart, file: str | Path | None) -> Experiment:
@@ -203,24 +202,3 @@ def _with_zones(experiment: Experiment, part: OnePart, file: str | Path | None) 
         zones=zones.on(experiment.surface),
         files=experiment.files | {'zones': str(file)},
     )
-
-
-def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int | None]]:
-    """The file of each gun, what to read of it, and its brush."""
-    own = {key: getattr(entry, key) for key in MotionSource.model_fields}
-    motions = []
-    for number, written in enumerate(entry.guns or [{}], start=1):
-        gun = checked(_Gun, f'gun {number}', written, ReadingsError)
-        declared = {key: value for key in own if (value := getattr(gun, key)) is not None}
-        file = gun.trajectory or entry.trajectory
-        if file is None:
-            of = f'gun {number}' if entry.guns else 'it'
-            raise ReadingsError(
-                f"{of} has no 'trajectory'; give the name of a recording, RAPID module or table"
-            )
-        source = MotionSource(**(own | declared))
-        if source.urdf:
-            source = source.model_copy(update={'urdf': str(folder / source.urdf)})
-        brush = entry.brush if gun.brush is None else gun.brush
-        motions.append((str(folder / file), source, brush))
-    return motions

@@ -35,8 +35,8 @@ def read_readings(
     Args:
         path: CSV, TSV, TXT, Parquet or a workbook. The project's own columns are
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
-            ``session`` and ``nx,ny,nz``; others are known by usual English and German headings.
-            Without labels, readings at exactly one place are repeats.
+            ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual English and German
+            headings. Without labels, readings at exactly one place are repeats.
         points: file of the measuring points (label, x, y, z) that readings name.
         layout: what the file does not say itself.
         surface: the part, for points that are given on its face.
@@ -71,7 +71,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
-        GUESSED in place_words, read.doubts,
+        GUESSED in place_words, read.doubts, np.array(read.texts('layer'))[row],
     )  # fmt: skip
     require_repeats_close(readings)
     return readings

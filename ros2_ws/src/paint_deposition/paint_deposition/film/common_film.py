@@ -1,6 +1,6 @@
-"""The one film that several guns lay on a part."""
+"""The one film that several guns lay on a part, and the sum of several such films."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -9,6 +9,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
+from paint_deposition.film.coats import TOTAL, Coats, sum_um
 from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import PaintUsed
@@ -45,7 +46,7 @@ class CommonFilm:
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return gauge_reading_um(self.raw_um, self._effects, self.guns[0].points)
+        return gauge_reading_um(self.film_um, self._effects, self.guns[0].points)
 
     @property
     def used(self) -> PaintUsed:
@@ -64,6 +65,28 @@ class CommonFilm:
     @property
     def _effects(self) -> list[Effect]:
         return [effect for effect in self.guns[0].model.effects if not effect.is_neutral]
+
+    def of_guns(self, rows: slice) -> 'CommonFilm':
+        """What some of the guns laid."""
+        return CommonFilm(self.guns[rows])
+
+
+@dataclass(frozen=True)
+class LayeredFilm:
+    """What guns laid in coats: what acts on the finished film acts on each wet film by itself."""
+
+    guns: CommonFilm
+    coats: Coats
+
+    def film_um(self, layer: str = TOTAL) -> np.ndarray:
+        """(V,) film of a layer [um], see ``Coats.films_of``."""
+        films = self.coats.films_of(layer)
+        return sum_um((sign, self.guns.of_guns(rows).film_um) for sign, rows in films)
+
+    def gauge_um(self, layer: str = TOTAL) -> np.ndarray:
+        """(V,) what a gauge shows that sees this layer alone [um]."""
+        first = self.guns.guns[0]
+        return gauge_reading_um(self.film_um(layer), first.model.effects, first.points)
 
 
 @dataclass(frozen=True)
@@ -102,14 +125,19 @@ class LiveFilms:
             gun.warm_up()
 
 
-def require_one_finish(models: Mapping[str, DepositionModel]) -> None:
+def require_one_finish(
+    models: Mapping[str, DepositionModel], places: Sequence[str] = ('on_film', 'on_gauge')
+) -> None:
     """Refuse models, by the name of their gun, that let different things happen to one film.
+
+    Args:
+        places: where effects are compared, methods of ``Effect``.
 
     Raises:
         ModelError: naming two guns and the effects on film or gauge in which they differ.
     """
     finishes = {
-        gun: [e for e in model.effects if not e.is_neutral and e.acts_on_the_finished_film]
+        gun: [e for e in model.effects if not e.is_neutral and e.acts(*places)]
         for gun, model in models.items()
     }
     (first, reference), *others = finishes.items()

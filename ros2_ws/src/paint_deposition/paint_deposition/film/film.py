@@ -49,6 +49,36 @@ class GunFilm:
 
 
 @dataclass(frozen=True)
+class CoatFilm:
+    """What one of the coats adds to the film on a part."""
+
+    name: str
+    guns: tuple[GunFilm, ...]  # what laid it
+    film_um: np.ndarray  # (V,) film at the vertices of the surface [um]
+    statistics: FilmStatistics  # of this film
+    paint: PaintUsed  # that was sprayed
+
+    @property
+    def model(self) -> DepositionModel:
+        """The deposition model of its first gun."""
+        return self.guns[0].model
+
+    @property
+    def mean_wet_um(self) -> float:
+        """Mean film before anything evaporates [um]; NaN where its solids are not known."""
+        return self.statistics.mean_um / self.paint.solids
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures by name."""
+        return {
+            'name': self.name,
+            'atomizers': [gun.name for gun in self.guns],
+            **self.statistics.to_dict(),
+            'paint': paint_figures(self),
+        }
+
+
+@dataclass(frozen=True)
 class Film:
     """The film on a part, with all that it was computed from.
 
@@ -61,6 +91,7 @@ class Film:
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
         paint: that was sprayed.
         doubts: what is odd in the readings.
+        coats: in the order of painting, where the film was laid in named coats.
         zones: of the vertices, each with a target, or None.
     """
 
@@ -72,6 +103,7 @@ class Film:
     predicted_um: np.ndarray | None = None
     paint: PaintUsed = NO_PAINT
     doubts: tuple[str, ...] = ()
+    coats: tuple[CoatFilm, ...] = ()
     zones: PointZones | None = None
 
     def __repr__(self) -> str:
@@ -130,15 +162,22 @@ class Film:
 
         The geometry is that of the first gun; `atomizers` has each.
         """
-        return self.statistics.to_dict() | {
-            'frame_id': self.trajectory.frame_id,
-            'down': self.surface.down.tolist(),
-            'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
-            'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
-            'paint': paint_figures(self),
-            'poses': self.counts.to_dict(),
-            'geometry': self.guns[0].geometry.to_dict(),
-            'atomizers': [gun.to_dict() for gun in self.guns],
-            'notes': list(self.notes),
-            'warnings': list(self.warnings),
-        }
+        coats = {'coats': [coat.to_dict() for coat in self.coats]} if self.coats else {}
+        return (
+            self.statistics.to_dict()
+            | coats
+            | {
+                'frame_id': self.trajectory.frame_id,
+                'down': self.surface.down.tolist(),
+                'effects': list(
+                    dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)
+                ),
+                'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
+                'paint': paint_figures(self),
+                'poses': self.counts.to_dict(),
+                'geometry': self.guns[0].geometry.to_dict(),
+                'atomizers': [gun.to_dict() for gun in self.guns],
+                'notes': list(self.notes),
+                'warnings': list(self.warnings),
+            }
+        )

@@ -229,7 +229,7 @@ class FilmIntegrator:
     @property
     def gauge_um(self) -> np.ndarray:
         """(V,) what a gauge shows on that film [um]."""
-        return gauge_reading_um(self.raw_um, self._effects, self.points)
+        return gauge_reading_um(self.film_um, self._effects, self.points)
 
 
 def after_film_effects(
@@ -242,10 +242,9 @@ def after_film_effects(
 
 
 def gauge_reading_um(
-    raw_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
+    film_um: np.ndarray, effects: Sequence[Effect], points: SurfacePoints
 ) -> np.ndarray:
-    """(V,) what a gauge shows [um] where (V,) arrived [um]."""
-    reading = after_film_effects(raw_um, effects, points)
+    """(V,) what a gauge shows [um] on a film (V,) [um]."""
     for effect in effects:
-        reading = effect.on_gauge(reading, points)
-    return reading
+        film_um = effect.on_gauge(film_um, points)
+    return film_um

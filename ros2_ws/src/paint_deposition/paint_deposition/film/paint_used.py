@@ -25,6 +25,7 @@ class PaintUsed:
     wet_cm3: float = 0.0
     mass_g: float = 0.0
     solids_cm3: float = 0.0  # solids in it
+    emitted_wet_cm3: float = 0.0  # the same paint as `emitted_cm3`, before anything evaporates
 
     @staticmethod
     def of(model: DepositionModel, path: SprayPath) -> 'PaintUsed':
@@ -46,6 +47,7 @@ class PaintUsed:
             total(_flow_cm3_per_s),
             total(lambda brush: _flow_cm3_per_s(brush) * _known(brush.density_g_per_cm3)),
             total(lambda brush: _flow_cm3_per_s(brush) * _known(brush.solids)),
+            total(lambda brush: brush.planar.K1_cm3_per_s / _known(brush.solids)),
         )
 
     def __add__(self, other: 'PaintUsed') -> 'PaintUsed':
@@ -58,8 +60,8 @@ class PaintUsed:
 
     @property
     def solids(self) -> float:
-        """Share of solids in the volume that was sprayed."""
-        return self.solids_cm3 / self.wet_cm3 if self.wet_cm3 else math.nan
+        """Share of solids in the volume of the film while it is wet."""
+        return self.emitted_cm3 / self.emitted_wet_cm3 if self.emitted_wet_cm3 else math.nan
 
     def transfer_efficiency(self, on_part_cm3: float) -> float:
         """Solids on the part [cm3] over solids sprayed."""
@@ -112,9 +114,10 @@ def paint_sentence(result: Painted) -> str:
     if not math.isnan(paint.wet_cm3):
         mass = '' if math.isnan(paint.mass_g) else f' ({paint.mass_g:.1f} g)'
         said.append(f'{paint.wet_cm3:.1f} cm3{mass} of paint sprayed')
-    if not math.isnan(paint.solids):
-        share = paint.transfer_efficiency(film.painted_volume_cm3)
+    share = paint.transfer_efficiency(film.painted_volume_cm3)
+    if not math.isnan(share):
         said.append(f'transfer efficiency {100 * share:.0f} %')
+    if not math.isnan(paint.solids):
         said.append(f'mean wet film {film.mean_um / paint.solids:.1f} µm')
     return ', '.join(said)
 

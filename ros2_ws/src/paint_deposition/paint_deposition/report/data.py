@@ -10,6 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.coats import TOTAL, sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
@@ -29,6 +30,13 @@ class Change(NamedTuple):
     least_um: float
     most_um: float
     rms_um: float
+
+
+class Painted(NamedTuple):
+    """The layer of a part that was measured, with one model."""
+
+    film_um: np.ndarray  # (V,) on the surface [um]
+    emitted_cm3: float  # solids that a part which catches everything would get [cm3]
 
 
 @dataclass(frozen=True)
@@ -75,13 +83,17 @@ class ReportData:
         """What it may differ [um]."""
         return self.study.campaign.tolerance_um
 
+    def target_of(self, experiment: Experiment) -> tuple[float, float]:
+        """Target and tolerance of the film read [um]; 0 is none, as for some of the coats."""
+        wanted = self.target_um or 0.0, self.tolerance_um or 0.0
+        return wanted if experiment.layer == TOTAL else (0.0, 0.0)
+
     @cached_property
     def wanted_um(self) -> tuple[np.ndarray, np.ndarray]:
         """Target and tolerance (P,) at the points, those of their zones [um]; NaN: none."""
-        overall = self.target_um or 0.0, self.tolerance_um or 0.0
         each = [
             wanted_at(
-                one.measured_points.positions_m[:, 0], *overall,
+                one.measured_points.positions_m[:, 0], *self.target_of(one),
                 one.zones and one.zones.at(
                     one.measured_points.positions_m, one.measured_points.normals
                 ),
@@ -185,18 +197,20 @@ class ReportData:
         return slice(int(first), int(stop))
 
     @cached_property
-    def painted(self) -> list[list[FilmIntegrator]]:
+    def painted(self) -> list[list[Painted]]:
         """The surface painted: for each experiment, with each model."""
-        films = []
-        for experiment in self.experiments:
-            surface = experiment.surface
-            points = surface.points()
-            films.append([
-                FilmIntegrator(
-                    points, model.without(experiment.switched_off), 'double', surface.occluder
-                )
-                for model in self.models
-            ])  # fmt: skip
-            for film in films[-1]:
-                film.add(experiment.path)
-        return films
+        return [[_painted(one, model) for model in self.models] for one in self.experiments]
+
+
+def _painted(experiment: Experiment, model: DepositionModel) -> Painted:
+    surface, acting = experiment.surface, model.without(experiment.switched_off)
+    points = surface.points()
+    films = []
+    for sign, rows in experiment.films:
+        film = FilmIntegrator(points, acting, 'double', surface.occluder)
+        film.add(experiment.path.select(rows))
+        films.append((sign, film))
+    return Painted(
+        sum_um((sign, film.film_um) for sign, film in films),
+        sum(sign * film.emitted_cm3 for sign, film in films),
+    )

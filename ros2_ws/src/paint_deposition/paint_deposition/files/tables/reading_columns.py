@@ -4,6 +4,7 @@ Columns are known by the project's own names, by a few usual English and German 
 the user names them, see ``Layout``.
 """
 
+import re
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -17,7 +18,7 @@ from paint_deposition.files.tables.table import headings_in, shown, widest
 OWN = {
     'x': 'x_m', 'y': 'y_m', 'z': 'z_m', 'thickness': 'thickness_um', 'point': 'point',
     'group': 'group', 'session': 'session', 'sigma': 'sigma_um',
-    'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
+    'layer': 'layer', 'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
 }  # fmt: skip
 AXES = ('x', 'y', 'z')
 ON_FACE = ('from_left', 'height')
@@ -25,6 +26,8 @@ NORMALS = ('nx', 'ny', 'nz')
 LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
 # Headings without their unit, numbers of repeats and accents. A word that ends in 'dicke' is a
 # thickness too, but for these.
+# A film before anything evaporates, as a comb shows it.
+WET = re.compile(r'(wet|wft|nass)')
 OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')
 ALIASES = {
     'thickness': (
@@ -41,6 +44,7 @@ ALIASES = {
     'row': ('row', 'zeile', 'reihe'),
     'column': ('column', 'col', 'spalte'),
     'group': ('group', 'gruppe'),
+    'layer': ('layer', 'coat', 'schicht', 'lackschicht', 'couche'),
     'block': ('block', 'block no', 'block nr'),
     'unit': ('unit', 'units', 'einheit'),
 }  # fmt: skip
@@ -124,6 +128,8 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
         if foreign:
             remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
             remedy += ', or say unit: {thickness: ...} and name it'
+        elif wet := [h.text for h in headings if h.words and WET.match(' '.join(h.words))]:
+            remedy = f"'{wet[0]}' is a wet film: say wet: true, give its solids, and name it"
         elif likely:
             remedy = f'it may be {" or ".join(map(repr, likely))}: name one'
         return (

@@ -257,10 +257,8 @@ def _with_candidates(rivals: Rivals, experiment: Experiment, seed: int) -> Exper
     here = experiment.measured_points
     positions = np.vstack([here.positions_m, surface.vertices_m[inside]])
     normals = np.vstack([here.normals, surface.normals[inside]])
-    new = Experiment.of(
-        experiment.name, surface, experiment.path,
-        Readings.of(positions, np.zeros(len(positions)), normals=normals),
-        switched_off=experiment.switched_off,
-    )  # fmt: skip
+    new = experiment.with_readings(
+        Readings.of(positions, np.zeros(len(positions)), normals=normals)
+    )
     film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(rivals.fit.model)
     return _with_readings(new, positions, film_um, study.noise.typical_um)

@@ -181,10 +181,7 @@ def _passes_turned(experiment: Experiment) -> Experiment | None:
 
 def _upside_down(experiment: Experiment) -> Experiment:
     surface = replace(experiment.surface, down=-experiment.surface.down)
-    return Experiment.of(
-        experiment.name, surface, experiment.path, experiment.readings,
-        switched_off=experiment.switched_off,
-    )  # fmt: skip
+    return replace(experiment, surface=surface).with_readings(experiment.readings)
 
 
 def _without(setting: str) -> Callable[[Experiment], Experiment]:

@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.coats import ONE_FILM
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -90,7 +91,7 @@ class StationarySpray:
             trigger_brush=np.full(2, self.brush),
         )
         path, _ = spray_path(motion)
-        return replace(experiment, path=path)
+        return replace(experiment, path=path, films=ONE_FILM)
 
     @property
     def words(self) -> str:

@@ -101,7 +101,7 @@ def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
     return part.with_readings(Readings(
         mean(place_m), np.bincount(cell, off_um) / count, names, readings.group[first],
         noise_um / np.sqrt(count), mean(normals), readings.source, readings.session[first],
-        understood,
+        understood, layer=readings.layer[first],
     ))  # fmt: skip
 
 

@@ -11,7 +11,14 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator, Steps, gauge_reading_um
+from paint_deposition.film.coats import sum_um
+from paint_deposition.film.integrator import (
+    FEW_RAYS,
+    FilmIntegrator,
+    Steps,
+    after_film_effects,
+    gauge_reading_um,
+)
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.kernel.blocks import LANES
@@ -39,7 +46,7 @@ class Forward:
     def __init__(self, campaign: Campaign, effects: tuple[Effect, ...] = ()) -> None:
         self.campaign, self.effects = campaign, effects
         # A model without one of them has it absent; what cannot be absent is not in its kernel.
-        absent = (effect.absent for effect in effects if _defines(effect, LAWS))
+        absent = (effect.absent for effect in effects if effect.acts(*LAWS))
         self._in_kernel = {effect.id: effect for effect in absent if effect.is_neutral}
         self._parts = [_Part(experiment) for experiment in campaign.experiments]
         # Where the integral is short, threads wait for each other longer than for it.
@@ -65,7 +72,7 @@ class Forward:
 
     def _gauge_reading_um(self, films_um: list[np.ndarray], stages: list['_Stages']) -> np.ndarray:
         return np.concatenate([
-            gauge_reading_um(film, one.effects, part.points(one.slope))[: len(part.experiment)]
+            part.gauge_reading_um(film, one)
             for part, film, one in zip(self._parts, films_um, stages, strict=True)
         ])  # fmt: skip
 
@@ -77,11 +84,11 @@ class Forward:
 
     def _split_by_stage(self, model: DepositionModel) -> '_Stages':
         acting = tuple(effect for effect in model.effects if not effect.is_neutral)
-        before = tuple(effect for effect in acting if _defines(effect, BEFORE_ARRIVAL))
-        if any(_defines(effect, LAWS) for effect in before):
+        before = tuple(effect for effect in acting if effect.acts(*BEFORE_ARRIVAL))
+        if any(effect.acts(*LAWS) for effect in before):
             # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
-            laws = self._in_kernel | {e.id: e for e in before if _defines(e, LAWS)}
-            before = (*(e for e in before if not _defines(e, LAWS)), *laws.values())
+            laws = self._in_kernel | {e.id: e for e in before if e.acts(*LAWS)}
+            before = (*(e for e in before if not e.acts(*LAWS)), *laws.values())
         return _Stages(
             model.model_copy(update={'effects': before}),
             acting,
@@ -118,10 +125,6 @@ class _Stages(NamedTuple):
     slope: bool  # whether one needs the film's slope
 
 
-def _defines(effect: Effect, names: tuple[str, ...]) -> bool:
-    return any(getattr(type(effect), name) is not getattr(Effect, name) for name in names)
-
-
 class _Part:
     """One experiment, integrated at its points alone or with the stencils of the film's slope."""
 
@@ -137,21 +140,35 @@ class _Part:
         return self.experiment.points if slope else self.experiment.measured_points
 
     def film_um(self, stages: _Stages) -> np.ndarray:
-        """(V,) film that arrived at the points [um]."""
+        """(F V,) what arrived at the points [um], one wet film after the other."""
         return self._film_um(stages.arrival, stages.slope)
 
     def terms(self, stages: _Stages) -> np.ndarray:
-        """(7 B, V) terms of that film."""
-        integrator, steps = self._ready(stages.arrival, stages.slope)
-        return integrator.terms(steps)[:, : len(self.points(stages.slope))]
+        """(7 B, F V) terms of these films."""
+        integrator, films = self._ready(stages.arrival, stages.slope)
+        count = len(self.points(stages.slope))
+        return np.hstack([integrator.terms(steps)[:, :count] for steps in films])
+
+    def gauge_reading_um(self, films_um: np.ndarray, stages: _Stages) -> np.ndarray:
+        """(P,) gauge readings [um] of what arrived."""
+        points, films = self.points(stages.slope), self.experiment.films
+        finished = (
+            (sign, after_film_effects(film_um, stages.effects, points))
+            for (sign, _), film_um in zip(films, films_um.reshape(len(films), -1), strict=True)
+        )
+        reading = gauge_reading_um(sum_um(finished), stages.effects, points)
+        return reading[: len(self.experiment)]
 
     def _integrated_um(self, model: DepositionModel, slope: bool) -> np.ndarray:
-        integrator, steps = self._ready(model, slope)
-        integrator.reset()
-        integrator.paint(steps)
-        return integrator.raw_um[: len(self.points(slope))]
+        integrator, films = self._ready(model, slope)
+        arrived = []
+        for steps in films:
+            integrator.reset()
+            integrator.paint(steps)
+            arrived.append(integrator.raw_um[: len(self.points(slope))])
+        return np.concatenate(arrived)
 
-    def _ready(self, model: DepositionModel, slope: bool) -> tuple[FilmIntegrator, Steps]:
+    def _ready(self, model: DepositionModel, slope: bool) -> tuple[FilmIntegrator, list[Steps]]:
         integrator = self._integrators.get(slope)
         if integrator is None:
             points = self.points(slope)
@@ -162,11 +179,11 @@ class _Part:
                 keep_absent_laws=True, parallel=False,
             )  # fmt: skip
         integrator.use(model)
-        moving = tuple(e for e in model.effects if _defines(e, ('on_path',)))
+        moving = tuple(e for e in model.effects if e.acts('on_path'))
         return integrator, self._steps(slope, model.projection, moving, max(model.shadows) > 0.0)
 
-    def _prepared(self, slope: bool, *_: object) -> Steps:
-        """The path as the integrator's effects have it."""
-        integrator = self._integrators[slope]
+    def _prepared(self, slope: bool, *_: object) -> list[Steps]:
+        """The path of each wet film as the integrator's effects have it."""
+        integrator, path = self._integrators[slope], self.experiment.path
         integrator.reset()
-        return integrator.steps(self.experiment.path)
+        return [integrator.steps(path.select(rows)) for _, rows in self.experiment.films]

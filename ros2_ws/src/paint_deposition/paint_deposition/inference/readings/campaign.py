@@ -7,6 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
+from paint_deposition.film.coats import ONE_FILM, TOTAL, WetFilms
 from paint_deposition.inference.readings.gauge_noise import left_out_lines
 from paint_deposition.inference.readings.placement import (
     columns_or_rows,
@@ -44,6 +45,8 @@ class Experiment:
     # Of the cell while the part was painted: 'voltage', 'draught'.
     switched_off: frozenset[str] = frozenset()
     frame_id: str = ''  # of the recorded poses, '' where not known
+    films: WetFilms = ONE_FILM  # what is read, as wet films that sub-steps of the path laid
+    layer: str = TOTAL  # what is read, by the names of its coats
     zones: PointZones | None = None  # of the vertices of the surface, each with a target
 
     @staticmethod
@@ -51,12 +54,20 @@ class Experiment:
         name: str, surface: Surface, path: SprayPath, readings: Readings,
         files: dict[str, str] | None = None, settings: Mapping[str, float] | None = None,
         switched_off: frozenset[str] = frozenset(), frame_id: str = '',
+        films: WetFilms = ONE_FILM,
     ) -> 'Experiment':  # fmt: skip
         """Match readings to the surface; those without groups get the rows or columns found.
 
         Raises:
-            ReadingsError: readings too far off the surface or on its other side.
+            ReadingsError: readings too far off the surface or on its other side, or of several
+                layers.
         """
+        if len(layers := dict.fromkeys(readings.layer.tolist())) > 1:
+            raise ReadingsError(
+                f'{readings.source}: readings of the layers {", ".join(map(repr, layers))}, and '
+                'nothing says which motion laid which; name the coats (coats: in a campaign, '
+                '--coat with simulate)'
+            )
         means = PointMeans.of(readings)
         normals = None if readings.normals is None else readings.normals[means.first]
         positions = readings.positions_m[means.first]
@@ -71,16 +82,16 @@ class Experiment:
         used = np.ones(len(readings), dtype=bool)
         return Experiment(
             name, surface, path, readings, means, points, readings, used, files or {},
-            settings or {}, switched_off, frame_id,
+            settings or {}, switched_off, frame_id, films,
         )  # fmt: skip
 
     def with_readings(self, readings: Readings) -> 'Experiment':
         """The same part with other readings; raises what ``of`` does."""
         found = Experiment.of(
             self.name, self.surface, self.path, readings, self.files, self.settings,
-            self.switched_off, self.frame_id,
+            self.switched_off, self.frame_id, self.films,
         )  # fmt: skip
-        return replace(found, zones=self.zones)
+        return replace(found, layer=self.layer, zones=self.zones)
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The same part without some of the readings (N,) that were used.

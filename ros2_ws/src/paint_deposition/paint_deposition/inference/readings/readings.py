@@ -24,6 +24,7 @@ class Readings:
         normals: (N, 3) outward normals, or None.
         source: the file they came from, for messages.
         session: (N,) labels of the gauge session; '' where none.
+        layer: (N,) names of the coats that are read, as in 'base+clear'; '' is all of them.
         understood: how their file was read, in one line for the user; '' for none.
         zero_is_film: whether the user says that a reading of 0 is one.
         unit_is_guessed: whether nobody said what the unit of the positions is.
@@ -42,10 +43,12 @@ class Readings:
     zero_is_film: bool = False
     unit_is_guessed: bool = False
     doubts: tuple[str, ...] = ()
+    layer: np.ndarray = field(default_factory=lambda: np.array(''))
 
     def __post_init__(self) -> None:
-        sessions = np.broadcast_to(self.session, len(self.thickness_um))
-        object.__setattr__(self, 'session', sessions)
+        for name in ('session', 'layer'):
+            labels = np.broadcast_to(getattr(self, name), len(self.thickness_um))
+            object.__setattr__(self, name, labels)
 
     def __repr__(self) -> str:
         return f'Readings({len(self)} from {self.source}, mean {self.thickness_um.mean():.1f} µm)'
@@ -79,7 +82,10 @@ class Readings:
 
     def select(self, rows: np.ndarray | slice) -> 'Readings':
         """The chosen rows, by mask or indices."""
-        names = ('positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session')
+        names = (
+            'positions_m', 'thickness_um', 'point', 'group', 'sigma_um', 'normals', 'session',
+            'layer',
+        )  # fmt: skip
         columns = {n: getattr(self, n) for n in names}
         some: dict[str, Any] = {n: c if c is None else c[rows] for n, c in columns.items()}
         return replace(self, **some)

@@ -157,10 +157,10 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for k, experiment in enumerate(data.experiments):
         measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
+        target_um, tolerance_um = data.target_of(experiment)
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
-            target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
-            zones=experiment.zones,
+            target_um=target_um, target_tolerance_um=tolerance_um, zones=experiment.zones,
         )  # fmt: skip
         areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}
         rows.append({

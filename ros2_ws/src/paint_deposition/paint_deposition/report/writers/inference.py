@@ -94,7 +94,7 @@ def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
     """A heading and a row a reading; those that were left out are without a prediction."""
     yield (
         'experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
-        'residual_um', 'sigma_um', 'used',
+        'residual_um', 'sigma_um', 'used', 'layer',
     )  # fmt: skip
     found = comparison.readings
     fitted = zip(found.predicted_um, found.residual_um, found.sigma_um, strict=True)
@@ -109,6 +109,7 @@ def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
                 f'{readings.thickness_um[k]:.3f}',
                 *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
                 str(int(used)),
+                str(readings.layer[k]),
             ]
 
 

@@ -1,0 +1,173 @@
+"""The coats of a campaign's experiment: which guns laid each, and what its readings are of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BeforeValidator, Field
+
+from paint_deposition.errors import ReadingsError
+from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.refusals import checked
+from paint_deposition.film.coats import TOTAL, Coats, WetFilms
+from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.model.brush import MOST, listed
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.trigger import ONLY_BRUSH
+
+# A name or number, read as text.
+Name = Annotated[str, BeforeValidator(str)]
+
+
+class _Gun(MotionSource):
+    """One of several guns; what it does not say holds for it as for the coat or experiment."""
+
+    trajectory: Text | None = Field(None, description='the name of a recording, module or table')
+    brush: Annotated[int, Field(strict=True, ge=1, le=MOST)] | None = Field(
+        None, description='the number of the brush, where the recording names none'
+    )
+
+
+class PaintJob(_Gun):
+    """What is painted in one go: an experiment, or one of its coats."""
+
+    name: Name = ''
+    guns: list[Any] = Field(
+        [], description='a list of guns that painted together, each with its motion'
+    )
+    solids: Number | None = Field(
+        None, gt=0.0, le=1.0, description='share of solids in the volume of the wet paint [1]'
+    )
+
+
+class CoatEntry(PaintJob):
+    """A coat as it is written; what it does not say holds for it as for the experiment."""
+
+    wet_on_wet: bool = Field(
+        False, description='true or false, whether the coat before it was still wet'
+    )
+
+
+@dataclass(frozen=True)
+class GunMotionFile:
+    """A gun as a campaign names it."""
+
+    file: str  # of its motion
+    source: MotionSource  # what to read of it
+    brush: int | None  # where the file names none
+
+    def with_brush(self, path: SprayPath) -> SprayPath:
+        """The path with the brush, or ReadingsError if its file names another."""
+        if self.brush is None:
+            return path
+        others = set(path.brush[path.flow > 0.0].tolist()) - {ONLY_BRUSH, self.brush}
+        if others:
+            raise ReadingsError(
+                f'brush is {self.brush}, and the recording names {listed(others)}; leave it out'
+            )
+        return path.with_(brush=np.full(len(path), self.brush))
+
+
+@dataclass(frozen=True)
+class LaidCoats:
+    """The coats of an experiment, with their guns in the order of painting."""
+
+    coats: Coats
+    guns: tuple[GunMotionFile, ...]
+    solids: tuple[float | None, ...]  # (C,) of each coat, where known
+
+    @staticmethod
+    def of(folder: Path, entry: PaintJob, written: Sequence[Any]) -> 'LaidCoats':
+        """The coats that an experiment lists, else the one that it is.
+
+        Raises:
+            ReadingsError: naming the coat or the gun and the key at fault.
+        """
+        coats = [
+            checked(CoatEntry, f'coat {number}', one, ReadingsError)
+            for number, one in enumerate(written, start=1)
+        ]
+        called = [coat.name for coat in coats]
+        if twice := [name for name in called if called.count(name) > 1]:
+            raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
+        guns: list[GunMotionFile] = []
+        names: list[str] = []
+        jobs: Sequence[PaintJob] = coats or [entry]
+        for coat in jobs:
+            given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
+            for number, one in enumerate(given, start=1):
+                gun = checked(_Gun, f'gun {number}', one, ReadingsError)
+                whose = f"coat '{coat.name}'" if coats else 'it'
+                whose = whose if given == [{}] else f'gun {number}'
+                guns.append(_motion(folder, (gun, coat, entry), whose))
+            names += [coat.name] * len(given) * bool(coats)
+        on_wet = {coat.name for coat in coats if coat.wet_on_wet}
+        solids = tuple(entry.solids if coat.solids is None else coat.solids for coat in jobs)
+        return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns), solids)
+
+    def painted(self, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
+        """The path of the guns that laid a layer, and the wet films that it is the sum of."""
+        films = self.coats.films_of(layer)
+        chosen = sorted({k for _, rows in films for k in range(len(paths))[rows]})
+        ends = np.cumsum([0, *(len(paths[k]) for k in chosen)]).tolist()
+        start = {k: ends[place] for place, k in enumerate(chosen)}
+        stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
+        steps = tuple(
+            (sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films
+        )
+        return SprayPath.of_guns([paths[k] for k in chosen]), steps
+
+    def dry(self, readings: Readings, layer: str, wet: bool, under_um: float) -> Readings:
+        """Readings of a layer as its dry film alone.
+
+        Args:
+            wet: whether they were taken wet.
+            under_um: film that was there before the first coat, part of all total readings [um].
+
+        Raises:
+            ReadingsError: taken wet, of coats whose solids are not known or differ.
+        """
+        film_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
+        if wet:
+            share = self._solids(layer)
+            film_um, sigma_um = share * film_um, share * sigma_um
+            words += f'; wet film, times {share:g} solids'
+        if under_um and layer == TOTAL:
+            film_um, words = film_um - under_um, f'{words}; less {under_um:g} µm below'
+        return replace(
+            readings, thickness_um=film_um, sigma_um=sigma_um,
+            understood=f'{readings.understood}{words}',
+            layer=readings.layer if self.coats.names == ('',) else np.array(layer),
+        )  # fmt: skip
+
+    def _solids(self, layer: str) -> float:
+        coats = layer.split('+') if layer != TOTAL else self.coats.names
+        known = {self.solids[self.coats.names.index(coat)] for coat in coats}
+        share = known.pop()
+        if share is None or known:
+            of = 'the paint' if self.coats.names == ('',) else f"layer '{layer}'"
+            what = f'of {of} differ' if known else f'of {of} are not said'
+            raise ReadingsError(
+                f'the readings are wet, and the solids {what}; give each coat its solids, 0.45 '
+                'say, and name the one that was read in the column layer'
+            )
+        return share
+
+
+def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:
+    """The motion of a gun from what it says itself, its coat, and its experiment."""
+
+    def said(key: str) -> Any:
+        return next((v for one in levels if (v := getattr(one, key)) is not None), None)
+
+    file = said('trajectory')
+    if file is None:
+        raise ReadingsError(
+            f"{whose} has no 'trajectory'; give the name of a recording, RAPID module or table"
+        )
+    source = MotionSource(**{key: said(key) for key in MotionSource.model_fields})
+    if source.urdf:
+        source = source.model_copy(update={'urdf': str(folder / source.urdf)})
+    return GunMotionFile(str(folder / file), source, said('brush'))
