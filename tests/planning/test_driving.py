@@ -1,6 +1,7 @@
 """Plans that a robot drives: its joints against the arm by the product of exponentials."""
 
 import json
+from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
+from paint_deposition.planning.configurations import starts
 from paint_deposition.planning.driven_plan import driven
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
@@ -123,6 +125,22 @@ def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot)
         plain = one.trajectory.quaternions_xyzw[0]
         roll = Rotation.from_quat(plain).as_matrix()[:, 0] @ [1.0, 0.0, 0.0]
         assert (abs(abs(roll) - 1.0) > 1e-3) == rolls
+
+
+def test_a_configuration_once_chosen_is_kept(planned, cell):
+    """Also where another way through the same poses is as good."""
+    _, chosen = cell.allowed_speeds(planned.trajectory)
+    place, turn = cell.poses(planned.trajectory, np.zeros(1))
+    found = starts(cell.arm, place[0], turn[0].as_matrix(), False)
+    others = [one for one in found if np.abs(one.joints - chosen.joints).max() > 1.0]
+    kept = 0
+    while others and kept < 2:
+        begin = others.pop(0) if kept else chosen
+        with suppress(PlanError):  # not every configuration follows to the end
+            drive = cell.drive(planned.trajectory, False, begin)
+            assert drive.joints[0] == pytest.approx(begin.joints, abs=1e-3)
+            kept += 1
+    assert kept == 2
 
 
 @pytest.mark.parametrize(
