@@ -109,12 +109,16 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
 
 
 def _begins_as_thickness(heading: Heading) -> bool:
-    """'Schichtdicke Klarlack [µm]', and no target or statistic such as 'DFT max [µm]'."""
-    for count, words in ((1, heading.words[:1]), (2, heading.words[:2])):
-        name = ' '.join(words)
-        if name.endswith(('dicke', 'dft', 'thickness')) and len(heading.words) > count:
-            known = _quantity(replace(heading, words=words)) == 'thickness'
-            return known and heading.unit != '' and not {*heading.words} & NO_READING
+    """'Schichtdicke Klarlack [µm]', and no target or statistic such as 'DFT max [µm]'.
+
+    The unit ends it: more behind that is a remark.
+    """
+    if not (heading.unit and heading.text.endswith((']', ')'))) or {*heading.words} & NO_READING:
+        return False
+    for count in (1, 2):
+        words = heading.words[:count]
+        if words[-1:] and words[-1].endswith(('dicke', 'dft', 'thickness')):
+            return _quantity(replace(heading, words=words)) == 'thickness'
     return False
 
 
