@@ -182,7 +182,6 @@ def amounts(painted: Painted, diagnosis) -> list[dict]:
 @click.option('--kinds', default=','.join(KINDS), show_default=True, help='Kinds of campaigns.')
 @click.option('--seed', default=1, show_default=True, help='Another seed draws other campaigns.')
 @click.option('--jobs', default=2, show_default=True, help='Processes.')
-@click.option('--scheduler', help='Address of a Dask scheduler, instead of processes here.')
 @click.option(
     '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
 )
@@ -196,7 +195,6 @@ def main(
     kinds: str,
     seed: int,
     jobs: int,
-    scheduler: str | None,
     results: Path,
     constants: tuple[str, ...],
     report_only: bool,
@@ -227,7 +225,7 @@ def main(
             for task in tasks(campaigns, worlds, kinds.split(','), seed)
             if f'{task[0]}-{task[2]}-{task[1]}' not in done
         ]
-        records = add(results, run, todo, jobs, scheduler)
+        records = add(results, run, todo, jobs)
     click.echo(table(records))
     if failed:
         click.echo('\n' + failures(records))

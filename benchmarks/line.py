@@ -1,4 +1,4 @@
-"""A line of virtual parts through `paint line`: a real scheduler, workers, one of them killed.
+"""A line of virtual parts through `paint line`: two processes, one of them killed.
 
 The clean film of the programme is by eqs. (1) and (2) in NumPy, the hidden drift of the air is
 that of the virtual paint shop, by another law than the model's. It is too small for one door. At
@@ -11,7 +11,6 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -70,45 +69,20 @@ def smooth(job: Job, aside: Path) -> Job:
     return replace(job, experiments=(replace(part, readings=table),))
 
 
-def computed_on_a_cluster(folder: Path, output: Path, count: int) -> dict:
-    """`paint line` with a scheduler and two workers, one of which is killed half-way."""
-    told = FOLDER / 'scheduler.json'
-    told.unlink(missing_ok=True)
-    quiet = {'stdout': subprocess.DEVNULL, 'stderr': subprocess.DEVNULL}
-    dask = [sys.executable, '-m', 'dask']
-    scheduler = subprocess.Popen(
-        [*dask, 'scheduler', '--port', '0', '--no-dashboard', '--scheduler-file', told], **quiet
-    )
-    worker = [*dask, 'worker', '--scheduler-file', told, '--nthreads', '1', '--no-nanny',
-              '--no-dashboard']  # fmt: skip
-    workers = [subprocess.Popen(worker, **quiet) for _ in range(2)]
-    try:
-        while not told.exists():
-            time.sleep(0.2)
-        address = json.loads(told.read_text())['address']
-        began = time.monotonic()
-        command = ['paint', 'line', folder, '-o', output, '--scheduler', address, '--json']
-        running = subprocess.Popen([str(word) for word in command], stdout=subprocess.PIPE)
-        while running.poll() is None and len(list(output.glob('finished/*'))) < count // 2:
-            time.sleep(0.5)
-        workers[0].send_signal(signal.SIGKILL)
-        done = len(list(output.glob('finished/*')))
-        content, _ = running.communicate()
-        if running.returncode:
-            raise SystemExit(running.returncode)
-        return json.loads(content) | {
-            'seconds': time.monotonic() - began, 'killed_at': done,
-            'cpu_s': sum(_cpu_s(one.pid) for one in workers[1:]),
-        }  # fmt: skip
-    finally:
-        for process in (*workers, scheduler):
-            process.terminate()
-            process.wait()
-
-
-def _cpu_s(pid: int) -> float:
-    fields = Path(f'/proc/{pid}/stat').read_text().rpartition(')')[2].split()
-    return sum(map(int, fields[11:13])) / os.sysconf('SC_CLK_TCK')
+def computed_though_one_is_killed(folder: Path, output: Path, count: int) -> dict:
+    """`paint line` with two processes, one of which is killed half-way."""
+    began = time.monotonic()
+    command = ['paint', 'line', str(folder), '-o', str(output), '--workers', '2', '--json']
+    running = subprocess.Popen(command, stdout=subprocess.PIPE)
+    while running.poll() is None and len(list(output.glob('finished/*'))) < count // 2:
+        time.sleep(0.5)
+    done = len(list(output.glob('finished/*')))
+    children = Path(f'/proc/{running.pid}/task/{running.pid}/children').read_text().split()
+    os.kill(int(children[-1]), signal.SIGKILL)
+    content, _ = running.communicate()
+    if running.returncode:
+        raise SystemExit(running.returncode)
+    return json.loads(content) | {'seconds': time.monotonic() - began, 'killed_at': done}
 
 
 def repeated(parts: list[Measured], count: int) -> list[Measured]:
@@ -167,9 +141,9 @@ def main(count: int, length: int, redraws: int, seed: int) -> None:
     hidden = Hidden(step_at=step_at, step=STEP)
     folder, output = FOLDER / 'line', FOLDER / 'results'
     write_line(job, folder, count, hidden, points_a_part=A_PART)
-    told = computed_on_a_cluster(folder, output, count)
+    told = computed_though_one_is_killed(folder, output, count)
     size = sum(path.stat().st_size for path in output.glob('*.parquet'))
-    print(f'{count} parts, {told["points"]} readings: {told["seconds"]:.0f} s with two workers, '
+    print(f'{count} parts, {told["points"]} readings: {told["seconds"]:.0f} s with two processes, '
           f'one killed after {told["killed_at"]} parts; {told["measured"]} parts computed, '
           f'{len(told["errors"])} errors')  # fmt: skip
     print(f'tables: {size / count:.0f} bytes a part')

@@ -1,16 +1,14 @@
 """Results that are kept line by line: a run that was cut off goes on where it was."""
 
-import importlib
 import json
-import sys
 from collections.abc import Callable, Sequence
+from concurrent.futures import as_completed
 from pathlib import Path
 
 import click
-from distributed import as_completed
 from tqdm import tqdm
 
-from paint_deposition.batch.cluster import workers
+from paint_deposition.batch.processes import processes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
@@ -32,35 +30,16 @@ def kept(results: Path) -> list[dict]:
 
 
 def add(
-    results: Path,
-    run: Callable[[tuple], list[dict]],
-    todo: Sequence[tuple],
-    processes: int,
-    scheduler: str | None = None,
+    results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple], count: int
 ) -> list[dict]:
-    """Run tasks side by side, append their records to a file, and return all that it holds.
-
-    Args:
-        processes: workers on this machine.
-        scheduler: address of one whose workers are taken instead; see ``cluster.workers``.
-    """
+    """Run tasks side by side in so many processes, and return all records that the file holds."""
     results.parent.mkdir(parents=True, exist_ok=True)
-    with workers(scheduler, processes) as client, results.open('a') as file:
-        left = client.map(_importable(run), todo, pure=False)
+    with processes(count, {}) as pool, results.open('a') as file:
+        left = [pool.submit(run, task) for task in todo]
         for future in tqdm(as_completed(left), total=len(todo), mininterval=20):
-            records = future.result()
-            file.writelines(json.dumps(record, default=float) + '\n' for record in records)
+            file.writelines(json.dumps(one, default=float) + '\n' for one in future.result())
             file.flush()
-            future.release()
     return kept(results)
-
-
-def _importable(run: Callable) -> Callable:
-    """The same function where workers find it: in its module, not in the script that runs."""
-    if run.__module__ != '__main__':
-        return run
-    module = sys.modules['__main__'].__spec__.name
-    return getattr(importlib.import_module(module), run.__name__)
 
 
 def model_of(values: dict[str, float]) -> DepositionModel:

@@ -18,7 +18,10 @@ os.environ.setdefault('NUMBA_NUM_THREADS', '2')
 REPOSITORY = Path(__file__).resolve().parent.parent
 SHARED_DATA = REPOSITORY.parent / 'shared' / 'data'
 # The wheel comes early: meanwhile the first worker compiles what all others find on the disk.
-LONGEST = ('worlds', 'test_packaging.py', 'cli', 'inference', 'nodes', 'batch', 'test_public.py')
+LONGEST = (
+    'worlds', 'test_packaging.py', 'cli', 'nature', 'inference', 'nodes', 'batch',
+    'test_public.py', 'report', 'planning', 'effects',
+)  # fmt: skip
 
 # Nodes need ROS and the messages of the built workspace; the rest of the tests does without.
 HAS_NODES = find_spec('rclpy') is not None and find_spec('paint_msgs') is not None

@@ -18,6 +18,7 @@ def mesh(tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
 def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(mesh, tmp_path):
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []

@@ -53,6 +53,7 @@ def test_the_film_is_that_of_the_written_files(improved):
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
 def test_a_robot_program_is_improved_in_the_robots_frame(tmp_path):
     """A module in, a module out, in one frame."""
     pose = ('--part-pose', 1.8, -0.3, 0.7, 0.0, 0.0, 0.6, 0.8)
@@ -69,7 +70,10 @@ def test_a_robot_program_is_improved_in_the_robots_frame(tmp_path):
 @pytest.mark.parametrize(
     ('more', 'words'),
     [
-        (('--speed-min', 0.5, '--speed-max', 0.2), ('speed_min_m_per_s is 0.5', 'swap')),
+        (
+            ('--speed-min', 0.5, '--speed-max', 0.2),
+            ('--speed-min is 0.5, above --speed-max',),
+        ),
         (('--flow', 0, 1), ('--flow', '0.0')),
         (('--acceleration', 'fast'), ('fast',)),
         (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),

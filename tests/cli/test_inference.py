@@ -4,12 +4,15 @@ import csv
 import json
 import os
 import re
+import shlex
 import shutil
 import subprocess
+from functools import partial
 
 import pytest
 import yaml
 
+import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.results_folder import MARKER
@@ -19,6 +22,7 @@ from paint_deposition.inference.diagnosis.verdict import percent
 
 CAMPAIGN = SAMPLES / 'measured_door/campaign.yaml'
 HIDDEN = 'incidence_attraction'
+DIAGNOSE = 'paint diagnose measured_door/campaign.yaml -o diagnosis'
 
 
 @pytest.fixture(scope='module')
@@ -115,6 +119,49 @@ def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
     steps = ('paint simulate ', 'paint diagnose ', 'paint compare ', 'paint improve ')
     places = [printed.index(f'$ {step}') for step in steps]
     assert places == sorted(places)
+
+
+@pytest.mark.slow
+def test_a_demo_that_is_cut_off_says_so_on_its_page(tmp_path, monkeypatch, undrawn):
+    def cut_off(*given: object, **named: object) -> None:
+        raise KeyboardInterrupt
+
+    coarse = partial(pd.read_mesh, max_edge_length_m=0.1)
+    monkeypatch.setattr(pd, 'read_mesh', lambda path, **_: coarse(path), raising=False)
+    monkeypatch.setattr(pd, 'diagnose', cut_off, raising=False)
+    assert paint('demo', '-o', tmp_path, '--no-open').returncode == 130
+    page = (tmp_path / 'demo.html').read_text()
+    assert 'Cut off here, while: Diagnosing its readings.' in page
+    assert 'http-equiv="refresh"' not in page
+
+
+@pytest.mark.slow
+def test_the_guide_comes_to_a_painted_door(repository, tmp_path, demo, undrawn):
+    """Commands of docs/first_cell.md but those of nodes, on a copy of the samples.
+
+    They print the figures it names. The demo has diagnosed the same campaign.
+    """
+    page = (repository / 'docs/first_cell.md').read_text(encoding='utf-8')
+    folder = shutil.copytree(SAMPLES, tmp_path / 'first_cell')
+    shutil.copytree(demo[1] / 'diagnosis', folder / 'diagnosis')
+    everything = content(folder / 'diagnosis/diagnosis.json')['reason']
+    blocks = re.findall(r'```bash\n(.*?)```', page, re.DOTALL)
+    for line in ''.join(block for block in blocks if ' &\n' not in block).splitlines():
+        if line.startswith('paint ') and line != DIAGNOSE:
+            done = paint(*shlex.split(line)[1:], cwd=folder)
+            assert done.returncode == 0, done.stderr
+            everything += done.stdout
+    assert f'\n{DIAGNOSE}\n' in page
+    for printed, written in {
+        'film 17.0 µm mean': '17.0 µm on average',
+        '8.0 to 23.4 µm': '8.0 to 23.4 µm',
+        'The readings show incidence_attraction': 'the readings show incidence_attraction',
+        '7 horizontal passes at 188 mm, 0.637 m/s': 'seven passes, 188 mm apart at 0.637 m/s',
+        'sigma_n 4.2 to 2.7 %': 'by 4.2 % (σ_N)',
+        '99.8 % of it within 20 ± 2 µm': '99.8 % of the door is within 2 µm of its 20 µm',
+    }.items():
+        assert printed in everything
+        assert written in ' '.join(page.split())
 
 
 @pytest.mark.slow

@@ -74,7 +74,7 @@ def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(mode
 @pytest.mark.parametrize(
     ('arguments', 'words'),
     [
-        ((), 'neither speed_m_per_s nor target_um'),
+        ((), 'neither --speed nor --target-um'),
         (('--speed', -1), "'--speed': -1.0 is not in the range"),
         (('--speed', 'nan'), 'nan is not finite'),
         (('--speed', 0.2, '--travel-deg', 'inf'), 'inf is not finite'),
@@ -135,7 +135,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     ('arguments', 'words'),
     [
         (('--mesh', 'nowhere.stl', '--speed', 0.3), 'nowhere.stl: no such mesh file'),
-        (('--mesh', SAMPLES / 'door.stl'), 'neither speed_m_per_s nor target_um'),
+        (('--mesh', SAMPLES / 'door.stl'), 'neither --speed nor --target-um'),
         (('--mesh', SAMPLES / 'door.stl', '--speed', 0.3, '--index', -1), "'--index'"),
         (('--mesh', 'door.stl', '--speed', 0.3, '--index', 577), '<=10.0, in metres'),
         (('--mesh', 'door.stl', '--speed', 0.3, '--standoff', 250), '<=10.0, in metres'),

@@ -91,6 +91,21 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
 
 
+@pytest.mark.parametrize('heading', ['Auftrag', 'Schichtdicke soll [µm]', 'Schichtdicke Lack'])
+def test_readings_without_a_known_thickness_are_told_the_headings_that_are(heading, tmp_path):
+    (tmp_path / 'door.csv').write_text(f'x_m;y_m;z_m;{heading}\n0;0;0;20,5\n1;0;0;21,5\n')
+    known = f"'{heading}'", 'thickness_um, DFT, film thickness or Schichtdicke'
+    assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'no column is known as', *known)
+
+
+def test_a_table_with_every_sample_twice_says_the_rate_without_them(tmp_path):
+    rows = [f'{0.004 * k:.3f},{0.01 * (k // 2):.2f},0,0,0,0,0,1' for k in range(200)]
+    (tmp_path / 'poses.csv').write_text('\n'.join(['time_s,x_m,y_m,z_m,qx,qy,qz,qw', *rows]))
+    done = paint('inspect', tmp_path / 'poses.csv')
+    assert ' repeated samples (125.0 a second without them)' in done.stdout
+    assert 'they are dropped, and 125 a second are left' in done.stderr
+
+
 @pytest.mark.parametrize(
     ('scale', 'words'),
     [(1.0, 'taken for metres'), (1e3, 'looks like millimetres, else it would be 1200 m large')],

@@ -62,7 +62,10 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
         ),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
-        (['x,y,z,base_um', '0,0,0,1'], r"'base_um'\); call it thickness_um, or give its heading"),
+        (
+            ['x,y,z,base_um', '0,0,0,1'],
+            r"'base_um'\); call it thickness_um, DFT, film thickness or",
+        ),
         (['point,thickness_um', 'A,20'], 'no coordinates .* a list of measuring points'),
         ([], 'there is nothing to read in it'),
         ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),

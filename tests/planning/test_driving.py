@@ -18,6 +18,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
+from paint_deposition.planning.configurations import starts
 from paint_deposition.planning.driven_plan import driven
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
@@ -123,6 +124,18 @@ def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot)
         plain = one.trajectory.quaternions_xyzw[0]
         roll = Rotation.from_quat(plain).as_matrix()[:, 0] @ [1.0, 0.0, 0.0]
         assert (abs(abs(roll) - 1.0) > 1e-3) == rolls
+
+
+def test_a_configuration_once_chosen_is_kept(planned, cell):
+    """No other is looked for, also where it is one that cannot follow to the end."""
+    _, chosen = cell.allowed_speeds(planned.trajectory)
+    drive = cell.drive(planned.trajectory, False, chosen)
+    assert drive.joints[0] == pytest.approx(chosen.joints, abs=1e-3)
+    place, turn = cell.poses(planned.trajectory, np.zeros(1))
+    found = starts(cell.arm, place[0], turn[0].as_matrix(), False)
+    other = next(one for one in found if np.abs(one.joints - chosen.joints).max() > 1.0)
+    with pytest.raises(PlanError, match='in none of 1 configurations'):
+        cell.drive(planned.trajectory, False, other)
 
 
 @pytest.mark.parametrize(

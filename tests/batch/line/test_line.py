@@ -13,14 +13,14 @@ STEP_AT, MINUTES = 7, 90.0
 
 
 @pytest.mark.slow
-def test_a_line_of_twelve_parts_with_a_step(tmp_path, at_worker):
+def test_a_line_of_twelve_parts_with_a_step(tmp_path):
     job = painted_job(3, None, None, 12, 200_000)
     folder, output = tmp_path / 'line', tmp_path / 'out'
     hidden = Hidden(step_at=STEP_AT, step=0.85)
     names = write_line(job, folder, 12, hidden, minutes=MINUTES)
     (folder / f'{names[2]}.csv').unlink()
     (folder / f'{names[3]}.csv').write_text('x_m,y_m,z_m,thickness_um\n9,9,9,20\n')
-    done = paint('line', folder, '-o', output, *at_worker, '--json')
+    done = paint('line', folder, '-o', output, '--workers', 1, '--json')
     assert done.returncode == 0, done.stderr
     told = json.loads(done.stdout)
     assert (told['parts'], told['measured'], told['computed']) == (12, 10, 12)
@@ -45,7 +45,7 @@ def test_a_line_of_twelve_parts_with_a_step(tmp_path, at_worker):
     assert (output / 'line.png').stat().st_size > 10_000
     # A new day: only the new run is computed.
     (folder / f'{names[3]}.csv').unlink()
-    again = json.loads(paint('line', folder, '-o', output, *at_worker, '--json').stdout)
+    again = json.loads(paint('line', folder, '-o', output, '--workers', 1, '--json').stdout)
     assert (again['computed'], again['parts'], again['remarks']) == (1, 12, [])
 
 

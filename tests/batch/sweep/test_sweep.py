@@ -1,9 +1,8 @@
-"""A sweep by worker processes: the films of single runs, whatever dies on the way."""
+"""A sweep by processes: the films of single runs, whatever dies on the way."""
 
 import hashlib
 import json
-import os
-import signal
+import multiprocessing
 
 import pyarrow.parquet as pq
 import pytest
@@ -13,13 +12,14 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.batch.cases import ResultCache
-from paint_deposition.batch.cluster import run, workers
+from paint_deposition.batch.processes import compute
 from paint_deposition.batch.sweep.case import computed, varied_motion
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.sweep_file import SweepFile
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
+ONE = ('--workers', 1)
 SPEEDS, K1 = [0.9, 1.0, 1.1], [1.8, 1.9]
 TOLD = {
     'mesh': 'door.stl', 'trajectory': 'door', 'state_topic': '/atomizer/state',
@@ -48,21 +48,19 @@ def by_itself():
 
 
 @pytest.mark.slow
-def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path, by_itself):
+def test_films_are_those_of_single_runs_though_a_process_is_killed(tmp_path, by_itself):
     job = Job.of(SweepFile.model_validate(TOLD), DOOR)
     finished = ResultCache(tmp_path / 'finished')
     killed = []
 
     def kill_one(what: str, share: float) -> None:
-        if share > 0.0 and not killed:
-            killed.append(client.run(os.getpid).popitem()[1])
-            os.kill(killed[0], signal.SIGKILL)
+        if not killed:
+            killed.extend(multiprocessing.active_children())
+            killed[0].kill()
 
-    with workers(count=2) as client:
-        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 6
-        assert run(client, computed, job.cases, job.inputs, finished, kill_one) == 0
-        assert len(killed) == 1
-        assert killed[0] not in client.run(os.getpid).values()
+    for left in (6, 0):
+        assert compute(computed, job.cases, job.inputs, finished, kill_one, 2) == left
+    assert len(killed) == 2
     table = finished.table(case.digest for case in job.cases).to_pylist()
     for values, row in zip(job.values, table, strict=True):
         planar = pd.DepositionModel().planar
@@ -74,15 +72,15 @@ def test_films_are_those_of_single_runs_though_a_worker_is_killed(tmp_path, by_i
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_worker):
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
     output = tmp_path / 'out'
-    told = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
+    told = json.loads(paint('sweep', sweep_file, '-o', output, *ONE, '--json').stdout)
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
     kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
-    again = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
+    again = json.loads(paint('sweep', sweep_file, '-o', output, *ONE, '--json').stdout)
     assert again['computed'] == 1
     assert pq.read_table(output / 'cases.parquet').equals(first)
     assert first['speed_factor'].to_pylist() == SPEEDS * 2
@@ -109,7 +107,7 @@ def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_
         ),
     ],
 )
-def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path, changed, words):
+def test_what_does_not_go_together_is_refused_before_any_process_starts(tmp_path, changed, words):
     path = tmp_path / 'sweep.yaml'
     inputs = {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory', 'readings')}
     path.write_text(yaml.safe_dump(TOLD | inputs | changed))
@@ -118,12 +116,12 @@ def test_what_does_not_go_together_is_refused_before_any_worker_starts(tmp_path,
 
 
 @pytest.mark.slow
-def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_worker):
+def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
     """Names of files and lists of effects are drawn over, too; a bare part is no best case."""
     told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
     told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *ONE)
     assert done.returncode == 0, done.stderr
     assert 'warning: case 1: ' in done.stderr
     assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
@@ -149,7 +147,7 @@ class Own(Effect):
 
 
 @pytest.mark.slow
-def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, worker, by_itself):
+def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(tmp_path, by_itself):
     """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
     file.write_text(OWN)
@@ -161,7 +159,7 @@ def test_a_users_own_effect_travels_to_workers_that_have_not_its_file(tmp_path, 
     alone = by_itself(pd.read_model(model_file), SPEEDS[0])
     file.unlink()
     finished = ResultCache(tmp_path / 'finished')
-    run(worker, computed, job.cases, job.inputs, finished, lambda what, share: None)
+    compute(computed, job.cases, job.inputs, finished, lambda what, share: None, 1)
     as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']

@@ -214,7 +214,9 @@ def test_a_missing_reading_keeps_its_number(file, text, measured, names):
     assert readings.point.tolist() == [names.format(k) for k in measured]
 
 
-@pytest.mark.parametrize('heading', ['DFT [mil]', 'Thickness mil', 'Schichtdicke (mils)'])
+@pytest.mark.parametrize(
+    'heading', ['DFT [mil]', 'Thickness mil', 'Schichtdicke (mils)', 'Schichtdicke Klarlack [mil]']
+)
 @pytest.mark.parametrize('mark', '.,')
 def test_a_lone_heading_keeps_its_unit(file, heading, mark):
     text = f'{heading}\n0.8\n0.9\nn/a\n\n0.7\n1.1\n1.0\nStandard Deviation 0.1\n'

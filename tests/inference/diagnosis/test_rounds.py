@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 
 BASE = DepositionModel()
 LIBRARY = {effect.id: effect for effect in (FogGradient, FlowDrift, AirDrift)}
-CAMPAIGNS = 12
+CAMPAIGNS = 8
 # Probability that a correct rate fails one of these bounds with other seeds.
 CHANCE = 0.01
 

@@ -34,7 +34,9 @@ def test_the_cause_is_named_with_both_boxes(positions_m, words):
     with pytest.raises(ReadingsError, match=words) as refused:
         placed(positions_m)
     assert 'the readings span' in str(refused.value)
-    assert 'and the part -0.5 to 0.5 x 0 to 0 x -0.5 to 0.5 m' in str(refused.value)
+    assert 'and the part x -0.500 to 0.500, y 0.000 to 0.000, z -0.500 to 0.500 m' in str(
+        refused.value
+    )
 
 
 def test_a_small_cluster_of_readings_is_none_of_these():

@@ -84,9 +84,11 @@ def improve(
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, original = seen.surface, Programme.of(trajectory)
+    begin = None
     point_zones = zones.on(surface) if zones else None
     if robot:
-        original = replace(original, allowed=robot.allowed_speeds(trajectory))
+        allowed, begin = robot.allowed_speeds(trajectory)
+        original = replace(original, allowed=allowed)
     progress('the film as it is', 0.0)
     film_um, paint = simulated(surface, model, trajectory)
     if film_um.max() < NO_PAINT_UM:
@@ -101,7 +103,7 @@ def improve(
     retiming = retime_for_evenness(surface, sought, original, models, request, progress)
     programme, drive = retiming.programme, None
     if robot:
-        drive = robot.drive(programme.trajectory(), free_roll=False)
+        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
         programme = Programme.of(drive.trajectory)
     moves = moves_of(programme, request)
     progress('the film of the written files', 0.0)

@@ -1,1 +1,1 @@
-"""Many cases and many parts: workers, sweeps, lines."""
+"""Many cases and many parts: processes, sweeps, lines."""

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -13,35 +12,26 @@ from paint_deposition.cli.progress import Progress
 from paint_deposition.errors import ManyError
 from paint_deposition.files.parquet import MANY, require_libraries
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
-
-    from paint_deposition.batch.cases import Case, ResultCache
-
 MOST_WARNINGS = 5
-workers_options = options.grouped((
-    click.option(
-        '--scheduler', metavar='ADDRESS',
-        help='Address of a Dask scheduler, tcp://10.0.0.5:8786; default: local processes.',
-    ),
-    click.option(
-        '--workers', 'count', type=click.IntRange(min=1),
-        help='Processes on this machine, of one thread each; default: one a core.',
-    ),
-), 'where')  # fmt: skip
+workers_option = click.option(
+    '--workers', 'count', type=click.IntRange(min=1),
+    help='Processes of one thread each, side by side; default: one a core.',
+)  # fmt: skip
 
 
 @click.command('sweep')
 @click.argument('sweep', type=options.FILE)
-@workers_options
+@workers_option
 @options.results_options('cases.parquet, sweep.json and sweep.png')
-def sweep_command(sweep: Path, results: options.Results, where: dict) -> None:
+def sweep_command(sweep: Path, results: options.Results, count: int | None) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
     Each case is what `simulate` computes. Finished cases are kept in the folder `finished` of the
     output: a run that was cut off computes the rest only, and so does a sweep with more cases.
     """
     require_libraries('paint sweep', MANY)
+    from paint_deposition.batch.cases import ResultCache
+    from paint_deposition.batch.processes import compute
     from paint_deposition.batch.sweep.case import computed
     from paint_deposition.batch.sweep.job import Job
     from paint_deposition.batch.sweep.result import Sweep
@@ -51,11 +41,10 @@ def sweep_command(sweep: Path, results: options.Results, where: dict) -> None:
         show('reading')
         job = Job.of(read_sweep(sweep), sweep.parent, show)
         options.print_all('note', job.notes)
-        finished, done, workers = _computed(
-            computed, job.cases, job.inputs, results, show, **where
-        )
+        finished = ResultCache(results.output / 'finished')
+        done = compute(computed, job.cases, job.inputs, finished, show, count)
         show('writing and drawing')
-        found = Sweep.of(job, finished, done, workers)
+        found = Sweep.of(job, finished, done)
         if len(found.errors) == len(job.cases):
             number, error = found.errors[0]
             raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
@@ -67,9 +56,9 @@ def sweep_command(sweep: Path, results: options.Results, where: dict) -> None:
 
 @click.command('line')
 @click.argument('folder', type=options.FOLDER)
-@workers_options
+@workers_option
 @options.results_options('points.parquet, parts.parquet, line.json and line.png')
-def line_command(folder: Path, results: options.Results, where: dict) -> None:
+def line_command(folder: Path, results: options.Results, count: int | None) -> None:
     """Simulate and compare all runs in FOLDER, and show what they share and what changes.
 
     FOLDER holds line.yaml, which names mesh and model, the recordings, and the readings of those
@@ -77,18 +66,21 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
     folder `finished` of the output: the next time only new runs are computed.
     """
     require_libraries('paint line', MANY)
+    from paint_deposition.batch.cases import ResultCache
     from paint_deposition.batch.line.part import computed
     from paint_deposition.batch.line.result import Line
     from paint_deposition.batch.line.runs import line_cases, shared_files
     from paint_deposition.batch.line.times import dated
+    from paint_deposition.batch.processes import compute
 
     with Progress('line') as show:
         show('reading')
         cases, file, model, unmatched = line_cases(folder)
-        finished, done, workers = _computed(computed, cases, {}, results, show, **where)
+        finished = ResultCache(results.output / 'finished')
+        done = compute(computed, cases, {}, finished, show, count)
         show('pooling')
         table = dated(finished.table(case.digest for case in cases))
-        found = Line(model, shared_files(folder, file), table, done, workers, unmatched)
+        found = Line(model, shared_files(folder, file), table, done, unmatched)
         if not found.runs:
             name, error = found.errors[0]
             raise ManyError(f'none of {len(cases)} runs can be used; {name}: {error}')
@@ -96,27 +88,6 @@ def line_command(folder: Path, results: options.Results, where: dict) -> None:
     _print_warnings([*found.errors, *found.remarks], results.output / 'line.json')
     options.print_all('warning', found.warnings)
     results.print(found.lines)
-
-
-def _computed(
-    work: Callable,
-    cases: Sequence[Case],
-    inputs: Mapping[str, Any],
-    results: options.Results,
-    show: Callable[..., None],
-    scheduler: str | None,
-    count: int | None,
-) -> tuple[ResultCache, int, str]:
-    """The finished cases, how many were computed now, and by which workers."""
-    from paint_deposition.batch.cases import ResultCache
-    from paint_deposition.batch.cluster import compute
-
-    if scheduler is not None and count is not None:
-        raise click.UsageError('--workers is for this machine; leave it out beside --scheduler')
-    finished = ResultCache(results.output / 'finished')
-    done, workers = compute(scheduler, count, work, cases, inputs, finished, show)
-    options.print_all('note', [f'workers: {workers}'])
-    return finished, done, workers
 
 
 def _print_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:

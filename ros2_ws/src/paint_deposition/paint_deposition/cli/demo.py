@@ -93,14 +93,16 @@ class _Story:
         self._opens = opens and has_display()
         self._told: list[tuple[Chapter, str]] = []
         self._command, self._folder, self._step = '', page.parent, ''
+        self._underway = ''
         self._began_s = time.monotonic()
 
     def begin(self, what: str, *command: object) -> None:
         """Say what comes next and the command, with its folder at the end, that does the same."""
         self._command = f'paint {shlex.join(map(str, command))}'
         self._folder = Path(str(command[-1]))
+        self._underway = what
         click.echo(f'\n{what}\n  $ {self._command}')
-        self._write(what)
+        self._write()
 
     def step(self, what: str, share: float | None = None) -> None:
         """Say what is being done, once."""
@@ -114,22 +116,23 @@ class _Story:
         with results_in(self._folder) as folder:
             pd.write(result, folder)
         self._told.append((chapter, self._command))
+        self._underway = ''
         for paragraph in chapter.text:
             click.echo(fill(paragraph, LINE, initial_indent='  ', subsequent_indent='  '))
         for label, before, after, unit in chapter.figures:
             click.echo(f'  {label + ":":32} {before + " -> " if before else ""}{after} {unit}')
 
-    def _write(self, underway: str) -> None:
+    def _write(self, ended: bool = False) -> None:
         if self._told:
             from paint_deposition.report.page.story import write_story
 
-            write_story(self.page, self._told, underway)
+            write_story(self.page, self._told, self._underway, ended)
             if self._opens:
                 self._opens = not webbrowser.open(self.page.resolve().as_uri())
 
     def end(self) -> None:
-        """Write the page for the last time: it no longer waits for more."""
-        self._write('')
+        """Write the page for the last time: it says where it was cut off, and waits no more."""
+        self._write(ended=True)
 
 
 def has_display() -> bool:

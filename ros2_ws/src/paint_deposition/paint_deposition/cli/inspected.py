@@ -3,22 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.errors import some
 
-if TYPE_CHECKING:
-    import numpy as np
-
 MOST_NAMED = 8
-
-
-def box_words(low_m: np.ndarray, high_m: np.ndarray) -> str:
-    """'x 0.000 to 1.200, y ...', of the corners (3,) of a box [m]."""
-    sides = zip('xyz', low_m, high_m, strict=True)
-    return ', '.join(f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in sides) + ' m'
 
 
 def readings_in(path: Path, points_file: Path | None) -> tuple[dict[str, Any], str]:
@@ -27,6 +18,7 @@ def readings_in(path: Path, points_file: Path | None) -> tuple[dict[str, Any], s
 
     from paint_deposition.inference.readings.gauge_noise import gauge_noise
     from paint_deposition.inference.readings.readings import PointMeans
+    from paint_deposition.part.points import box_words
 
     readings = pd.read_readings(path, points_file)
     film, means, noise = readings.thickness_um, PointMeans.of(readings), gauge_noise(readings)
@@ -55,7 +47,7 @@ def readings_in(path: Path, points_file: Path | None) -> tuple[dict[str, Any], s
         f'{len(readings)} readings at {len(means.first)} points, {repeats}: noise of the gauge '
         f'{noise.typical_um:.2f} µm, {noise.source}',
         f'film {film.min():.1f} to {film.max():.1f} µm, mean {film.mean():.1f} µm',
-        box_words(low, high),
+        box_words(readings.positions_m),
     ]
     return figures, '\n'.join(lines)
 
@@ -66,6 +58,7 @@ def mesh_in(path: Path) -> tuple[dict[str, Any], str]:
 
     from paint_deposition.files.mesh_bodies import WITH_UNIT, read_bodies
     from paint_deposition.files.meshes import LARGEST_M
+    from paint_deposition.part.points import box_words
 
     bodies, scale, unit = read_bodies(path), 1.0, ''
     if path.suffix.lower() not in WITH_UNIT:
@@ -85,4 +78,6 @@ def mesh_in(path: Path) -> tuple[dict[str, Any], str]:
     }  # fmt: skip
     size = ' x '.join(f'{side:.3f}' for side in high - low)
     what = f'{path.name}: a mesh of {len(bodies.faces)} triangles, {size} m, {area_m2:.3g} m2'
-    return figures, '\n'.join(filter(None, [what, unit, box_words(low, high), *surface.notes]))
+    return figures, '\n'.join(
+        filter(None, [what, unit, box_words(surface.vertices_m), *surface.notes])
+    )

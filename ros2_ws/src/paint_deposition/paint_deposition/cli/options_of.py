@@ -1,6 +1,7 @@
 """Options of a command from the model of its request: names, types, bounds, defaults and help."""
 
 import math
+import re
 from collections.abc import Callable
 from functools import reduce, wraps
 from pathlib import Path
@@ -9,11 +10,11 @@ from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
 from annotated_types import Ge, Gt, Le, Lt, MaxLen
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 from paint_deposition.cli.options import FILE, FiniteNumber, FiniteRange
-from paint_deposition.request import reason
+from paint_deposition.errors import PaintError
 
 
 def options_of(kind: type[BaseModel], into: str = 'request') -> Callable[[Callable], Callable]:
@@ -28,6 +29,7 @@ def options_of(kind: type[BaseModel], into: str = 'request') -> Callable[[Callab
         into: name of the argument of the command that takes the request.
     """
     names = list(kind.model_fields)
+    called = {name: _called(name, kind.model_fields[name]) for name in names}
 
     def with_options(command: Callable) -> Callable:
         @wraps(command)
@@ -37,10 +39,12 @@ def options_of(kind: type[BaseModel], into: str = 'request') -> Callable[[Callab
             for name in own.keys() & set(filter(_is_angle, names)):
                 own[name] = math.radians(own[name])
             try:
-                request = kind(**own)
-            except ValidationError as error:
-                raise click.UsageError(reason(error, kind)) from None
-            return command(**{into: request}, **values)
+                return command(**{into: kind(**own)}, **values)
+            except PaintError as error:
+                # Of names with a unit only: others are also words of a sentence.
+                named = {name: option for name, option in called.items() if '_' in name}
+                said = re.sub(r'\w+', lambda word: named.get(word[0], word[0]), str(error))
+                raise type(error)(said) from None
 
         options = (_option(name, kind.model_fields[name]) for name in reversed(names))
         return reduce(lambda taken, option: option(taken), options, with_request)
@@ -52,9 +56,18 @@ def _is_angle(name: str) -> bool:
     return name.endswith('_rad')
 
 
-def _option(name: str, field: FieldInfo) -> Callable:
-    extra = field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+def _extra(field: FieldInfo) -> dict[str, Any]:
+    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
+
+
+def _called(name: str, field: FieldInfo) -> str:
+    """The option of a field."""
     usual = f'--{name.removesuffix("_rad")}-deg' if _is_angle(name) else f'--{name}'
+    return str(_extra(field).get('option', usual.replace('_', '-')))
+
+
+def _option(name: str, field: FieldInfo) -> Callable:
+    extra = _extra(field)
     known = field.get_default(call_default_factory=True)
     if _is_angle(name) and known is not None:
         known = math.degrees(known)
@@ -67,7 +80,7 @@ def _option(name: str, field: FieldInfo) -> Callable:
         settings |= _type(annotation, metadata, shown) | {'show_default': known is not None}
     if 'metavar' in extra:
         settings['metavar'] = extra['metavar']
-    return click.option(str(extra.get('option', usual.replace('_', '-'))), name, **settings)
+    return click.option(_called(name, field), name, **settings)
 
 
 def _bare(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:

@@ -10,7 +10,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.inspected import box_words, mesh_in, readings_in
+from paint_deposition.cli.inspected import mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.json_files import json_text
@@ -80,13 +80,13 @@ def _contents(
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
     from paint_deposition.files.refusals import checked
-    from paint_deposition.files.tables.poses import is_pose_table
+    from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
     from paint_deposition.files.tables.readings import holds_readings
 
     source = checked(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         return mesh_in(path)
-    if is_pose_table(path) and (points_file or holds_readings(path)):
+    if is_pose_table(path) and (points_file or holds_readings(path) or not may_hold_poses(path)):
         return readings_in(path, points_file)
     if is_pose_table(path):
         poses = read_table(path, source)
@@ -110,6 +110,7 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
     import numpy as np
 
     from paint_deposition.motion.stream_quality import StreamQuality
+    from paint_deposition.part.points import box_words
 
     values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
     quality = StreamQuality.of(poses.stamps_ns, values, max_gap_s=max_pose_gap_s)
@@ -120,7 +121,8 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
         **vars(quality),
     }  # fmt: skip
     frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {box_words(low, high)}'
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: '
+    line += box_words(poses.positions_m)
     return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 
@@ -158,7 +160,9 @@ def _source_lines(source: PoseSource) -> list[str]:
 
 
 def _stream_words(quality: StreamQuality) -> str:
-    lag = ''
+    lag = without = ''
+    if quality.repeated_samples:
+        without = f' ({quality.new_rate_hz:.1f} a second without them)'
     if quality.lag_s is not None and quality.lag_range_s is not None:
         low, high = quality.lag_range_s
         lag = f', logged {quality.lag_s:.3g} s after the stamp ({low:.3g} to {high:.3g})'
@@ -166,7 +170,7 @@ def _stream_words(quality: StreamQuality) -> str:
         f'{quality.mean_rate_hz:.1f} a second, {quality.gaps} gaps, longest interval '
         f'{quality.longest_gap_s:.3f} s, {quality.repeated_stamps} repeated and '
         f'{quality.backward_stamps} backward stamps, {quality.repeated_samples} repeated '
-        f'samples{lag}'
+        f'samples{without}{lag}'
     )
 
 

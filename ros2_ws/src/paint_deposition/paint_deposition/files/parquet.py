@@ -14,15 +14,14 @@ if TYPE_CHECKING:
 
 MAGIC = b'PAR1'
 PYARROW = 'pyarrow'
-MANY = ('distributed', PYARROW, 'ruptures')
+MANY = (PYARROW, 'ruptures')
 
 
 def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> None:
     """Refuse to begin what needs libraries of the extra, naming those that are missing."""
     missing = [name for name in libraries if find_spec(name) is None]
     if missing:
-        *others, last = missing
-        named = f'{", ".join(others)} and {last}, which are' if others else f'{last}, which is'
+        named = f'{" and ".join(missing)}, which {"are" if missing[1:] else "is"}'
         raise ManyError(
             f'{what} needs {named} not installed; run: pip install '
             f'{" ".join(missing)}, or install paint_deposition[many]'

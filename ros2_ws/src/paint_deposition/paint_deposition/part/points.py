@@ -158,6 +158,13 @@ def box_extent_m(positions_m: np.ndarray) -> np.ndarray:
     return high - low
 
 
+def box_words(positions_m: np.ndarray) -> str:
+    """'x 0.000 to 1.200, y 0.000 to 0.700, z ... m', the box around points (N, 3) [m]."""
+    low, high = positions_m.min(axis=0).round(3) + 0.0, positions_m.max(axis=0).round(3) + 0.0
+    sides = zip('xyz', low, high, strict=True)
+    return ', '.join(f'{axis} {a:.3f} to {b:.3f}' for axis, a, b in sides) + ' m'
+
+
 def heights(positions_m: np.ndarray, among_m: np.ndarray, down: np.ndarray) -> np.ndarray:
     """(N,) heights of (N, 3) positions, 0 at the lowest of (V, 3) others to 1 at the highest."""
     height, others = -positions_m @ down, -among_m @ down

@@ -99,20 +99,21 @@ class RobotCell:
                 '<limit lower="-3" upper="3" effort="0" velocity="2"/>'
             )
 
-    def drive(self, trajectory: Trajectory, free_roll: bool) -> Drive:
+    def drive(self, trajectory: Trajectory, free_roll: bool, begin: Start | None = None) -> Drive:
         """The joints that drive a motion in the frame of the part.
 
         The way through all poses is the one that the joints can drive the fastest. Where they
         cannot keep up the motion is slowed down, each pass as a whole. With ``free_roll`` the tool
-        may be turned about its own axis, by one angle for the whole motion.
+        may be turned about its own axis, by one angle for the whole motion. ``begin`` is the
+        configuration to begin in, where it is chosen already.
 
         Raises:
             PlanError: the robot does not reach all poses.
         """
-        arm, begin_ns = self.arm, int(trajectory.stamps_ns[0])
+        arm, first_ns = self.arm, int(trajectory.stamps_ns[0])
         times_s = _times(trajectory)
         positions, turns = self.poses(trajectory, times_s)
-        joints, roll_rad = _joints(arm, positions, turns, times_s, free_roll)
+        joints, begun = _joints(arm, positions, turns, times_s, free_roll, begin)
         most = arm.fastest / FULL_SPEED_S
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
@@ -122,10 +123,10 @@ class RobotCell:
         reached_s, seconds, driven, speeds = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
-            later_s = np.interp(1e-9 * (stamps_ns - begin_ns), times_s, reached_s)
-            return begin_ns + np.round(1e9 * later_s).astype(np.int64)
+            later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
+            return first_ns + np.round(1e9 * later_s).astype(np.int64)
 
-        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(roll_rad)
+        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(begun.roll_rad)
         slowed = replace(
             trajectory,
             stamps_ns=slowed_ns(trajectory.stamps_ns),
@@ -136,19 +137,21 @@ class RobotCell:
         limits = pace.limits(opening, shares)
         return Drive(arm, slowed, seconds, driven, speeds, limits, float(values[:, -1].min()))
 
-    def allowed_speeds(self, trajectory: Trajectory) -> tuple[np.ndarray, np.ndarray]:
+    def allowed_speeds(
+        self, trajectory: Trajectory
+    ) -> tuple[tuple[np.ndarray, np.ndarray], Start]:
         """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
-        at which a joint runs at its greatest speed.
+        at which a joint runs at its greatest speed; and the configuration in which it begins.
         """
         times_s = _times(trajectory)
         positions, turns = self.poses(trajectory, times_s)
-        joints, _ = _joints(self.arm, positions, turns, times_s, False)
+        joints, begun = _joints(self.arm, positions, turns, times_s, False)
         steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         share = np.abs(np.diff(joints, axis=0)) / (1.0 - MARGIN) / self.arm.fastest
         speed = steps_m / np.maximum(share.max(axis=1), 1e-9)
         travel = np.append(0.0, np.cumsum(steps_m))
         moving = steps_m > 1e-6
-        return 0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]
+        return (0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]), begun
 
     def tried(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
         """How far a motion is followed, at which share of its speed, and with what room.
@@ -174,19 +177,24 @@ class RobotCell:
 
 
 def _joints(
-    arm: Arm, positions_m: np.ndarray, turns: Rotation, times_s: np.ndarray, free_roll: bool
-) -> tuple[np.ndarray, float]:
-    """Joints (N, J) for poses in the robot's base, and by how much the tool is rolled [rad]."""
+    arm: Arm,
+    positions_m: np.ndarray,
+    turns: Rotation,
+    times_s: np.ndarray,
+    free_roll: bool,
+    begin: Start | None = None,
+) -> tuple[np.ndarray, Start]:
+    """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
     rows = _apart(positions_m, turns)
-    way, roll_rad = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll)
-    axes = (turns * _roll(roll_rad)).as_matrix()
+    way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
+    axes = (turns * _roll(begun.roll_rad)).as_matrix()
     joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
     if error.max() > REACHED:
         raise PlanError(
             f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m in '
             'its base; let the part stand elsewhere, paint place shows where'
         )
-    return joints, roll_rad
+    return joints, begun
 
 
 def _roll(roll_rad: float) -> Rotation:
@@ -203,11 +211,16 @@ def _apart(positions_m: np.ndarray, turns: Rotation) -> np.ndarray:
 
 
 def _best_way(
-    arm: Arm, positions_m: np.ndarray, turns: Rotation, times_s: np.ndarray, free_roll: bool
-) -> tuple[np.ndarray, float]:
-    """(N, J), of all ways through the poses the one that is driven the fastest, and its roll."""
-    begin, ways = _ways(arm, positions_m, turns, free_roll)
-    if not begin:
+    arm: Arm,
+    positions_m: np.ndarray,
+    turns: Rotation,
+    times_s: np.ndarray,
+    free_roll: bool,
+    begin: Start | None,
+) -> tuple[np.ndarray, Start]:
+    """(N, J), of all ways through the poses the one that is driven the fastest, and its begin."""
+    begins, ways = _ways(arm, positions_m, turns, free_roll, begin)
+    if not begins:
         raise PlanError(
             f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
             'check --part-pose, or let paint place look where the part may stand'
@@ -216,17 +229,21 @@ def _best_way(
         far = int(ways.reached.max())
         raise PlanError(
             f'the robot follows the motion to {times_s[far]:.1f} of {times_s[-1]:.1f} s and not '
-            f'beyond {_words(positions_m[far])} m in its base, in none of {len(begin)} '
+            f'beyond {_words(positions_m[far])} m in its base, in none of {len(begins)} '
             'configurations; let paint place look where the part may stand'
         )
     best = _best(arm, ways, times_s)
-    return ways.joints[best], begin[best].roll_rad
+    return ways.joints[best], begins[best]
 
 
 def _ways(
-    arm: Arm, positions_m: np.ndarray, turns: Rotation, free_roll: bool
+    arm: Arm,
+    positions_m: np.ndarray,
+    turns: Rotation,
+    free_roll: bool,
+    chosen: Start | None = None,
 ) -> tuple[list[Start], Ways]:
-    begin = starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    begin = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
     axes = np.reshape([(turns * _roll(one.roll_rad)).as_matrix() for one in begin],
                       (len(begin), len(positions_m), 3, 3))  # fmt: skip
     joints = np.reshape([one.joints for one in begin], (len(begin), len(arm)))

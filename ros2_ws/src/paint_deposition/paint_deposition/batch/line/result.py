@@ -51,7 +51,6 @@ class Line:
     files: Mapping[str, Path]  # shared by all, by what they are
     table: pa.Table  # a row for each part and point, in the order of the runs
     computed: int  # how many runs were computed now
-    workers: str  # what computed them, in words
     unmatched: Sequence[str] = ()  # names of files of the folder that belong to no run
 
     @cached_property
@@ -178,7 +177,6 @@ class Line:
             'measured': len(self.parts),
             'points': sum(map(len, self.parts)),
             'computed': self.computed,
-            'workers': self.workers,
             'first': date(self.runs[0]['time_s']) if self.runs else None,
             'last': date(self.runs[-1]['time_s']) if self.runs else None,
             'pooled': scales and {

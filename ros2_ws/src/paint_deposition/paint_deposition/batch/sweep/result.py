@@ -44,10 +44,9 @@ class Sweep:
     job: Job  # what was swept
     table: pa.Table  # a row for each case in the order of the job: what varied, then its figures
     computed: int  # how many cases this run computed; the others had been finished before
-    workers: str  # what computed them, in words
 
     @staticmethod
-    def of(job: Job, results: ResultCache, computed: int, workers: str) -> Sweep:
+    def of(job: Job, results: ResultCache, computed: int) -> Sweep:
         """Collect the results of a job that is finished."""
         import pyarrow as pa
 
@@ -58,7 +57,7 @@ class Sweep:
         columns |= {name: figures[name] for name in figures.column_names}
         if 'error' not in columns:
             columns['error'] = pa.nulls(len(job.cases), pa.string())
-        return Sweep(job, pa.table(columns), computed, workers)
+        return Sweep(job, pa.table(columns), computed)
 
     def __repr__(self) -> str:
         return f'Sweep({self.sentence})'
@@ -128,7 +127,6 @@ class Sweep:
         return {
             'cases': len(self.job.cases),
             'computed': self.computed,
-            'workers': self.workers,
             'varied': list(self.varied),
             'figures': {
                 name: dict(zip(('low_5', 'median', 'high_95'), self._spread(name), strict=True))

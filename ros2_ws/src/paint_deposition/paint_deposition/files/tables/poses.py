@@ -7,10 +7,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.tables.headings import LENGTHS, SPEEDS
-from paint_deposition.files.tables.pose_columns import POSITION, PoseTable
+from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading
+from paint_deposition.files.tables.pose_columns import (
+    POSITION,
+    QUATERNION,
+    ROLL_PITCH_YAW,
+    ROTATION_VECTOR,
+    PoseTable,
+    column_name,
+)
+from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.rotations import read_rotations
-from paint_deposition.files.tables.table import SWITCHED
+from paint_deposition.files.tables.table import SWITCHED, find_table
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
@@ -47,6 +55,16 @@ class PoseLayout:
 def is_pose_table(path: Path) -> bool:
     """Whether a file is named as a table."""
     return path.suffix.lower() in SUFFIXES
+
+
+def may_hold_poses(path: Path) -> bool:
+    """Whether a table has a column of times, speeds or angles, as no table of readings has."""
+    names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
+
+    def known(headings: list[Heading]) -> int:
+        return sum(column_name(heading) in names for heading in translated(headings)[0])
+
+    return find_table(path, RecordingError, known)[1] is not None
 
 
 def read_pose_table(path: Path, layout: PoseLayout, robot: 'Robot | None' = None) -> Trajectory:

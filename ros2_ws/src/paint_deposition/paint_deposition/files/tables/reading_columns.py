@@ -29,6 +29,12 @@ LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
 # A film before anything evaporates, as a comb shows it.
 WET = re.compile(r'(wet|wft|nass)')
 OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')
+# What makes a thickness another figure than a reading of it.
+NO_READING = {
+    *NOMINAL, 'ziel', 'target', 'min', 'max', 'minimum', 'maximum', 'std', 'sd', 'sigma',
+    'streuung', 'toleranz', 'tolerance', 'abweichung', 'deviation', 'differenz',
+    'difference', 'nass', 'wet', 'fehler', 'error',
+}  # fmt: skip
 ALIASES = {
     'thickness': (
         'thickness', 'film thickness', 'coating thickness', 'film build', 'film', 'dft',
@@ -78,6 +84,9 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
                 at[quantity] = [k for k, one in enumerate(found) if one == quantity]
         if {*AXES} <= {*at}:
             at = {q: columns for q, columns in at.items() if q not in ON_FACE}
+        also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
+        if also and 'thickness' not in at:
+            at['thickness'] = also
     at |= own
     for quantity, name in layout.columns.items():
         wanted = name - 1 if isinstance(name, int) else -1
@@ -103,6 +112,20 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
     return known
 
 
+def _begins_as_thickness(heading: Heading) -> bool:
+    """'Schichtdicke Klarlack [µm]', and no target or statistic such as 'DFT max [µm]'.
+
+    The unit ends it: more behind that is a remark.
+    """
+    if not (heading.unit and heading.text.endswith((']', ')'))) or {*heading.words} & NO_READING:
+        return False
+    for count in (1, 2):
+        words = heading.words[:count]
+        if words[-1:] and words[-1].endswith(('dicke', 'dft', 'thickness')):
+            return _quantity(replace(heading, words=words)) == 'thickness'
+    return False
+
+
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
     """Why a file has no such table, and what to do.
 
@@ -124,7 +147,7 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
             if _quantity(heading) != 'thickness' == _quantity(plain)
         ]
         likely = [h.text for h in bare if _quantity(replace(h, words=h.words[-1:])) == 'thickness']
-        remedy = 'call it thickness_um, or give its heading or number'
+        remedy = 'call it thickness_um, DFT, film thickness or Schichtdicke, or name it'
         if foreign:
             remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
             remedy += ', or say unit: {thickness: ...} and name it'

@@ -6,6 +6,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import box_words
 from paint_deposition.part.surface import Surface
 
 # Readings further from the surface, or facing more away from it, do not belong to the part.
@@ -66,8 +67,8 @@ def unit_in_doubt(surface: Surface, readings: Readings) -> str:
     if not units:
         return ''
     return (
-        f'the readings span {_box_words(places_m)} m and the part '
-        f'{_box_words(surface.vertices_m)} m; no unit of their positions is given, and they fit '
+        f'the readings span {box_words(places_m)} and the part '
+        f'{box_words(surface.vertices_m)}; no unit of their positions is given, and they fit '
         f'in {" and in ".join(units)}, too: say unit: {{position: {units[-1]}}}, or mm if it is '
         'right'
     )
@@ -88,7 +89,7 @@ def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarr
 def _hint(surface: Surface, positions_m: np.ndarray) -> str:
     """Both bounding boxes and the likely cause, in one line."""
     vertices = surface.vertices_m
-    boxes = f'the readings span {_box_words(positions_m)} m and the part {_box_words(vertices)} m'
+    boxes = f'the readings span {box_words(positions_m)} and the part {box_words(vertices)}'
     for factor, words in OTHER_UNITS.items():
         if _fits(surface, factor * positions_m):
             return f'{boxes}; {words}'
@@ -107,11 +108,6 @@ def _fits(surface: Surface, positions_m: np.ndarray) -> bool:
     if span < LEAST_SPAN * np.ptp(surface.vertices_m, axis=0).max():
         return False
     return bool(np.median(surface.locate(positions_m).distance_m) < NEAR_M)
-
-
-def _box_words(points_m: np.ndarray) -> str:
-    low, high = points_m.min(axis=0).round(6) + 0.0, points_m.max(axis=0).round(6) + 0.0
-    return ' x '.join(f'{a:.3g} to {b:.3g}' for a, b in zip(low, high, strict=True))
 
 
 FEWEST_ON_A_LINE = 3

@@ -36,14 +36,17 @@ class Chapter:
     pictures: Sequence[tuple[str, str]]  # what each shows, and its content as an address
 
 
-def write_story(path: Path, told: Sequence[tuple[Chapter, str]], underway: str = '') -> Path:
+def write_story(
+    path: Path, told: Sequence[tuple[Chapter, str]], underway: str = '', ended: bool = False
+) -> Path:
     """Write the page, whole or not at all.
 
     Args:
         told: each chapter with the command that does the same by hand.
-        underway: what is being done; while there is something the page reloads itself.
+        underway: what is being done; until it has ``ended`` the page reloads itself.
     """
-    page = from_template('story.html.j2', {}, told=told, underway=underway, reload_s=RELOAD_S)
+    reload_s = RELOAD_S if underway and not ended else None
+    page = from_template('story.html.j2', {}, told=told, underway=underway, reload_s=reload_s)
     write_text(path, page)
     return path
 
