@@ -6,6 +6,7 @@ does not count. Within a cell they scatter by the gauge's noise and the film's f
 is how well its mean is known. What is coarser than a cell is not averaged out.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -24,14 +25,31 @@ HALVINGS = 30
 NEIGHBOURS, LEAST = 12, 5
 
 
+def cells_by_part(points: Sequence[int]) -> list[int]:
+    """How many cells each part gets of all, by its number of points: none more than another needs.
+
+    A part with fewer points than an even share keeps them all; what it leaves goes to the others.
+    """
+    cells, left = [0] * len(points), CELLS
+    in_order = sorted(range(len(points)), key=points.__getitem__)
+    for done, part in enumerate(in_order):
+        cells[part] = min(points[part], max(left // (len(points) - done), 1))
+        left -= cells[part]
+    return cells
+
+
 def thinned(campaign: Campaign, seed: int) -> Campaign:
-    """The campaign with as many of its points as there may be cells."""
-    points = np.random.default_rng(seed).choice(len(campaign), CELLS, replace=False)
-    return campaign.without(~np.isin(campaign.means.owner, points))
+    """The campaign with as many points of each part as it may have cells."""
+    random, parts = np.random.default_rng(seed), campaign.experiments
+    kept = [
+        np.isin(part.means.owner, random.choice(len(part), cells, replace=False))
+        for part, cells in zip(parts, cells_by_part([*map(len, parts)]), strict=True)
+    ]
+    return campaign.without(~np.concatenate(kept))
 
 
 def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
-    """The campaign with cells for points.
+    """The campaign with cells for points, in parts with more points than cells.
 
     Args:
         campaign: with many points.
@@ -43,16 +61,17 @@ def condensed(campaign: Campaign, model: DepositionModel) -> Campaign:
     predicted_um = Forward(campaign, model.effects).predict_um(model)[campaign.means.owner]
     off_um = campaign.readings.thickness_um - predicted_um
     owner = campaign.experiment_of[campaign.means.owner]
-    cells = Campaign(tuple(
-        _in_cells(part, off_um[owner == k], int(np.ceil(CELLS * len(part) / len(campaign))))
-        for k, part in enumerate(campaign.experiments)
-    ))  # fmt: skip
-    film_um = Forward(cells, model.effects).predict_um(model) + cells.means.mean_um
-    made = (
-        part.with_readings(replace(part.readings, thickness_um=film_um[cells.experiment_of == k]))
-        for k, part in enumerate(cells.experiments)
-    )
-    return replace(campaign, experiments=tuple(made))
+    shares = cells_by_part([*map(len, campaign.experiments)])
+    parts = []
+    for k, (part, most) in enumerate(zip(campaign.experiments, shares, strict=True)):
+        if most == len(part):
+            parts.append(part)
+            continue
+        cells = _in_cells(part, off_um[owner == k], most)
+        film_um = Forward(Campaign((cells,)), model.effects).predict_um(model)
+        taken = replace(cells.readings, thickness_um=film_um + cells.readings.thickness_um)
+        parts.append(cells.with_readings(taken))
+    return replace(campaign, experiments=tuple(parts), scanned=len(campaign.readings))
 
 
 def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:

@@ -162,6 +162,11 @@ class Study:
             'p-values that can be trusted.'
         ]  # fmt: skip
         notes += [] if self.texture.source == 'assumed' else [str(self.texture)]
+        if self.campaign.scanned:
+            notes.append(
+                f'{self.campaign.scanned} readings were condensed to the means of {len(self)} '
+                'cells, but for parts with few: all figures, and residuals.csv, are of the cells.'
+            )
         return (*notes, *self._facet_notes, *self.left_out)
 
     @property

@@ -141,6 +141,7 @@ class Campaign:
         name: that of its file, '' for none; errors compare within one campaign only.
         head: what the report says of part and batch, by key.
         target_um, tolerance_um: the film wanted and what it may differ [um]; None: not known.
+        scanned: number of readings that were condensed to these, means of cells; 0: none.
 
     Raises:
         ReadingsError: two experiments have one name.
@@ -152,6 +153,7 @@ class Campaign:
     head: Mapping[str, str] = field(default_factory=dict)
     target_um: float | None = None
     tolerance_um: float | None = None
+    scanned: int = 0
 
     def __repr__(self) -> str:
         names = ', '.join(e.name for e in self.experiments)
