@@ -28,6 +28,10 @@ WIDEST_PX = 1250
 # The moving picture: frames a second, how much faster than the robot, the last frame's time [s].
 FRAMES_PER_S, SPEED_UP, REST_S = 12, 3.0, 2.5
 LARGEST_FILM_UM = 24.0
+ZONES = """zones:
+  - {name: sill, target_um: 15, tolerance_um: 2, box: [[-1, -1, -1], [1, 1, 0.1]]}
+  - {name: outer skin, target_um: 20, tolerance_um: 3, box: [[-1, -1, 0.1], [1, 1, 0.5]]}
+"""
 
 
 def main() -> None:
@@ -132,6 +136,13 @@ def draw_results() -> None:
               SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
               '--out', folder / 'inspect.png')  # fmt: skip
         keep(Image.open(folder / 'inspect.png'), 'inspect.png')
+        zones = folder / 'zones.yaml'
+        zones.write_text(ZONES)
+        paint('simulate', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+              SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
+              '--zones', zones, '-o', folder / 'film')  # fmt: skip
+        film = Image.open(folder / 'film/film.png')
+        keep(film.crop((0, 0, film.width, film.height // 2)), 'zones.png')
         paint('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
         paint('plan', '--mesh', SAMPLES / 'door.stl', '--model',

@@ -11,6 +11,7 @@ from paint_deposition.files.campaign_file import _Entry, _File, read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.motion_source import MOTION_KINDS
+from paint_deposition.files.zones_file import ZoneEntry
 
 REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')
 OPTIONAL = ('point', 'group', 'sigma_um', 'nx', 'ny', 'nz')
@@ -37,6 +38,7 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     text = text.replace('../ros2_ws', str(CONFIG.parent / 'ros2_ws'))
     text = re.sub(r'^    # (\w+: )', r'    \1', text, flags=re.M).replace('0.001', '1.0')
     text = text.replace('points.csv', str(SAMPLES / 'measured_door' / 'door.csv'))
+    text = text.replace('zones.yaml', str(CONFIG / 'zones.yaml'))
     text = re.sub(r'^ *sheet: .*\n', '', text, flags=re.M)  # a CSV file has no sheets
     entries = yaml.safe_load(text)['experiments']
     # Keys of other kinds of motion stand by themselves: no recording has them all.
@@ -44,6 +46,9 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     assert set(_Entry.model_fields) - others <= set(entries[-1])
     campaign = tmp_path / 'campaign.yaml'
     campaign.write_text(text)
-    assert [experiment.name for experiment in read_campaign(campaign).experiments] == [
-        'panel', 'door',
-    ]  # fmt: skip
+    panel, door = read_campaign(campaign).experiments
+    assert (panel.name, door.name, panel.zones) == ('panel', 'door', None)
+    assert set(door.zones.names) == {'foot', 'skin'}
+    written = (CONFIG / 'zones.yaml').read_text()
+    for key in ZoneEntry.model_fields:
+        assert re.search(rf'^[ -]*(# )?{key}:', written, re.M), key

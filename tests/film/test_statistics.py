@@ -7,6 +7,7 @@ import pytest
 
 from paint_deposition.errors import PaintError
 from paint_deposition.film.statistics import film_statistics
+from paint_deposition.part.zones import Box, PointZones, Zone, Zones
 
 
 def test_area_weighs_not_the_number_of_vertices():
@@ -57,3 +58,33 @@ def test_without_target_or_paint_figures_say_so():
     assert math.isnan(stats.capture_fraction)
     assert stats.to_dict()['capture_fraction'] is None
     assert (stats.mean_um, stats.std_dev_um, stats.max_um, stats.coverage) == (0, 0, 0, 0)
+
+
+def test_zones_share_the_area_and_add_up_to_the_whole():
+    """Each vertex counts against its own band, and area with no target not at all."""
+    corners, middle = [[-1.0, -1, -1], [1, 1, 1]], [[-1.0, -1, -1], [0, 1, 1]]
+    left, right = (
+        Zone(name, target, 2.0, (Box(np.array(box)),))
+        for name, target, box in (('left', 10.0, middle), ('right', 20.0, corners))
+    )
+    x = np.array([-0.9, -0.5, -0.1, 0.1, 0.5, 0.9, 2.0])
+    positions = np.stack([x, 0 * x, 0 * x], axis=1)
+    numbers = Zones((left, right)).of(positions, positions)
+    np.testing.assert_array_equal(numbers, [0, 0, 0, 1, 1, 1, -1])
+    zones = PointZones(Zones((left, right)), numbers)
+    film = np.array([9.0, 12.5, 0.0, 20.0, 21.0, 30.0, 50.0])
+    area = np.array([0.3, 0.1, 1.0, 0.2, 0.2, 0.1, 5.0])
+    stats = film_statistics(film, area, 1.0, zones=zones)
+    a, b = stats.zones.values()
+    assert (a.within_target, b.within_target) == pytest.approx((0.75, 0.8))
+    assert stats.within_target == pytest.approx((0.4 * 0.75 + 0.5 * 0.8) / 0.9)
+    assert stats.below_target + stats.within_target + stats.above_target == pytest.approx(1.0)
+    assert a.painted_volume_cm3 + b.painted_volume_cm3 == pytest.approx(film[:6] @ area[:6])
+    assert (a.coverage, math.isnan(stats.cpk), math.isnan(b.cpk)) == (0.4 / 1.4, True, False)
+    # With a target elsewhere, that area counts, too.
+    everywhere = film_statistics(
+        film, area, 1.0, target_um=50.0, target_tolerance_um=1.0, zones=zones
+    )
+    assert everywhere.within_target == pytest.approx((0.3 + 0.4 + 5.0) / 5.9)
+    assert [zone['name'] for zone in everywhere.to_dict()['zones']] == ['left', 'right']
+    assert 'zones' not in film_statistics(film, area, 1.0).to_dict()

@@ -10,6 +10,7 @@ from paint_deposition.batch.sweep.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
 from paint_deposition.files.tables.reading_columns import ALIASES, OWN
+from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.brush import SetPoints
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
@@ -35,6 +36,7 @@ def text() -> str:
         '### An experiment of `experiments`\n',
         'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
         _keys(campaign_file._Entry, without=MOTION | PART),
+        '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
         _keys(MotionSource),
         '## A part\n', _keys(OnePart),

@@ -70,6 +70,35 @@ def test_the_film_is_saved_whole_and_never_over_another(simulator, robot, painte
     assert len(list(folder.iterdir())) == 6
 
 
+def test_zones_are_counted_against_their_own_bands(
+    simulator, robot, painted, onlooker, call, wait_until, tmp_path
+):
+    (tmp_path / 'zones.yaml').write_text(
+        'zones: [{name: left, target_um: 9, tolerance_um: 3, box: [[-9, -9, -9], [0, 9, 9]]}]'
+    )
+    node = simulator(
+        zones_file=str(tmp_path / 'zones.yaml'), target_um=5.0, target_tolerance_um=1.0
+    )
+    viewer = onlooker({'thickness/stats': (ThicknessStats, topics.RESULTS)})
+    source = robot(node)
+    source.send(MOTION)
+    film, x, area = painted(node), node.surface.vertices_m[:, 0], node.surface.vertex_areas_m2
+    good = np.where(x <= 0.0, np.abs(film - 9.0) <= 3.0, np.abs(film - 5.0) <= 1.0)
+    share = area[good & (film > 1.0)].sum() / area[film > 1.0].sum()
+    wait_until(
+        lambda: viewer.shows('thickness/stats', lambda m: abs(m.within_target - share) < 1e-6)
+    )
+    answer = call(
+        source, SaveFilm, '/deposition_simulator/save_film', SaveFilm.Request(name='film')
+    )
+    assert answer.success, answer.message
+    figures = json.loads((tmp_path / 'films/film.json').read_text())
+    (left,) = figures['zones']
+    assert (left['name'], left['target_um']) == ('left', 9.0)
+    assert left['max_um'] == film[x <= 0.0].max()
+    assert (tmp_path / 'films/film.csv').read_text().startswith('x_m,y_m,z_m,thickness_um,zone\n')
+
+
 def test_changes_that_cannot_be_are_refused_with_the_reason(simulator):
     node = simulator()
     for values, reason in (

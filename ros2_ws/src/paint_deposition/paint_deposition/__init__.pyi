@@ -44,6 +44,7 @@ from paint_deposition.files.meshes import read_mesh as read_mesh
 from paint_deposition.files.model_file import read_model as read_model
 from paint_deposition.files.model_file import write_model as write_model
 from paint_deposition.files.motion_files import read_recording as read_recording
+from paint_deposition.files.zones_file import read_zones as read_zones
 from paint_deposition.film.film import Film as Film
 from paint_deposition.inference.comparison.comparison import (
     Comparison as Comparison,
@@ -58,6 +59,7 @@ from paint_deposition.inference.readings.campaign import Campaign as Campaign
 from paint_deposition.inference.readings.readings import Readings as Readings
 from paint_deposition.motion.trajectory import Trajectory as Trajectory
 from paint_deposition.part.surface import Surface as Surface
+from paint_deposition.part.zones import Zones as Zones
 from paint_deposition.planning.improvement.improvement import Improvement as Improvement
 from paint_deposition.planning.part_plan import PartPlan as PartPlan
 from paint_deposition.planning.plan import Plan as Plan

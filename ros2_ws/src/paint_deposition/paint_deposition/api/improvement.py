@@ -17,6 +17,7 @@ from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.films import simulated
 from paint_deposition.planning.improvement.improvement import (
@@ -28,6 +29,7 @@ from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.surface_map import painted_side, pass_axes
+from paint_deposition.planning.wanted_film import WantedFilm
 from paint_deposition.report.writers.passes import BAG, PROGRAM, Passes, write_passes
 from paint_deposition.request import takes
 
@@ -48,6 +50,7 @@ def improve(
     posterior: Posterior | None = None,
     rivals: Sequence[DepositionModel] = (),
     target_region: np.ndarray | None = None,
+    zones: Zones | None = None,
     robot: RobotCell | None = None,
     seed: int = 0,
     progress: Progress = lambda what, share: None,
@@ -66,6 +69,8 @@ def improve(
         rivals: other models that explain the readings as well; each counts as much as the model.
         target_region: (V,) bool, vertices whose film counts; default: the side that the gun
             faces, where the programme lays more than a tenth of its greatest film.
+        zones: regions with targets of their own, from ``read_zones``: the film over its own target
+            is made even. Elsewhere it counts only where ``target_um`` is given.
         robot: that is to drive it, from ``read_robot``: its joints limit the speeds.
         seed: of the draws.
         progress: called with what is being done and the share of it that is done, 0 to 1.
@@ -73,11 +78,13 @@ def improve(
 
     Raises:
         RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
+        PaintError: a zone has no vertex of the part.
     """
     model = model or DepositionModel()
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, original = seen.surface, Programme.of(trajectory)
+    point_zones = zones.on(surface) if zones else None
     if robot:
         original = replace(original, allowed=robot.allowed_speeds(trajectory))
     progress('the film as it is', 0.0)
@@ -87,10 +94,11 @@ def improve(
     if target_region is None:
         tool_z = seen.path.rotation[seen.path.flow > 0.0][:, :, 2]
         target_region = _target_region(surface, film_um, tool_z)
+    sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     models = [model, *rivals]
     if posterior is not None:
         models += draw_models(model, posterior, DRAWS, seed)
-    retiming = retime_for_evenness(surface, target_region, original, models, request, progress)
+    retiming = retime_for_evenness(surface, sought, original, models, request, progress)
     programme, drive = retiming.programme, None
     if robot:
         drive = robot.drive(programme.trajectory(), free_roll=False)
@@ -102,11 +110,11 @@ def improve(
     new_um, new_paint = simulated(surface, model, improved)
     program_um, _ = simulated(surface, model, program)
     tolerance = request.tolerance or DEFAULT_TOLERANCE
-    band = (retiming.target_um * (1.0 - tolerance), retiming.target_um * (1.0 + tolerance))
-    before = FilmSummary.of(film_um, surface, target_region, band, paint.emitted_cm3, trajectory)
-    after = FilmSummary.of(new_um, surface, target_region, band, new_paint.emitted_cm3, improved)
+    band = surface, sought, retiming.target_um, tolerance
+    before = FilmSummary.of(film_um, *band, paint.emitted_cm3, trajectory)
+    after = FilmSummary.of(new_um, *band, new_paint.emitted_cm3, improved)
     return Improvement(
-        surface, target_region, model, request, trajectory, improved, moves, retiming, before,
+        surface, sought, model, request, trajectory, improved, moves, retiming, before,
         after, float(np.abs(program_um - new_um).max() / new_um.max()),
         (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
     )  # fmt: skip

@@ -7,6 +7,7 @@ from typing import Any
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driven_plan import driven
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.optimised_plan import optimise
@@ -42,6 +43,7 @@ def plan(
     *,
     frame_id: str = 'part',
     robot: RobotCell | None = None,
+    zones: Zones | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> Plan:
@@ -53,15 +55,20 @@ def plan(
         frame_id: of the planned poses.
         robot: that is to drive it, from ``read_robot``: passes that its joints cannot keep up
             with are slower, and the plan has the joints; default: any robot does.
+        zones: regions with targets of their own, from ``read_zones``: the speeds along the passes
+            are chosen for the film over its own target, as by ``optimise``.
         progress: called with what is being done and the share of it that is done, 0 to 1.
         wanted: the fields of ``planning.requests.PlanRequest``; ``speed_m_per_s`` or
-            ``target_um`` at least.
+            ``target_um`` at least, or zones.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
+        PaintError: a zone has no vertex of the part.
     """
-    request = PlanRequest(**wanted)
-    unoptimised = planned(surface, model or DepositionModel(), request, frame_id, progress)
+    request, on_part = _with_zones(surface, zones, wanted)
+    unoptimised = planned(
+        surface, model or DepositionModel(), request, frame_id, progress, on_part
+    )
     found = optimise(unoptimised, progress) if request.optimise else unoptimised
     return driven(found, robot) if robot else found
 
@@ -75,23 +82,34 @@ def plan_faces(
     face_angle_deg: float = math.degrees(WIDEST_RAD),
     envelope: GunEnvelope | None = None,
     robot: RobotCell | None = None,
+    zones: Zones | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
     **wanted: Any,
 ) -> PartPlan:
     """Lay passes over a part that has several sides, each of them sprayed by itself.
 
     Args:
-        surface, model, frame_id, robot, progress, wanted: as for ``plan``. With ``outward``,
-            faces on the back are left out; ``optimise`` chooses the speeds along the passes for an
-            even film on all faces together.
+        surface, model, frame_id, robot, zones, progress, wanted: as for ``plan``. With
+            ``outward``, faces on the back are left out; ``optimise`` chooses the speeds along the
+            passes for an even film on all faces together.
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
         envelope: of the gun, for the check that it keeps clear of the part.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
+    request, on_part = _with_zones(surface, zones, wanted)
     found = planned_faces(
-        surface, model or DepositionModel(), PlanRequest(**wanted), frame_id,
-        math.radians(face_angle_deg), envelope, progress,
+        surface, model or DepositionModel(), request, frame_id, math.radians(face_angle_deg),
+        envelope, progress, on_part,
     )  # fmt: skip
     return driven(found, robot) if robot else found
+
+
+def _with_zones(
+    surface: Surface, zones: Zones | None, wanted: dict[str, Any]
+) -> tuple[PlanRequest, PointZones | None]:
+    """The request, and the zones of the vertices: their targets need speeds along the passes."""
+    if zones is None:
+        return PlanRequest(**wanted), None
+    return PlanRequest(**(wanted | {'optimise': True})), zones.on(surface)

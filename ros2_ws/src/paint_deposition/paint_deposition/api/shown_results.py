@@ -93,6 +93,7 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
             figures = film_statistics(
                 film_um, experiment.surface.vertex_areas_m2, film.emitted_cm3,
                 target_um=wanted[0], target_tolerance_um=wanted[1],
+                zones=experiment.zones,
             )  # fmt: skip
             scene.add_figures(0.0, figures, found.rmse_um)
             arrays = {

@@ -24,6 +24,7 @@ from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import Zones
 
 Progress = Callable[[str, float], None]
 
@@ -136,6 +137,7 @@ def simulate(
     max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
     target_um: float = 0.0,
     tolerance_um: float = 0.0,
+    zones: Zones | None = None,
     progress: Progress = lambda what, share: None,
 ) -> Film:
     """Compute the film on a part from a recorded motion, or from those of several guns.
@@ -149,6 +151,7 @@ def simulate(
         readings: places at which the gauge is to be predicted too, effects on it included.
         max_pose_gap_s: a longer time between two poses counts as gun off [s].
         target_um, tolerance_um: the film wanted and what it may differ, for the figures [um].
+        zones: regions of the part with targets of their own, from ``read_zones``.
         progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
@@ -156,7 +159,7 @@ def simulate(
             part; says why.
         ModelError: models of several guns that do not go together.
         ReadingsError: readings that are not on the part.
-        PaintError: a tolerance that is not less than the target.
+        PaintError: a tolerance that is not less than the target, or a zone without a vertex.
     """
     require_band(target_um, tolerance_um)
     motions = [trajectory] if isinstance(trajectory, Trajectory) else list(trajectory)
@@ -179,6 +182,7 @@ def simulate(
     motions, models = map(list, zip(*pairs, strict=True))
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
+    point_zones = zones.on(surface) if zones else None
     common = _painted(surface.points(), seen, models, surface, 'single', progress)
     film_um = common.film_um
     if film_um.max() < NO_PAINT_UM:
@@ -187,7 +191,7 @@ def simulate(
         raise RecordingError(f'{motions[0].source}: no paint lands on the part: {cause}')
     statistics = film_statistics(
         film_um, surface.vertex_areas_m2, common.emitted_cm3,
-        target_um=target_um, target_tolerance_um=tolerance_um,
+        target_um=target_um, target_tolerance_um=tolerance_um, zones=point_zones,
     )  # fmt: skip
     guns = tuple(
         GunFilm(
@@ -209,7 +213,10 @@ def simulate(
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
         predicted_um = at_points.gauge_um[: len(part)]
         doubts = readings_in_doubt(surface, readings, predicted_um)
-    return Film(surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts)
+    return Film(
+        surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,
+        point_zones,
+    )  # fmt: skip
 
 
 def _painted(

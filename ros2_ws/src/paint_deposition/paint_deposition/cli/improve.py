@@ -28,6 +28,7 @@ from paint_deposition.planning.requests import ImproveRequest
     help='Another model that explains the readings equally well; the film is optimised for all.',
 )  # fmt: skip
 @options_of(ImproveRequest)
+@options.ZONES
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
 @options.PAINT_MOVES
@@ -41,6 +42,7 @@ def improve_command(
     trajectory: Path,
     model_file: Path | None,
     rivals: tuple[Path, ...],
+    zones_file: Path | None,
     paint_moves: bool,
     seed: int,
     motion: dict[str, Any],
@@ -71,13 +73,14 @@ def improve_command(
             surface, recorded, chosen.model,
             posterior=chosen.file.posterior if chosen.file else None,
             rivals=[pd.read_model(path) for path in rivals], robot=cell,
-            seed=seed, progress=show, **dict(request),
+            zones=options.zones_of(zones_file, part), seed=seed, progress=show, **dict(request),
         )  # fmt: skip
         made_from = {
             'mesh_file': str(part['path']),
             'trajectory': str(trajectory),
             'model_file': str(chosen.path or ''),
             'rivals': [str(path) for path in rivals],
+            'zones_file': str(zones_file or ''),
             'part_pose': motion.get('part_pose'),
         }
         show('writing and drawing')
@@ -93,12 +96,16 @@ def improve_command(
 def _lines(result: pd.Improvement) -> Iterator[str]:
     before, after, surface = result.before, result.after, result.surface
     region = surface.vertex_areas_m2[result.target_region].sum()
-    yield f'target region: {region:.2f} of {surface.area_m2:.2f} m2, what the programme paints'
+    yield (
+        f'target region: {region:.2f} of {surface.area_m2:.2f} m2, what the programme paints'
+        f'{" where a film is wanted" if result.wanted.zones else ""}'
+    )
     yield result.sentence
     yield (
         f'film {before.min_um:.1f} to {before.max_um:.1f} µm before, {after.min_um:.1f} to '
         f'{after.max_um:.1f} µm after; mean {before.mean_um:.1f} and {after.mean_um:.1f} µm'
     )
+    yield from options.zone_lines(after.statistics.zones, before.statistics.zones)
     for change in result.changes:
         yield change.sentence
     yield from result.limit_sentences

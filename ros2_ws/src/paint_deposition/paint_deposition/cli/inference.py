@@ -34,6 +34,7 @@ def _run(
     model_file: Path | None,
     part_pose: list[float] | None,
     results: options.Results,
+    zones_file: Path | None = None,
     begins_with: Iterable[str] = ('model', 'posterior'),
     fitted: str = FITTED,
     words: str = '',
@@ -52,7 +53,7 @@ def _run(
         options.print_all(kind, [f'{experiment}: {line}'])
 
     with Progress(command) as show:
-        data = pd.read_campaign(campaign, show, part_pose, remark)
+        data = pd.read_campaign(campaign, show, part_pose, remark, zones_file)
         chosen = Path(model_file or data.model_file or '')
         start = read_model_file(chosen) if chosen.name else None
         known = {name: getattr(start, name, None) for name in begins_with}
@@ -120,6 +121,11 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     help="Model to compare, taken as it is; default: the campaign's, else one fitted to it. "
     'Repeated, the models are compared with each other.',
 )  # fmt: skip
+@click.option(
+    '--zones', 'zones_file', type=options.FILE,
+    help="Regions of the parts with a target and a tolerance of their own, YAML; default: the "
+    "campaign's.",
+)  # fmt: skip
 @options.PART_POSE
 @RESULTS
 def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
@@ -167,6 +173,7 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
             f'{indent}{misfit.label}: {len(found)} readings, bias {found.bias_um:+.2f} µm, '
             f'RMSE {found.rmse_um:.2f} µm, chi2 per reading {found.chi_square_per_reading:.2f}'
         )
+    yield from (zone.sentence for zone in comparison.zones)
     noise = comparison.study.noise
     yield f'gauge noise {noise.typical_um:.2f} µm ({noise.source})'
     for region in comparison.regions:
@@ -298,6 +305,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         f'{diagnosis.left_out} left out, {before.rmse_um:.2f} -> {after.rmse_um:.2f} µm on the '
         f'fitted points; gauge and texture {diagnosis.noise_floor_um:.2f} µm'
     )
+    yield from (zone.sentence for zone in diagnosis.comparisons[-1].zones)
     yield from (f'worse than before: {one}' for one in diagnosis.worse)
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
@@ -16,6 +16,9 @@ from paint_deposition.cli.results_folder import results_in
 
 if TYPE_CHECKING:
     import numpy as np
+
+    from paint_deposition.film.statistics import FilmStatistics
+    from paint_deposition.part.zones import Zones
 
 
 class Finite:
@@ -69,6 +72,36 @@ POINTS = click.option(
     '--points', 'points_file', type=FILE,
     help='Measuring points, label and x, y, z, of readings that name their point only.',
 )  # fmt: skip
+
+
+ZONES = click.option(
+    '--zones', 'zones_file', type=FILE,
+    help='Regions of the part with a target and a tolerance of their own, YAML; elsewhere '
+    '--target-um holds.',
+)  # fmt: skip
+
+
+def zones_of(zones_file: Path | None, part: Mapping[str, Any]) -> Zones | None:
+    """The zones of a part, which is given as for ``part_options``."""
+    if zones_file is None:
+        return None
+    return pd.read_zones(zones_file, part['path'], part['scale'], part['body'])
+
+
+def zone_lines(
+    now: Mapping[str, FilmStatistics], before: Mapping[str, FilmStatistics] | None = None
+) -> Iterator[str]:
+    """The film on each zone by its name, and what it was before."""
+    for name, zone in now.items():
+        was = before and before[name]
+        bare = f', {100 * (1.0 - zone.coverage):.1f} % of it bare' if zone.coverage < 1.0 else ''
+        yield (
+            f'{name}, {zone.target_um:g} ± {zone.target_tolerance_um:g} µm: '
+            f'{f"{was.mean_um:.1f} to " if was else ""}{zone.mean_um:.1f} µm mean, '
+            f'{zone.min_um:.1f} to {zone.max_um:.1f} µm, '
+            f'{f"{100 * was.within_target:.1f} to " if was else ""}'
+            f'{100 * zone.within_target:.1f} % within{bare}'
+        )
 
 
 def model_option(text: str) -> Callable:

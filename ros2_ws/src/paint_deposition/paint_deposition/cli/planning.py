@@ -55,6 +55,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 @options.MODEL
 @options.BRUSH
 @options_of(PlanRequest)
+@options.ZONES
 @options.PART_POSE
 @options.robot_options
 @click.option(
@@ -77,6 +78,7 @@ def plan_command(
     envelope: GunEnvelope,
     part: dict[str, Any],
     robot: dict[str, Any],
+    zones_file: Path | None,
     model_file: Path | None,
     brush: int,
     part_pose: list[float] | None,
@@ -97,21 +99,25 @@ def plan_command(
         show('reading the mesh')
         surface = pd.read_mesh(**part)
         frame = frame_id if part_pose is None else 'part'
+        given: dict[str, Any] = {
+            'frame_id': frame, 'robot': cell, 'zones': options.zones_of(zones_file, part),
+            'progress': show, **wanted,
+        }  # fmt: skip
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
-            result = pd.plan(surface, model, frame_id=frame, robot=cell, progress=show, **wanted)
+            result = pd.plan(surface, model, **given)
             touched = contacts(surface, result.trajectory, envelope)
         else:
             result = pd.plan_faces(
-                surface, model, frame_id=frame, face_angle_deg=face_angle_deg, envelope=envelope,
-                robot=cell, progress=show, **wanted,
-            )  # fmt: skip
+                surface, model, face_angle_deg=face_angle_deg, envelope=envelope, **given
+            )
             touched = result.contacts
         warnings = [*result.warnings, *map(str, touched)]
         show('writing')
         made_from = {
             'mesh': str(part['path']),
             'model': str(model_file or 'default'),
+            'zones_file': str(zones_file or ''),
             'frame_id': frame_id,
             'part_pose': part_pose,
             'warnings': warnings,
@@ -133,6 +139,8 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
         f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
         f'capture fraction {100 * film.capture_fraction:.0f} %'
     )
+    first = result.unoptimised if isinstance(result, pd.Plan) else None
+    yield from options.zone_lines(film.zones, first.statistics.zones if first else {})
     yield from options.paint_lines(result)
     if result.drive:
         yield result.drive.sentence

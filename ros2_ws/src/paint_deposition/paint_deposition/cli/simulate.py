@@ -44,6 +44,7 @@ from paint_deposition.cli.progress import Progress
 @click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
 @click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
               help='Accepted difference from the target, either way [µm].')  # fmt: skip
+@options.ZONES
 @options.results_options('film.ply, film.csv, stats.json and film.png')
 def simulate_command(
     part: dict[str, Any],
@@ -53,6 +54,7 @@ def simulate_command(
     readings_file: Path | None,
     points_file: Path | None,
     motion: dict[str, Any],
+    zones_file: Path | None,
     results: options.Results,
     **wanted: float,
 ) -> None:
@@ -74,16 +76,19 @@ def simulate_command(
         chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
         show('refining the mesh')
         surface = pd.read_mesh(**part)
+        zones = options.zones_of(zones_file, part)
         readings = None
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
             surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
-            names=[gun.name for gun in guns], readings=readings, progress=show, **wanted,
+            names=[gun.name for gun in guns], readings=readings, zones=zones, progress=show,
+            **wanted,
         )  # fmt: skip
         made_from = {
             'mesh_file': str(part['path']),
             'trajectory': ', '.join(map(str, trajectories)),
+            'zones_file': str(zones_file or ''),
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
@@ -109,12 +114,14 @@ def _lines(film: pd.Film) -> Iterator[str]:
         f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
         f'{s.area_m2:.2f} m2'
     )
-    if s.target_um:
+    if s.has_target:
+        band = f'{s.target_um:g} ± {s.target_tolerance_um:g} µm'
+        cpk = '' if s.zones else f', Cpk {s.cpk:.2f}'
         yield (
-            f'{100 * s.within_target:.1f} % of it within {s.target_um:g} ± '
-            f'{s.target_tolerance_um:g} µm, {100 * s.below_target:.1f} % below, '
-            f'{100 * s.above_target:.1f} % above, Cpk {s.cpk:.2f}'
+            f'{100 * s.within_target:.1f} % of it within {"its own band" if s.zones else band}, '
+            f'{100 * s.below_target:.1f} % below, {100 * s.above_target:.1f} % above{cpk}'
         )
+    yield from options.zone_lines(s.zones)
     if not math.isnan(s.capture_fraction):
         yield (
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '

@@ -1,6 +1,7 @@
 """Campaign files: which parts were painted along which recording and measured where."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Literal, get_args
 
@@ -16,6 +17,7 @@ from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.brush import MOST, listed
@@ -53,6 +55,7 @@ class _File(BaseModel, extra='forbid'):
     tolerance_um: Number | None = Field(
         None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
     )
+    zones: Text | None = Field(None, description='the name of a zones file')
 
     @model_validator(mode='after')
     def _band(self) -> '_File':
@@ -83,6 +86,7 @@ class _Entry(_Gun, OnePart):
         [], description='a list of guns that painted together, each with its motion'
     )
     name: Name = ''
+    zones: Text | None = Field(None, description="the name of a zones file, if not the campaign's")
     points: Text | None = Field(None, description='the name of a file of measuring points')
     columns: dict[Quantity, Text | int] = Field(
         {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
@@ -107,6 +111,7 @@ def read_campaign(
     progress: Callable[[str], None] = lambda line: None,
     part_pose: Sequence[float] | None = None,
     remark: Remark = lambda kind, experiment, line: None,
+    zones: str | Path | None = None,
 ) -> Campaign:
     """Read a campaign with all that it names; paths in it are relative to it.
 
@@ -115,6 +120,7 @@ def read_campaign(
         part_pose: [x y z qx qy qz qw] of the part in the frame of the poses, for every experiment
             that has none of its own.
         remark: called with 'note' or 'warning', the experiment's name and what is odd about it.
+        zones: file of zones for every experiment, in place of those that the campaign names.
 
     Raises:
         PaintError: naming the file, the experiment and the key at fault, and the remedy.
@@ -132,7 +138,10 @@ def read_campaign(
         if part_pose is not None and entry.part_pose is None:
             entry = entry.model_copy(update={'part_pose': list(part_pose)})
         try:
-            experiments.append(_read_experiment(path.parent, name, entry, remark))
+            experiment = _read_experiment(path.parent, name, entry, remark)
+            named = entry.zones or file.zones
+            of = zones or (path.parent / named if named else None)
+            experiments.append(_with_zones(experiment, entry, of))
         except PaintError as error:
             raise type(error)(f"{path}: experiment '{name}': {error}") from None
     start = None if file.model is None else str(path.parent / file.model)
@@ -183,6 +192,17 @@ def _read_experiment(folder: Path, name: str, entry: _Entry, remark: Remark) -> 
         name, surface, SprayPath.of_guns(paths), readings, files, settings, off,
         trajectories[0].frame_id,
     )  # fmt: skip
+
+
+def _with_zones(experiment: Experiment, part: OnePart, file: str | Path | None) -> Experiment:
+    if not file:
+        return experiment
+    zones = read_zones(file, experiment.files['mesh'], part.mesh_scale, part.body)
+    return replace(
+        experiment,
+        zones=zones.on(experiment.surface),
+        files=experiment.files | {'zones': str(file)},
+    )
 
 
 def _motions(folder: Path, entry: _Entry) -> list[tuple[str, MotionSource, int | None]]:

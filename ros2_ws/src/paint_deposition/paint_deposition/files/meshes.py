@@ -1,5 +1,6 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
+from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
 
@@ -45,27 +46,55 @@ def read_mesh(
     Raises:
         MeshError: no file, not a mesh, or nothing that could be painted; says what to do.
     """
-    path = Path(path)
-    for name, value, meaning in (
-        ('mesh_scale', scale, 'metres per unit of the file, 0.001 for millimetres'),
-        ('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance'),
-    ):
-        if not (np.isfinite(value) and value > 0.0):
-            raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
+    _require_above_zero('max_edge_length_m', max_edge_length_m, 'metres, 0.02 for instance')
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    read = _load(path, body)
-    notes, unit_m = [*read.notes], read.unit_m
+    read = read_triangles(path, scale, body)
+    return Surface.from_triangles(
+        read.vertices_m, read.faces, max_edge_length_m, down, tuple(read.notes)
+    )
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """The triangles of a file, ready to be refined."""
+
+    vertices_m: np.ndarray  # (V, 3) [m]
+    faces: np.ndarray  # (F, 3) wound alike
+    rows: np.ndarray  # (F,) number of each in the file, or in the body taken of it, from 0
+    notes: list[str]  # what was put right, for the user
+    colours: np.ndarray | None  # (F, 3, 3) uint8 of their corners, where they were asked for
+
+
+def read_triangles(
+    path: str | Path, scale: float = 1.0, body: str | None = None, coloured: bool = False
+) -> Triangles:
+    """Read the triangles of a part, all of one winding where they join; see ``read_mesh``.
+
+    Raises:
+        MeshError: as ``read_mesh``, or without colours although it should be ``coloured``.
+    """
+    path = Path(path)
+    meaning = 'metres per unit of the file, 0.001 for millimetres'
+    _require_above_zero('mesh_scale', scale, meaning)
+    read = _load(path, body, coloured)
+    notes, unit_m, colours = [*read.notes], read.unit_m, read.colours
     vertices, faces = read.vertices, read.faces
     del read
     if unit_m * scale != 1.0:
         vertices = vertices.astype(np.float64) * (unit_m * scale)
     _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
-    faces = _without_degenerate(path, vertices, faces, notes)
-    faces = _oriented(vertices, faces, notes)
-    return Surface.from_triangles(vertices, faces, max_edge_length_m, down, tuple(notes))
+    rows = np.flatnonzero(_with_area(path, vertices, faces, notes))
+    if len(rows) < len(faces):
+        faces, colours = faces[rows], None if colours is None else colours[rows]
+    return Triangles(vertices, _oriented(vertices, faces, notes), rows, notes, colours)
+
+
+def _require_above_zero(name: str, value: float, meaning: str) -> None:
+    if not (np.isfinite(value) and value > 0.0):
+        raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
 
 
 def write_mesh_ply(
@@ -97,7 +126,7 @@ def write_mesh_ply(
         faces.tofile(file)
 
 
-def _load(path: Path, body: str | None) -> Bodies:
+def _load(path: Path, body: str | None, coloured: bool) -> Bodies:
     if path.suffix.lower() not in SUFFIXES:
         raise MeshError(
             f'{path}: a mesh of type "{path.suffix}" cannot be read; '
@@ -105,7 +134,7 @@ def _load(path: Path, body: str | None) -> Bodies:
         )
     if not path.is_file():
         raise MeshError(f'{path}: no such mesh file; check the path')
-    bodies = read_bodies(path, body)
+    bodies = read_bodies(path, body, coloured)
     vertices, faces = bodies.vertices, bodies.faces
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
@@ -138,16 +167,17 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
         )
 
 
-def _without_degenerate(
+def _with_area(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
+    """(F,) bool, which of the triangles have an area."""
     heights_wanted = LEAST_HEIGHT_M * longest_edges_m(vertices_m, faces)
     good = 2.0 * face_areas_m2(vertices_m, faces) > heights_wanted
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
     if not good.all():
         notes.append(f'{np.sum(~good)} of {len(faces)} triangles without area were left out')
-    return faces[good]
+    return good
 
 
 def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:

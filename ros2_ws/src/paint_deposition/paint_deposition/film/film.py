@@ -15,6 +15,7 @@ from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 
 if TYPE_CHECKING:
     from paint_deposition.inference.readings.readings import Readings
@@ -60,6 +61,7 @@ class Film:
         predicted_um: (N,) what the gauge should show at each of them [um], or None.
         paint: that was sprayed.
         doubts: what is odd in the readings.
+        zones: of the vertices, each with a target, or None.
     """
 
     surface: Surface
@@ -70,6 +72,7 @@ class Film:
     predicted_um: np.ndarray | None = None
     paint: PaintUsed = NO_PAINT
     doubts: tuple[str, ...] = ()
+    zones: PointZones | None = None
 
     def __repr__(self) -> str:
         s = self.statistics

@@ -1,11 +1,16 @@
 """A film in figures, weighted by surface area."""
 
+from __future__ import annotations
+
 import math
-from dataclasses import asdict, dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.errors import PaintError
+from paint_deposition.part.zones import PointZones
 
 # Thinner film counts as bare metal: overspray dust that no gauge shows.
 DEFAULT_PAINTED_ABOVE_UM = 1.0
@@ -28,12 +33,13 @@ class FilmStatistics:
     min_um: float
     max_um: float
     coverage: float  # share of the part's area that is painted, 0 to 1
-    # Shares of the painted area below, in and above the target band, 0 to 1; NaN without a target.
+    # Shares of the painted area below, in and above the target band, that of its zone where there
+    # are zones, 0 to 1; NaN without a target. Area in no zone counts if it has a target.
     below_target: float
     within_target: float
     above_target: float
     # Distance of the mean from the nearer limit of the band over three standard deviations; NaN
-    # without a target or a standard deviation.
+    # without a target or a standard deviation, and over zones with targets of their own.
     cpk: float
     painted_volume_cm3: float  # solids on the whole part, dust included [cm3]
     # Solids on the part over `emitted_volume_cm3`; NaN without any. It is no transfer efficiency:
@@ -42,9 +48,15 @@ class FilmStatistics:
     emitted_volume_cm3: float  # solids that a part which catches everything would get [cm3]
     area_m2: float  # of the part [m2]
     painted_above_um: float  # film that counts as painted [um]
-    # The band is target +- tolerance [um]; 0 is no target.
+    # The band is target +- tolerance [um], outside of all zones; 0 is no target.
     target_um: float
     target_tolerance_um: float
+    zones: Mapping[str, FilmStatistics] = field(default_factory=dict)  # each by its name
+
+    @property
+    def has_target(self) -> bool:
+        """Whether there is a band to be in."""
+        return not math.isnan(self.within_target)
 
     @property
     def band_um(self) -> tuple[float, float]:
@@ -54,9 +66,14 @@ class FilmStatistics:
             self.target_um + self.target_tolerance_um,
         )
 
-    def to_dict(self) -> dict[str, float | None]:
+    def to_dict(self) -> dict[str, Any]:
         """All figures by name; None stands for NaN, which JSON does not know."""
-        return {k: None if math.isnan(v) else float(v) for k, v in asdict(self).items()}
+        figures: dict[str, Any] = {
+            k: None if math.isnan(v) else float(v) for k, v in vars(self).items() if k != 'zones'
+        }
+        if self.zones:
+            figures['zones'] = [{'name': n} | zone.to_dict() for n, zone in self.zones.items()]
+        return figures
 
 
 def require_band(target_um: float, tolerance_um: float) -> None:
@@ -76,11 +93,13 @@ def film_statistics(
     painted_above_um: float = DEFAULT_PAINTED_ABOVE_UM,
     target_um: float = 0.0,
     target_tolerance_um: float = 0.0,
+    zones: PointZones | None = None,
 ) -> FilmStatistics:
     """Sum up a film (V,) [um] by the area (V,) that each vertex stands for; 1 um on 1 m2 is 1 cm3.
 
     ``emitted_cm3`` are the solids that a part which catches everything would get, K1 times the
-    time sprayed. A target of 0 is none. Raises PaintError as ``require_band``.
+    time sprayed. A target of 0 is none; in ``zones`` of the vertices their own target holds.
+    Raises PaintError as ``require_band``.
     """
     require_band(target_um, target_tolerance_um)
     painted = film_um > painted_above_um
@@ -92,15 +111,16 @@ def film_statistics(
         mean = float(np.sum(film * area)) / painted_area
         variance = float(np.sum((film - mean) ** 2 * area)) / painted_area
         least, greatest = float(film.min()), float(film.max())
-    if target_um > 0.0:
-        off = film - target_um
-        shares = [off < -target_tolerance_um, np.abs(off) <= target_tolerance_um,
-                  off > target_tolerance_um]  # fmt: skip
+    if target_um > 0.0 or zones:
+        target, tolerance = wanted_at(film_um, target_um, target_tolerance_um, zones)
+        off, allowed = film - target[painted], tolerance[painted]
+        wanted_area = float(area[~np.isnan(off)].sum())
+        shares = [off < -allowed, np.abs(off) <= allowed, off > allowed]
         below, within, above = (
-            float(area[share].sum()) / painted_area if painted_area > 0.0 else 0.0
+            float(area[share].sum()) / wanted_area if wanted_area > 0.0 else 0.0
             for share in shares
         )
-        if variance > 0.0:
+        if variance > 0.0 and not zones:
             cpk = (target_tolerance_um - abs(mean - target_um)) / (3.0 * math.sqrt(variance))
     volume = float(np.sum(film_um * area_m2))
     return FilmStatistics(
@@ -120,4 +140,21 @@ def film_statistics(
         painted_above_um=float(painted_above_um),
         target_um=float(target_um),
         target_tolerance_um=float(target_tolerance_um),
-    )
+        zones={
+            zone.name: film_statistics(
+                film_um[own], area_m2[own], emitted_cm3, painted_above_um=painted_above_um,
+                target_um=zone.target_um, target_tolerance_um=zone.tolerance_um,
+            )
+            for zone, own in zones or ()
+        },
+    )  # fmt: skip
+
+
+def wanted_at(
+    film_um: np.ndarray, target_um: float, tolerance_um: float, zones: PointZones | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Target and tolerance (V,) [um] for a film (V,); NaN where no film is wanted."""
+    if zones:
+        return zones.wanted_um(target_um, tolerance_um)
+    shape = film_um.shape
+    return np.full(shape, target_um or np.nan), np.full(shape, tolerance_um)

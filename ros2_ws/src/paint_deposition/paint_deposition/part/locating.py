@@ -31,14 +31,19 @@ def locate(
     points_m: np.ndarray,
     normals: np.ndarray | None = None,
     side: np.ndarray | None = None,
+    least_cosine: float = 0.0,
 ) -> Location:
-    """See ``Surface.locate``; without ``normals`` the back of the only ``side`` is not taken."""
+    """See ``Surface.locate``; without ``normals`` the back of the only ``side`` is not taken.
+
+    Surface agrees with ``normals`` if the cosine between them is no less than ``least_cosine``.
+    """
     points: np.ndarray = np.ascontiguousarray(points_m, dtype=np.float64).reshape(-1, 3)
     if not np.isfinite(points).all():
         raise ValueError('points to be located are not finite')
     wanted: np.ndarray
     if normals is not None:
-        wanted, least = np.ascontiguousarray(normals, dtype=np.float64).reshape(-1, 3), 0.0
+        wanted = np.ascontiguousarray(normals, dtype=np.float64).reshape(-1, 3)
+        least = least_cosine
     elif side is not None:
         wanted, least = np.broadcast_to(side, points.shape).astype(np.float64), BACK_COSINE
     else:

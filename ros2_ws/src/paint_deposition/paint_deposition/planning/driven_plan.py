@@ -29,7 +29,7 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     """
     request = planned.request
     drive = cell.drive(planned.trajectory, _is_round(planned))
-    found = predicted(planned.surface, planned.model, request, planned.painted, drive.trajectory)
+    found = predicted(planned.surface, planned.model, request, planned.wanted, drive.trajectory)
     wanted = request.improvement(0.0, request.target_um, move_min_m=SHORTEST_MOVE_M)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
     return replace(planned, **found, moves=moves, drive=drive)

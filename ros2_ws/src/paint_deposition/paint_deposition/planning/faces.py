@@ -32,6 +32,7 @@ from paint_deposition.planning.passes import (
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
+from paint_deposition.planning.wanted_film import WantedFilm
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
@@ -79,20 +80,21 @@ def blend(
     model: DepositionModel,
     request: PlanRequest,
     faces: tuple[Face, ...],
-    area_m2: np.ndarray,
+    wanted: WantedFilm,
     progress: Callable[[str, float], None],
 ) -> tuple[float, tuple[FacePasses, ...], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
-    ``area_m2`` (V,) is of the surface that is to be even, 0 elsewhere. Returned are the margin, by
-    how much each face is sprayed less far than its seams [m], the passes of the faces, each at its
-    speed, and sigma_n without margin, each face for itself.
+    Even is the film over its own target, where one is wanted. Returned are the margin, by how much
+    each face is sprayed less far than its seams [m], the passes of the faces, each at its speed,
+    and sigma_n without margin, each face for itself.
     """
     overspray_m, tried = 0.0, []
     for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
         progress('faces', number / len(MARGINS))
-        tried.append(_lay_faces(surface, model, request, faces, share * overspray_m))
+        tried.append(_lay_faces(surface, model, request, faces, share * overspray_m, wanted))
         overspray_m = tried[0].faces[0].style.overspray_m
+    area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
     target = request.target_um if request.speed_m_per_s is None else None
     dwells = [_dwell(trial, area_m2, target) for trial in tried]
     sigmas = [
@@ -110,6 +112,7 @@ def _lay_faces(
     request: PlanRequest,
     faces: tuple[Face, ...],
     margin_m: float,
+    wanted: WantedFilm,
 ) -> _FaceFilms:
     passes, maps, films = [], [], []
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
@@ -121,7 +124,7 @@ def _lay_faces(
             path, _ = spray_path(trajectory_of((one,), planned.style), max_step_m=model.max_step_m)
             integrator.reset()
             integrator.add(path)
-            films.append(integrator.raw_um.copy())
+            films.append(integrator.raw_um / wanted.share)
     return _FaceFilms(margin_m, tuple(passes), tuple(maps), np.array(films))
 
 

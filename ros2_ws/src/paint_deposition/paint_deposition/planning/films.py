@@ -26,6 +26,7 @@ from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_pass, trajectory_of
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
+from paint_deposition.planning.wanted_film import WantedFilm
 
 MOST_POINTS = 1500
 LINES_PER_SCALE = 5.0
@@ -55,23 +56,25 @@ def predicted(
     surface: Surface,
     model: DepositionModel,
     request: PlanRequest,
-    painted: np.ndarray,
+    wanted: WantedFilm,
     trajectory: Trajectory,
     progress: Callable[[float], None] = lambda share: None,
 ) -> dict[str, Any]:
     """The film of a planned motion and its figures, as fields of a ``PlannedFilm``.
 
-    Within a tenth of the target, if there is one, it is good.
+    Within a tenth of the target, if there is one, it is good; in zones within their tolerance.
     """
     film, paint = simulated(surface, model, trajectory, progress)
-    area, target = surface.vertex_areas_m2[painted], request.target_um or 0.0
+    region, target = wanted.region, request.target_um or 0.0
+    area = surface.vertex_areas_m2[region]
     statistics = film_statistics(
-        film[painted], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target
-    )
+        film[region], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target,
+        zones=wanted.zones and wanted.zones.select(region),
+    )  # fmt: skip
     return {
-        'surface': surface, 'model': model, 'request': request, 'painted': painted,
+        'surface': surface, 'model': model, 'request': request, 'wanted': wanted,
         'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,
-        'sigma_n': evenness(film[painted], area)[1],
+        'sigma_n': evenness(film[region] / wanted.share[region], area)[1],
     }  # fmt: skip
 
 
@@ -82,15 +85,21 @@ class PlannedFilm:
     surface: Surface
     model: DepositionModel
     request: PlanRequest
-    painted: np.ndarray  # (V,) bool, the side or the faces that are painted
+    wanted: WantedFilm  # on the side or the faces that are painted
     passes: tuple[PlannedPass, ...]  # in running order
     trajectory: Trajectory  # their timed poses and trigger
     moves: tuple[Move, ...]  # of a robot program along them
     film_um: np.ndarray  # (V,) on the refined part
     paint: PaintUsed
-    statistics: FilmStatistics  # of the film on the painted part
-    sigma_n: float  # standard deviation over mean there, bare metal included
+    statistics: FilmStatistics  # of the film where one is wanted
+    # Standard deviation over mean there, of the film over its own target, bare metal included.
+    sigma_n: float
     drive: Drive | None = None  # of the robot that it was made for
+
+    @property
+    def painted(self) -> np.ndarray:
+        """(V,) bool, vertices whose film counts."""
+        return self.wanted.region
 
     @property
     def mean_um(self) -> float:
@@ -126,7 +135,9 @@ class PlannedFilm:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
         yield from map(str, self.drive.limits if self.drive else ())
-        if target and request.speed_m_per_s and abs(self.mean_um / target - 1.0) > NEAR:
+        yield from self.wanted.doubts(self.statistics)
+        at_speed = request.speed_m_per_s and not self.wanted.zones
+        if target and at_speed and abs(self.mean_um / target - 1.0) > NEAR:
             yield (
                 f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
                 f'of {target:g} µm; leave out the speed and it is chosen for the target'
@@ -228,10 +239,15 @@ class LineFilms:
 
 
 class FilmAtPoints:
-    """Films at vertices of a part, with the model's effects, the film's own included."""
+    """Films at vertices of a part, with the model's effects, the film's own included.
 
-    def __init__(self, surface: Surface, rows: np.ndarray, model: DepositionModel) -> None:
-        self.model = model
+    They are divided by ``share`` (V,), the target of each vertex over the mean target.
+    """
+
+    def __init__(
+        self, surface: Surface, rows: np.ndarray, model: DepositionModel, share: np.ndarray
+    ) -> None:
+        self.model, self._share = model, share
         self._surface, self._rows = surface, rows
         points = surface.points().select(rows)
         self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
@@ -244,7 +260,7 @@ class FilmAtPoints:
         path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
         self._integrator.reset()
         self._integrator.add(path)
-        return self._integrator.raw_um * self._finished_over_arrived(path)
+        return self._integrator.raw_um * self._finished_over_arrived(path) / self._share
 
     def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
         """(n, V) films for a density of paint of 1 s/m at each node [um].
@@ -267,7 +283,7 @@ class FilmAtPoints:
             self._integrator.reset()
             self._integrator.add_sprayed(part.with_(dwell_s=part.dwell_s * shares.data[column]))
             films[node] = self._integrator.raw_um
-        return films * self._finished_over_arrived(path)
+        return films * self._finished_over_arrived(path) / self._share
 
     def _finished_over_arrived(self, path: SprayPath) -> np.ndarray | float:
         """(V,) finished film over the film that arrived, from effects on the finished film."""

@@ -28,13 +28,13 @@ FASTER_ENDS = 1.3
 def optimise(
     unoptimised: Plan, progress: Callable[[str, float], None] = lambda what, share: None
 ) -> Plan:
-    """The better plan that starts from an unoptimised one, for the same mean film.
+    """The better plan that starts from an unoptimised one, for the same film wanted.
 
     The cost is sigma_n squared, and the weights of the request times the paint sprayed over the
     paint wanted on the part, and the cycle time over that of the unoptimised plan.
     """
     request, count = unoptimised.request, len(unoptimised.passes)
-    target = request.target_um or unoptimised.mean_um
+    target = unoptimised.wanted.target_um or unoptimised.mean_um
     wanted_cm3 = target * float(unoptimised.surface.vertex_areas_m2[unoptimised.painted].sum())
     low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
@@ -80,16 +80,17 @@ def _timed_plan(
     )
     programme = Programme.of(trajectory_of(passes, style, unoptimised.trajectory.frame_id))
     start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)
+    zones = unoptimised.wanted.zones
     wanted = request.improvement(
-        unoptimised.style.overspray_m, target_um,
+        unoptimised.style.overspray_m, request.target_um if zones else target_um,
         paint_weight=request.paint_weight * start_cm3 / wanted_cm3,
     )  # fmt: skip
     models = [unoptimised.model]
     retimed = retime_for_evenness(
-        surface, unoptimised.painted, programme, models, wanted, progress, explain=False
+        surface, unoptimised.wanted, programme, models, wanted, progress, explain=False
     ).programme
     found = predicted(
-        surface, unoptimised.model, request, unoptimised.painted, retimed.trajectory(),
+        surface, unoptimised.model, request, unoptimised.wanted, retimed.trajectory(),
         lambda share: progress('film', share),
     )  # fmt: skip
     return replace(

@@ -10,12 +10,14 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.clearance import Contact, contacts
 from paint_deposition.planning.faces import blend, join_motions, order_faces
 from paint_deposition.planning.films import PlannedFilm, predicted
 from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
+from paint_deposition.planning.wanted_film import WantedFilm
 
 # Faces that turn further from the side of the gun are its back.
 BACK_COSINE = -0.1
@@ -84,6 +86,7 @@ def plan_faces(
     widest_rad: float = WIDEST_RAD,
     envelope: GunEnvelope | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
+    zones: PointZones | None = None,
 ) -> PartPlan:
     """Split a part into faces, plan each, blend them, and order them for least travel.
 
@@ -98,21 +101,24 @@ def plan_faces(
     faces = _facing_gun(sprayable_faces(surface, widest_rad), request)
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
-    area = np.where(painted, surface.vertex_areas_m2, 0.0)
-    each = request.model_copy(update={'outward': None, 'tolerance': None})
-    margin_m, laid, unblended = blend(surface, model, each, faces, area, progress)
+    wanted = WantedFilm.of(surface, painted, request.target_um, zones)
+    # One film for all: the zones are left to the speeds along the passes.
+    each = request.model_copy(
+        update={'outward': None, 'tolerance': None, 'target_um': wanted.target_um}
+    )
+    margin_m, laid, unblended = blend(surface, model, each, faces, wanted, progress)
     running = order_faces(laid)
     progress('motion', 0.0)
     trajectory, moves = join_motions(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
     )
     if request.optimise:
-        wanted = request.improvement(running[0].style.overspray_m, request.target_um)
+        asked = request.improvement(running[0].style.overspray_m, request.target_um)
         retimed = retime_for_evenness(
-            surface, painted, Programme.of(trajectory), [model], wanted, progress, explain=False
+            surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
         ).programme
-        trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, wanted))
-    found = predicted(surface, model, request, painted, trajectory)
+        trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, asked))
+    found = predicted(surface, model, request, wanted, trajectory)
     sigma_n = found['sigma_n']
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(

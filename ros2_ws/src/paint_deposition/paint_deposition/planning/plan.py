@@ -8,6 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.films import LineFilms, PlannedFilm, evenness, predicted
 from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import PassStyle, plan_passes, planned_moves, trajectory_of
@@ -15,6 +16,7 @@ from paint_deposition.planning.placement import Placement, place_passes, placeme
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
+from paint_deposition.planning.wanted_film import WantedFilm
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
@@ -80,6 +82,7 @@ class Plan(PlannedFilm):
             'plain': self.unoptimised
             and {
                 'sigma_n': self.unoptimised.sigma_n,
+                'zones': self.unoptimised.statistics.to_dict().get('zones', []),
                 'mean_um': self.unoptimised.mean_um,
                 'paint_cm3': self.unoptimised.statistics.emitted_volume_cm3,
                 'cycle_time_s': self.unoptimised.cycle_time_s,
@@ -101,18 +104,23 @@ def plan(
     request: PlanRequest,
     frame_id: str = '',
     progress: Callable[[str, float], None] = lambda what, share: None,
+    zones: PointZones | None = None,
 ) -> Plan:
     """Plan passes and simulate their film; ``progress`` gets the step and its share, 0 to 1.
+
+    With ``zones`` of the vertices the even film of one speed is of their mean target.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
     axes = pass_axes(surface, request.direction, request.outward)
     surface_map = SurfaceMap(surface, axes, request.smoothing_radius_m)
-    area = surface.vertex_areas_m2[surface_map.painted]
+    wanted = WantedFilm.of(surface, surface_map.painted, request.target_um, zones)
+    area = surface.vertex_areas_m2[wanted.region]
     (left, right), ends = surface_map.extent_m.tolist()
     height = ends[1] - ends[0]
-    plane = recommend(model, request.for_plane(height, right - left))
+    even = request.model_copy(update={'target_um': wanted.target_um})
+    plane = recommend(model, even.for_plane(height, right - left))
     index_range = _index_range(request, plane)
     style = _style(model, request, plane)
     films = LineFilms(
@@ -124,14 +132,14 @@ def plan(
     on_part = placement_at(films, count, plane.index_m, 0.5 * (ends[0] + ends[1]))
     # Level passes go from the top down, vertical ones from the left to the right.
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
-    target = None if request.speed_m_per_s else request.target_um
+    target = None if request.speed_m_per_s else wanted.target_um
     for round_ in range(TARGET_ROUNDS):
         passes = plan_passes(surface_map, lines, [style] * len(lines))
         found = predicted(
-            surface, model, request, surface_map.painted,
+            surface, model, request, wanted,
             trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
         )  # fmt: skip
-        mean, _ = evenness(found['film_um'][surface_map.painted], area)
+        mean, _ = evenness(found['film_um'][wanted.region], area)
         ratio = mean / target if target else 1.0
         if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
             break

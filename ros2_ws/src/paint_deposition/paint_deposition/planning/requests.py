@@ -117,7 +117,7 @@ class Limits(Request):
 
 
 class PlanRequest(Limits, PassRequest):
-    """Passes on a part; the speeds along them are chosen for ``optimise`` only."""
+    """Passes on a part; the speeds along them are chosen for ``optimise`` only, and for zones."""
 
     direction: Literal['horizontal', 'vertical'] = given('horizontal', 'How the passes run.')
     index_m: float | None = given(
@@ -140,7 +140,7 @@ class PlanRequest(Limits, PassRequest):
     optimise: bool = given(
         False,
         'Choose number and place of the passes and the speeds along them for an even film and '
-        'little paint; default: even passes at one speed.',
+        'little paint; default: even passes at one speed. Zones imply it.',
     )
     paint_weight: float = given(
         5e-3,
@@ -156,6 +156,10 @@ class PlanRequest(Limits, PassRequest):
         if self.outward is not None and not any(self.outward):
             raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
         return self
+
+    @model_validator(mode='after')
+    def _has_speed_or_target(self) -> 'PlanRequest':
+        return self  # zones have targets, too; that a plane has one is asked in ``for_plane``
 
     def improvement(
         self, overspray_m: float, target_um: float | None, **weights: float

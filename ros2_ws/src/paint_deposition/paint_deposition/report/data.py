@@ -11,6 +11,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
@@ -73,6 +74,27 @@ class ReportData:
     def tolerance_um(self) -> float | None:
         """What it may differ [um]."""
         return self.study.campaign.tolerance_um
+
+    @cached_property
+    def wanted_um(self) -> tuple[np.ndarray, np.ndarray]:
+        """Target and tolerance (P,) at the points, those of their zones [um]; NaN: none."""
+        overall = self.target_um or 0.0, self.tolerance_um or 0.0
+        each = [
+            wanted_at(
+                one.measured_points.positions_m[:, 0], *overall,
+                one.zones and one.zones.at(
+                    one.measured_points.positions_m, one.measured_points.normals
+                ),
+            )
+            for one in self.experiments
+        ]  # fmt: skip
+        target, tolerance = map(np.concatenate, zip(*each, strict=True))
+        return target, tolerance
+
+    @property
+    def has_target(self) -> bool:
+        """Whether a film is wanted anywhere."""
+        return not np.isnan(self.wanted_um[0]).all()
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.comparison.zone_readings import ZoneReadings, zone_readings
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.residuals import Residuals
@@ -156,6 +157,7 @@ class Comparison:
         dependences: strongest first.
         regions: where the misfit is significant, strongest first.
         model: what was compared with the readings.
+        zones: the readings of each zone of each part beside its target, if there are zones.
         warnings: why a model that was fitted to the readings is not to be trusted.
     """
 
@@ -166,6 +168,7 @@ class Comparison:
     dependences: tuple[Dependence, ...]
     regions: tuple[Region, ...]
     model: DepositionModel
+    zones: tuple[ZoneReadings, ...] = ()
     warnings: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
@@ -188,6 +191,7 @@ class Comparison:
             'noise': self.study.noise_figures,
             'left_out': [outlier.to_dict() for outlier in self.study.outliers],
             'misfits': [misfit.to_dict() for misfit in self.misfits],
+            'zones': [zone.to_dict() for zone in self.zones],
             'regions': [region.to_dict() for region in self.regions],
             'dependences': [asdict(dependence) for dependence in self.dependences],
             'notes': [*self.warnings, *self.study.notes],
@@ -236,7 +240,7 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     return Comparison(
         study, readings, points, tuple(_misfits(study, model, readings)),
         tuple(sorted(dependences, key=lambda d: d.p_value)),
-        tuple(misfit_regions(study, points, model)), model,
+        tuple(misfit_regions(study, points, model)), model, zone_readings(campaign, readings),
     )  # fmt: skip
 
 

@@ -241,6 +241,7 @@ class Diagnosis:
             'not_testable': list(self.not_testable),
             'detectable': self.detectable,
             'regions': [region.to_dict() for region in self.comparisons[0].regions],
+            'zones': [zone.to_dict() for zone in self.comparisons[-1].zones],
             'next': {
                 'measure': [place.to_dict() for place in places],
                 'spray': [spray.to_dict() for spray in sprays],

@@ -17,6 +17,7 @@ from paint_deposition.inference.readings.readings import PointMeans, Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 
 # Half the width of the stencil from which the film's slope at a reading is taken [m].
 STENCIL_M = 0.006
@@ -43,6 +44,7 @@ class Experiment:
     # Of the cell while the part was painted: 'voltage', 'draught'.
     switched_off: frozenset[str] = frozenset()
     frame_id: str = ''  # of the recorded poses, '' where not known
+    zones: PointZones | None = None  # of the vertices of the surface, each with a target
 
     @staticmethod
     def of(
@@ -74,10 +76,11 @@ class Experiment:
 
     def with_readings(self, readings: Readings) -> 'Experiment':
         """The same part with other readings; raises what ``of`` does."""
-        return Experiment.of(
+        found = Experiment.of(
             self.name, self.surface, self.path, readings, self.files, self.settings,
             self.switched_off, self.frame_id,
         )  # fmt: skip
+        return replace(found, zones=self.zones)
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The same part without some of the readings (N,) that were used.
@@ -140,7 +143,8 @@ class Campaign:
         model_file: the start model's file, or None.
         name: that of its file, '' for none; errors compare within one campaign only.
         head: what the report says of part and batch, by key.
-        target_um, tolerance_um: the film wanted and what it may differ [um]; None: not known.
+        target_um, tolerance_um: the film wanted outside of zones, and what it may differ [um];
+            None: not known.
         scanned: number of readings that were condensed to these, means of cells; 0: none.
 
     Raises:

@@ -53,6 +53,12 @@ SIMULATOR = PAINTING | {
     ),
     'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
     'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
+    **fixed_while_configured(
+        'its zones are found on the mesh once; clean the node up or restart it',
+        zones_file=NodeParameter(
+            '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
+        ),
+    ),
     'publish_mesh': NodeParameter(
         True, 'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]'
     ),

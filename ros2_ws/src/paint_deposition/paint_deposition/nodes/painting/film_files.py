@@ -10,15 +10,20 @@ from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.report.writers.film import write_film
 
 
 def statistics_of(
-    values: Mapping[str, Any], surface: Surface, film_um: np.ndarray, emitted_cm3: float
+    values: Mapping[str, Any],
+    surface: Surface,
+    film_um: np.ndarray,
+    emitted_cm3: float,
+    zones: PointZones | None,
 ) -> FilmStatistics:
-    """The statistics of a film (V,), by the target and the thresholds among the parameters."""
+    """The statistics of a film (V,), by the targets and the thresholds among the parameters."""
     chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}
-    return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, **chosen)
+    return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, zones=zones, **chosen)
 
 
 def volume_by_gun(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
@@ -42,6 +47,7 @@ def film_writer(
         part: description of the part for the statistics file.
     """
     film, surface, values = node.film.snapshot(), node.surface, dict(node.values)
+    zones = node.zones
     names, counts = node.gun_names, [gun.counts.to_dict() for gun in node.film.guns]
     refused = [source.refused_frames.items() for source in node.inputs]
     details = {
@@ -50,6 +56,7 @@ def film_writer(
         'frame_id': node.frame.frame_id,
         'down': surface.down,
         'model_file': values['model_file'],
+        'zones_file': values['zones_file'],
         'effects': list(dict.fromkeys(e.id for gun in film.guns for e in gun.model.effects)),
         'poses': node.film.counts.to_dict(),
         'poses_in_other_frames': {frame: count for frames in refused for frame, count in frames},
@@ -73,12 +80,13 @@ def film_writer(
             )
         ]
         film_um = film.film_um
-        figures = statistics_of(values, surface, film_um, film.emitted_cm3)
+        figures = statistics_of(values, surface, film_um, film.emitted_cm3, zones)
         if any(gun.model.brushes for gun in film.guns):
             details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
         return write_film(
-            folder, surface, film_um, figures, stem=stem, statistics_file=f'{stem}.json',
-            details=details, color_range_um=(values['color_min_um'], values['color_max_um']),
+            folder, surface, film_um, figures, zones=zones, stem=stem,
+            statistics_file=f'{stem}.json', details=details,
+            color_range_um=(values['color_min_um'], values['color_max_um']),
         )  # fmt: skip
 
     return write

@@ -23,6 +23,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
     read_part,
     unpainted_films,
     warm_up,
+    zones_on,
 )
 from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
@@ -44,6 +45,7 @@ class PaintingNode(ManagedNode, ABC):
     Attributes:
         gun_names: names of the guns; one empty name for the only gun.
         mesh_file: the part's mesh; surface: the same, refined.
+        zones: of its vertices, or None.
         points: the points that are painted.
         models: the model of each gun, by the parameters.
         film: the film so far, by one gun or several.
@@ -95,6 +97,7 @@ class PaintingNode(ManagedNode, ABC):
         self.models = models_from_parameters(self.values)
         self._read_part()
         self._set_surface(read_part(self.values, self.mesh_file))
+        self.zones = zones_on(self.values, self.mesh_file, self.surface)
         self._outward_side = OutwardSide(len(self.gun_names))
         self.film = unpainted_films(self.surface, self.points, self.models, self.values)
         self.get_logger().info('getting ready; a new model is compiled first')
@@ -173,7 +176,7 @@ class PaintingNode(ManagedNode, ABC):
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points
-        self.film, self._shown = film, None
+        self.zones, self.film, self._shown = part.zones, film, None
         self._notes_logged = len(part.surface.notes)
         self._outward_side = OutwardSide(len(self.gun_names))
         if self.repainting is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
@@ -25,6 +26,7 @@ from paint_deposition.nodes.runtime.parameters import (
 from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 
 PAINTING = dict(
     **MANAGED,
@@ -93,11 +95,12 @@ PAINTING = dict(
 
 @dataclass(frozen=True)
 class PreparedPart:
-    """A part ready to be painted: its refined surface, the points on it, an unpainted film."""
+    """A part ready to be painted: its refined surface, points on it, unpainted film, and zones."""
 
     surface: Surface
     points: SurfacePoints
     film: LiveFilms
+    zones: PointZones | None = None
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
@@ -110,6 +113,17 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
         raise PaintError("mesh_file is empty: give the part's mesh")
     down = np.array(values['down']) if values['down'] else None
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
+
+
+def zones_on(values: Mapping[str, Any], mesh_file: str, surface: Surface) -> PointZones | None:
+    """The zones of a part's vertices by a node's parameters, if they name any.
+
+    Raises:
+        PaintError: the zones cannot be read, or one has no vertex of the part.
+    """
+    if not values.get('zones_file'):
+        return None
+    return read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
 
 
 def unpainted_films(

@@ -21,6 +21,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
     read_part,
     unpainted_films,
     warm_up,
+    zones_on,
 )
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
@@ -75,7 +76,7 @@ class PartChange:
         self._run, self._resets = '', 0
         self._since = datetime.now(timezone.utc)
         present: Future[PreparedPart] = Future()
-        present.set_result(PreparedPart(node.surface, node.points, node.film))
+        present.set_result(PreparedPart(node.surface, node.points, node.film, node.zones))
         self._parts = {version: present}
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
@@ -270,7 +271,7 @@ class PartChange:
         points = surface.points()
         film = unpainted_films(surface, points, node.models, node.values)
         warm_up(surface, film)
-        return PreparedPart(surface, points, film)
+        return PreparedPart(surface, points, film, zones_on(node.values, mesh_file, surface))
 
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run

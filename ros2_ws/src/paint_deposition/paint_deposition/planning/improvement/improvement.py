@@ -22,6 +22,7 @@ from paint_deposition.planning.improvement.programme import Programme, speed_alo
 from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.improvement.retiming import Retiming
 from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.wanted_film import WantedFilm
 
 DEFAULT_TOLERANCE = 0.1
 # The films of bag and robot program should agree to this share of the peak.
@@ -39,10 +40,10 @@ FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 's
 
 @dataclass(frozen=True)
 class FilmSummary:
-    """A film on the target region, and the paint and time spent on it."""
+    """A film where one is wanted, and the paint and time spent on it."""
 
     film_um: np.ndarray  # (V,) at the vertices of the surface
-    # Mean, and standard deviation over it, weighted by area.
+    # Mean, and standard deviation over mean of the film over its own target, weighted by area.
     mean_um: float
     sigma_n: float
     # Least and greatest.
@@ -54,30 +55,40 @@ class FilmSummary:
     # Time with the gun open, and from the first pose to the last.
     spraying_s: float
     cycle_s: float
+    statistics: FilmStatistics  # of the film there, with those of its zones
 
     @staticmethod
     def of(
         film_um: np.ndarray,
         surface: Surface,
-        target_region: np.ndarray,
-        band_um: tuple[float, float],
+        wanted: WantedFilm,
+        target_um: float,
+        tolerance: float,
         emitted_cm3: float,
         trajectory: Trajectory,
     ) -> 'FilmSummary':
-        """Summarise a film; ``target_region`` (V,) bool, ``band_um`` the tolerance band."""
-        film, area = film_um[target_region], surface.vertex_areas_m2[target_region]
+        """Summarise a film; outside of zones the mean target and its tolerance hold."""
+        region = wanted.region
+        film, area = film_um[region], surface.vertex_areas_m2[region]
         path, _ = spray_path(trajectory)
-        good = (film >= band_um[0]) & (film <= band_um[1])
+        low, high = (limit[region] for limit in wanted.limits_um(target_um, tolerance))
+        good = (film >= low) & (film <= high)
+        mean_um, _ = evenness(film, area)
+        _, sigma_n = evenness(film / wanted.share[region], area)
         return FilmSummary(
-            film_um, *evenness(film, area), float(film.min()), float(film.max()),
+            film_um, mean_um, sigma_n, float(film.min()), float(film.max()),
             float((area / area.sum())[good].sum()), emitted_cm3,
             float(surface.vertex_areas_m2 @ film_um),
             float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
+            film_statistics(
+                film, area, emitted_cm3, zones=wanted.zones and wanted.zones.select(region)
+            ),
         )  # fmt: skip
 
     def figures(self) -> dict[str, float]:
         """All but the film itself by name."""
-        return {name: value for name, value in vars(self).items() if name != 'film_um'}
+        apart = ('film_um', 'statistics')
+        return {name: value for name, value in vars(self).items() if name not in apart}
 
 
 @dataclass(frozen=True)
@@ -129,7 +140,7 @@ class Improvement:
     """A programme with other speeds, flows and triggers for a more even film.
 
     Attributes:
-        surface: the part. target_region: (V,) bool, the side whose film counts.
+        surface: the part. wanted: the film on the side where it counts.
         model: what the gun sprays. request: objective and limits.
         original: the motion as it was; trajectory: the improved one as its bag was read back.
         moves: the improved one as moves of a robot program.
@@ -142,7 +153,7 @@ class Improvement:
     """
 
     surface: Surface
-    target_region: np.ndarray
+    wanted: WantedFilm
     model: DepositionModel
     request: ImproveRequest
     original: Trajectory
@@ -154,6 +165,11 @@ class Improvement:
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
+
+    @property
+    def target_region(self) -> np.ndarray:
+        """(V,) bool, vertices whose film counts."""
+        return self.wanted.region
 
     @property
     def target_um(self) -> float:
@@ -173,9 +189,11 @@ class Improvement:
     @cached_property
     def statistics(self) -> FilmStatistics:
         """Of that film on the whole part."""
+        zones = self.wanted.zones
+        target = (self.wanted.elsewhere_um or 0.0) if zones else self.target_um
         return film_statistics(
             self.film_um, self.surface.vertex_areas_m2, self.after.paint_cm3,
-            target_um=self.target_um, target_tolerance_um=self.tolerance * self.target_um,
+            target_um=target, target_tolerance_um=self.tolerance * target, zones=zones,
         )  # fmt: skip
 
     @cached_property
@@ -192,6 +210,7 @@ class Improvement:
     def warnings(self) -> tuple[str, ...]:
         """What may be wrong, a line each with its likely cause."""
         found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
+        found += self.wanted.doubts(self.after.statistics)
         off = self.after.mean_um / self.target_um - 1.0
         if abs(off) > OFF_TARGET:
             thick = off > 0.0
@@ -222,14 +241,20 @@ class Improvement:
         return tuple(found)
 
     @property
+    def band(self) -> str:
+        """The film accepted, in words."""
+        if self.wanted.zones:
+            return 'the band of its zone'
+        return f'±{100 * self.tolerance:g} % of {self.target_um:.1f} µm'
+
+    @property
     def sentence(self) -> str:
         """The improvement in a sentence."""
         a, b = self.before, self.after
         return (
-            f'sigma_n {100 * a.sigma_n:.1f} to {100 * b.sigma_n:.1f} %, within '
-            f'±{100 * self.tolerance:g} % of {self.target_um:.1f} µm {100 * a.within:.0f} to '
-            f'{100 * b.within:.0f} % of the area, paint {a.paint_cm3:.1f} to {b.paint_cm3:.1f} '
-            f'cm3, {a.cycle_s:.1f} to {b.cycle_s:.1f} s'
+            f'sigma_n {100 * a.sigma_n:.1f} to {100 * b.sigma_n:.1f} %, within {self.band} '
+            f'{100 * a.within:.0f} to {100 * b.within:.0f} % of the area, paint '
+            f'{a.paint_cm3:.1f} to {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} to {b.cycle_s:.1f} s'
         )
 
     @property
@@ -260,10 +285,16 @@ class Improvement:
             name: {'before': value, 'after': self.after.figures()[name]}
             for name, value in self.before.figures().items()
         }
+        films = {'before': self.before, 'after': self.after}
+        laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
             **both,
             **{name: getattr(self, name) for name in FIGURES},
+            'zones': [
+                {'name': before['name'], 'before': before, 'after': after}
+                for before, after in zip(*laid.values(), strict=True)
+            ],
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
             'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],

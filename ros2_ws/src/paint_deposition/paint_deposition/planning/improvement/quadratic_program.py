@@ -24,6 +24,7 @@ from paint_deposition.planning.improvement.nodes import (
     SpeedBounds,
 )
 from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.wanted_film import Band
 
 # Converged when the density changes by less than this share; largest number of rounds.
 SETTLED, ROUNDS = 3e-3, 8
@@ -78,6 +79,7 @@ class Problem:
     # For each model, the best known first: (n, V) film [um] for a density of 1 s/m at each node.
     films: Sequence[np.ndarray]
     target_um: float  # film wanted
+    bands: Sequence[Band]  # of the points
     # Of the path.
     nodes: Nodes
     bounds: SpeedBounds
@@ -94,10 +96,10 @@ class Problem:
     def relaxed(self) -> 'Problem':
         """Without weights and limits, except that on the flow: for evenness alone."""
         weights = dict.fromkeys(('paint_weight', 'time_weight', 'smoothness'), 0.0)
-        bounds = dict.fromkeys(('tolerance', 'film_min_um', 'film_max_um'))
         return replace(
             self,
-            request=self.request.model_copy(update=weights | bounds),
+            request=self.request.model_copy(update=weights),
+            bands=(),
             open_ends=np.ones(len(self.nodes), dtype=bool),
             left_out=frozenset(LIMIT_NAMES) - {'flow'},
         )
@@ -183,16 +185,18 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
 
 def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float, float]]:
     """Points beyond an edge of the film / target - 1, that edge, and what they count more."""
-    request, target = problem.request, problem.target_um
-    sides = []
-    if request.tolerance is not None:
-        off = request.tolerance
-        sides += [(1.0, off, BEYOND_TOLERANCE), (-1.0, -off, BEYOND_TOLERANCE)]
-    if request.film_min_um is not None:
-        sides.append((-1.0, request.film_min_um / target - 1.0, BOUND_WEIGHT))
-    if request.film_max_um is not None:
-        sides.append((1.0, request.film_max_um / target - 1.0, BOUND_WEIGHT))
-    found = [(side * (error - edge) > 0.0, edge, weight) for side, edge, weight in sides]
+    request, found = problem.request, []
+    for points, target, off in problem.bands:
+        sides = []
+        if off is not None:
+            sides += [(1.0, off, BEYOND_TOLERANCE), (-1.0, -off, BEYOND_TOLERANCE)]
+        if request.film_min_um is not None:
+            sides.append((-1.0, request.film_min_um / target - 1.0, BOUND_WEIGHT))
+        if request.film_max_um is not None:
+            sides.append((1.0, request.film_max_um / target - 1.0, BOUND_WEIGHT))
+        found += [
+            (points & (side * (error - edge) > 0.0), edge, weight) for side, edge, weight in sides
+        ]
     return [hinge for hinge in found if hinge[0].any()]
 
 

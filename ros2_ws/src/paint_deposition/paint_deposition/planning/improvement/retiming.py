@@ -18,6 +18,7 @@ from paint_deposition.planning.improvement.quadratic_program import (
     solve,
 )
 from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.wanted_film import Band, WantedFilm
 
 # Nodes per width of the pattern, within bounds.
 NODES_PER_SIGMA = 2.0
@@ -60,7 +61,7 @@ class Retiming:
 
 def retime_for_evenness(
     surface: Surface,
-    target_region: np.ndarray,
+    wanted: WantedFilm,
     programme: Programme,
     models: Sequence[DepositionModel],
     request: ImproveRequest,
@@ -69,23 +70,25 @@ def retime_for_evenness(
 ) -> Retiming:
     """Choose speeds, flows and triggers along the path of a programme.
 
-    The film at points spread evenly over the target region, (V,) bool, is linear in the density of
-    paint along the path: a quadratic program gives the best one. Effects that depend on speed,
-    time or film are updated by solving again about the film of the last solution. The models are
-    equally likely, the first is the best known. ``explain`` also determines which limits cost
-    evenness, and how even the film along this path could be.
+    The film at points spread evenly over the region where one is wanted is linear in the density
+    of paint along the path: a quadratic program gives the best one. Films here are over the share
+    of their own target in the mean target: they are even where each zone has its target. Effects
+    that depend on speed, time or film are updated by solving again about the film of the last
+    solution. The models are equally likely, the first is the best known. ``explain`` also
+    determines which limits cost evenness, and how even the film along this path could be.
 
     Raises:
         PlanError: the limits contradict each other.
     """
-    rows = np.flatnonzero(target_region)
-    rows = rows[stratified_sample(surface.vertex_areas_m2[target_region])]
-    films = [FilmAtPoints(surface, rows, model) for model in models]
+    rows = np.flatnonzero(wanted.region)
+    rows = rows[stratified_sample(surface.vertex_areas_m2[wanted.region])]
+    films = [FilmAtPoints(surface, rows, model, wanted.share[rows]) for model in models]
     mean = float(films[0].film_um(programme).mean())
-    target = request.target_um or mean
+    target = wanted.target_um or request.target_um or mean
+    bands = wanted.bands(rows, target, request.tolerance)
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
     spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
-    search = _Search(programme, films, target, target / mean, request, spacing, progress)
+    search = _Search(programme, films, target, target / mean, bands, request, spacing, progress)
     return search.retiming(explain)
 
 
@@ -97,6 +100,7 @@ class _Search:
     films: Sequence[FilmAtPoints]
     target_um: float
     level: float
+    bands: Sequence[Band]
     request: ImproveRequest
     spacing_m: float
     progress: Callable[[str, float], None]
@@ -153,7 +157,7 @@ class _Search:
         flow = np.array([opening.flow for opening in original.openings])
         sprayed_s = self.level * float(flow @ np.diff(original.seconds_at(original.ends_m))[:, 0])
         return Problem(
-            films, self.target_um, nodes, bounds, self.request, sprayed_s, open_ends
+            films, self.target_um, self.bands, nodes, bounds, self.request, sprayed_s, open_ends
         ), now
 
     def _mean_density(self, nodes: Nodes) -> Density:

@@ -64,6 +64,7 @@ def report_html(data: ReportData) -> str:
     ]
     figures = [figure for figure in drawn if figure]
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
+    films = tables.film_rows(data)
     (places, sprays), git = data.proposals, git_version()
     return from_template(
         'report.html.j2', filters,
@@ -71,7 +72,8 @@ def report_html(data: ReportData) -> str:
         headline=headline(data),
         key_figures=key_figures(data),
         head=list(data.study.campaign.head.items()),
-        film=tables.film_rows(data),
+        film=films,
+        zones=tables.zone_rows(data, films),
         cpk=CPK_MEANS,
         points=tables.point_rows(data),
         counts=words.count_words(data.study),

@@ -114,7 +114,7 @@ def of_cause(found: Diagnosis, unseen: SideBySide, hidden: str) -> Chapter:
 
 def of_improvement(found: Improvement) -> Chapter:
     """A programme before and after, in the film that the model predicts."""
-    band = f'within ±{100 * found.tolerance:g} % of {found.target_um:.1f} µm'
+    band = f'within {found.band}'
 
     def both(
         label: str, unit: str, digits: int, figure: Callable[[FilmSummary], float]

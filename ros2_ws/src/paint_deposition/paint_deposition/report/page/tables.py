@@ -8,7 +8,8 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.film.statistics import film_statistics
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.inference.comparison.zone_readings import ZoneReadings
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
@@ -159,29 +160,36 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=data.target_um or 0.0, target_tolerance_um=data.tolerance_um or 0.0,
+            zones=experiment.zones,
         )  # fmt: skip
         areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}
         rows.append({
             'name': experiment.name, 'measured': measured, 'areas': areas, 'film': film,
-            'bands': band_shares(data, measured),
+            'bands': band_shares(data, k),
         })  # fmt: skip
     return rows
 
 
-def band_shares(data: ReportData, film_um: np.ndarray) -> dict[str, float]:
-    """Shares of films (N,) that are low, in and high; empty without a target."""
-    if data.target_um is None:
-        return {}
-    bands = [band_of(data, value) for value in film_um]
-    return {name: bands.count(name) / len(bands) for name in (LOW, IN, HIGH)}
+def zone_rows(
+    data: ReportData, films: list[dict[str, Any]]
+) -> list[tuple[ZoneReadings, FilmStatistics]]:
+    """For each zone of each part its readings, and its film as the best model predicts it."""
+    of_part = {row['name']: row['film'].zones for row in films}
+    return [(z, of_part[z.experiment][z.name]) for z in data.comparisons[-1].zones]
 
 
-def band_of(data: ReportData, film_um: float) -> str:
-    """Where a film is beside the target band; '' without a target."""
-    if data.target_um is None or data.tolerance_um is None:
-        return ''
-    off = film_um - data.target_um
-    return IN if abs(off) <= data.tolerance_um else LOW if off < 0.0 else HIGH
+def band_shares(data: ReportData, index: int) -> dict[str, float]:
+    """Shares of an experiment's points that are low, in and high; empty without a target."""
+    rows = range(*data.rows_of(index).indices(len(data.study)))
+    bands = [band for row in rows if (band := band_of(data, row))]
+    return {name: bands.count(name) / len(bands) for name in (LOW, IN, HIGH) if bands}
+
+
+def band_of(data: ReportData, row: int) -> str:
+    """Where the film measured at a point is beside its target band; '' without a target."""
+    target, tolerance = (wanted[row] for wanted in data.wanted_um)
+    off = data.study.measured_um[row] - target
+    return '' if np.isnan(off) else IN if abs(off) <= tolerance else LOW if off < 0.0 else HIGH
 
 
 def shares_in_words(shares: dict[str, float]) -> str:
@@ -209,6 +217,6 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
                 'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
                 'deviation_um': residual, 'scatter_um': scatter,
                 'model': 'OK' if abs(residual) <= scatter else 'off',
-                'film': band_of(data, found.measured_um[row]),
+                'film': band_of(data, row),
             })  # fmt: skip
     return rows

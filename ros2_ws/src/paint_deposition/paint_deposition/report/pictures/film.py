@@ -10,17 +10,19 @@ from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics
+from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_at
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.report.pictures.chart import colour_bar, colours_of, new_figure, quiet
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
-from paint_deposition.report.style import BARE, BELOW, HIGH, INK, MUTED, WITHIN
+from paint_deposition.report.style import BARE, BELOW, GRID, HIGH, INK, MUTED, WITHIN
 
 # The part's share of the picture, and the column beside it [in].
 PART_IN = (7.6, 7.6)
 BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 2.7, 1.0, 3.4
 BINS = 40
+NO_TARGET = GRID
 
 
 def film_picture(
@@ -30,15 +32,17 @@ def film_picture(
     statistics: FilmStatistics,
     title: str,
     subtitle: str,
+    zones: PointZones | None = None,
 ) -> Figure:
     """A painted part with the figures of its film (V,) [um].
 
-    With a target the part is drawn twice: too thin, right and too thick first, then the film.
+    With a target the part is drawn twice: too thin, right and too thick first, each zone by its
+    own target, then the film.
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
     width, height = (high - low) * min(PART_IN / (high - low))
-    rows = 2 if statistics.target_um > 0.0 else 1
+    rows = 2 if statistics.has_target else 1
     figure = new_figure(
         width + BESIDE_IN + AROUND_IN, rows * (max(height, LEAST_HEIGHT_IN) + AROUND_IN)
     )
@@ -47,8 +51,8 @@ def film_picture(
     scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
     _draw_legend(axes[-1], grid[rows - 1, 1], scale, film_um, statistics)
     if rows == 2:
-        _draw_band(axes[0], part, film_um, spray, statistics)
-        _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics)
+        _draw_band(axes[0], part, film_um, spray, statistics, zones)
+        _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics, zones)
     figure.suptitle(title, x=0.02, ha='left', fontsize=13, color=INK)
     axes[0].set_title(fill(subtitle, 110), loc='left', fontsize=9, color=MUTED)
     return figure
@@ -98,41 +102,70 @@ def draw_film(
 
 
 def _draw_band(
-    axes: Axes, part: PartPicture, film_um: np.ndarray, spray: SprayPath, s: FilmStatistics
+    axes: Axes,
+    part: PartPicture,
+    film_um: np.ndarray,
+    spray: SprayPath,
+    s: FilmStatistics,
+    zones: PointZones | None,
 ) -> None:
     low, high = part.window(spray)
     part.dress(axes, low, high)
-    ends, colours = [s.painted_above_um], [BARE]
-    for end, colour in zip(s.band_um, (BELOW, WITHIN), strict=True):
-        if end > ends[-1]:
-            ends.append(end)
-            colours.append(colour)
-    part.draw_bands(axes, film_um, ends, [*colours, HIGH])
+    of_zone = part.zones(zones.number if zones else np.full(len(film_um), -1))
+    for number, shown in of_zone.items():
+        name = zones.zones.zones[number].name if zones and number >= 0 else ''
+        wanted = s.zones[name] if name else s
+        ends, colours = [s.painted_above_um], [BARE]
+        for end, colour in zip(wanted.band_um, (BELOW, WITHIN), strict=True):
+            if end > ends[-1]:
+                ends.append(end)
+                colours.append(colour)
+        colours.append(HIGH if wanted.target_um else NO_TARGET)
+        part.draw_bands(axes, film_um, ends, colours, shown)
+    part.draw_zones(axes, zones)
     draw_tool_path(axes, spray, part.view, low, high)
 
 
 def _draw_band_legend(
-    figure: Figure, place: SubplotSpec, surface: Surface, film_um: np.ndarray, s: FilmStatistics
+    figure: Figure,
+    place: SubplotSpec,
+    surface: Surface,
+    film_um: np.ndarray,
+    s: FilmStatistics,
+    zones: PointZones | None,
 ) -> None:
-    """Shares, histogram and Cpk."""
+    """Shares, histogram, and Cpk or the figures of the zones."""
     low, high = s.band_um
-    column = place.subgridspec(3, 1, height_ratios=[1.3, 1.2, 0.6])
+    column = place.subgridspec(3, 1, height_ratios=[1.3, 1.2, 0.6 + 0.2 * len(s.zones)])
     shares = figure.add_subplot(column[0])
+    limits = ('its limit',) * 2 if s.zones else (f'{low:g} µm', f'{high:g} µm')
     entries = [
-        (HIGH, f'{100 * s.above_target:.1f} % high, above {high:g} µm'),
+        (HIGH, f'{100 * s.above_target:.1f} % high, above {limits[1]}'),
         (WITHIN, f'{100 * s.within_target:.1f} % in the band'),
-        (BELOW, f'{100 * s.below_target:.1f} % low, below {low:g} µm'),
+        (BELOW, f'{100 * s.below_target:.1f} % low, below {limits[0]}'),
     ] + [(BARE, f'bare, up to {s.painted_above_um:g} µm')] * (s.coverage < 1.0)
+    if zones and not s.target_um and (zones.number < 0).any():
+        entries.append((NO_TARGET, 'no target'))
     title = (
         f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
         f'of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'
     )
+    if s.zones:
+        title = 'target of each zone\nof the painted area with one'
     _draw_patches(shares, entries, title)
-    _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s)
-    cpk = figure.add_subplot(column[2])
-    cpk.set_axis_off()
-    meaning = fill(CPK_MEANS, 40)
-    _write(cpk, f'Cpk {s.cpk:.2f}\n{meaning}'.replace('-', '−'), 8.0)
+    _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s, zones)
+    below = figure.add_subplot(column[2])
+    below.set_axis_off()
+    text = f'Cpk {s.cpk:.2f}\n{fill(CPK_MEANS, 40)}'.replace('-', '−')
+    _write(below, '\n'.join(map(_zone_words, s.zones.items())) or text, 8.0)
+
+
+def _zone_words(named: tuple[str, FilmStatistics]) -> str:
+    name, s = named
+    return (
+        f'{name}: {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
+        f'    mean {s.mean_um:.1f} µm, {100 * s.within_target:.1f} % in the band'
+    )
 
 
 def _draw_patches(axes: Axes, entries: list[tuple[str, str]], title: str = '') -> None:
@@ -152,17 +185,28 @@ def _write(axes: Axes, text: str, size: float = 9.5) -> None:
     )  # fmt: skip
 
 
-def _draw_histogram(axes: Axes, surface: Surface, film_um: np.ndarray, s: FilmStatistics) -> None:
-    """Area over film, with the target band behind it."""
-    painted = film_um > s.painted_above_um
-    film, area = film_um[painted], surface.vertex_areas_m2[painted]
-    low, high = s.band_um
-    quiet(axes, 'film [µm]', '', size=8.0)
+def _draw_histogram(
+    axes: Axes,
+    surface: Surface,
+    film_um: np.ndarray,
+    s: FilmStatistics,
+    zones: PointZones | None,
+) -> None:
+    """Area over film, of zones in tolerances from their targets, with the band behind it."""
+    painted, shown = film_um > s.painted_above_um, film_um
+    (low, high), middle, axis = s.band_um, s.target_um, 'film [µm]'
+    if zones:
+        target, tolerance = wanted_at(film_um, s.target_um, s.target_tolerance_um, zones)
+        painted &= tolerance > 0.0
+        shown = np.divide(film_um - target, tolerance, where=painted, out=np.zeros(len(film_um)))
+        (low, high), middle, axis = (-1.0, 1.0), 0.0, '(film − target) / tolerance'
+    film, area = shown[painted], surface.vertex_areas_m2[painted]
+    quiet(axes, axis, '', size=8.0)
     axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
     axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
     if len(film):
         axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
-    for limit in (low, s.target_um, high):
+    for limit in (low, middle, high):
         axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 
 

@@ -15,6 +15,7 @@ from matplotlib.tri import Triangulation
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
 from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
@@ -93,14 +94,50 @@ class PartPicture:
         self._draw_edges(axes)
 
     def draw_bands(
-        self, axes: Axes, film_um: np.ndarray, ends_um: list[float], colours: list[str]
+        self,
+        axes: Axes,
+        film_um: np.ndarray,
+        ends_um: list[float],
+        colours: list[str],
+        shown: np.ndarray | None = None,
     ) -> None:
-        """The part with a colour for each band of the film, (V,) at the vertices [um]."""
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
+        """The part with a colour for each band of the film, (V,) at the vertices [um].
+
+        ``shown`` (n, 3) are the triangles to draw; default: all that are seen.
+        """
+        faces = self.faces[self.seen] if shown is None else shown
+        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], faces)
         least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
         levels = [least - 1.0, *ends_um, most + 1.0]
         axes.tricontourf(triangles, film_um, levels, colors=colours)
         self._draw_edges(axes)
+
+    def zones(self, number: np.ndarray) -> dict[int, np.ndarray]:
+        """The triangles (n, 3) that are seen of each zone, by numbers (V,) of the vertices."""
+        seen = self.faces[self.seen]
+        of = np.sort(number[seen], axis=1)[:, 1]  # that of two corners, if two agree
+        return {int(k): seen[of == k] for k in np.unique(of)}
+
+    def draw_zones(self, axes: Axes, zones: PointZones | None) -> None:
+        """The borders of the zones of the vertices, with their names and targets."""
+        if zones is None:
+            return
+        triangles = self.zones(zones.number)
+        for number, zone in enumerate(zones.zones.zones):
+            if number not in triangles:  # it is not seen from here
+                continue
+            faces = triangles[number]
+            edges, of_face = edges_of(faces)
+            border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
+            lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
+            axes.add_collection(lines, False)
+            centres = self.flat_m[faces].mean(axis=1)
+            middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
+            label = axes.annotate(
+                f'{zone.name}\n{zone.target_um:g} ± {zone.tolerance_um:g} µm', centres[middle],
+                fontsize=8.5, color=INK, ha='center', va='center', zorder=5,
+            )  # fmt: skip
+            label.set_path_effects(PALE_HALO)
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""

@@ -121,6 +121,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
         part.dress(one, low, high)
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
+        part.draw_zones(one, result.wanted.zones)
         draw_tool_path(one, driven, part.view, low, high)
         one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')

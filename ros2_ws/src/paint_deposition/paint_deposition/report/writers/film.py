@@ -15,6 +15,7 @@ from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.report.writers.write import with_provenance, writable, written
 
 CSV_HEADER = 'x_m,y_m,z_m,thickness_um'
@@ -32,8 +33,9 @@ def _write_simulation(
     found = {what: file for what, file in motions.items() if Path(file).exists()}
     about = with_provenance(result.to_dict() | dict(made_from or {}), models, found)
     files = write_film(
-        folder, result.surface, result.film_um, result.statistics, details=about, overwrite=True
-    )
+        folder, result.surface, result.film_um, result.statistics, zones=result.zones,
+        details=about, overwrite=True,
+    )  # fmt: skip
     if result.readings is not None and result.predicted_um is not None:
         files.append(folder / 'predicted.csv')
         write_predictions(files[-1], result.readings, result.predicted_um)
@@ -42,7 +44,7 @@ def _write_simulation(
     )
     picture = film_picture(
         result.surface, result.film_um, result.path, result.statistics,
-        f'Film on {mesh or "the part"}', f'{motion}, {model or "default model"}',
+        f'Film on {mesh or "the part"}', f'{motion}, {model or "default model"}', result.zones,
     )  # fmt: skip
     return [*files, save_picture(picture, folder / f'film.{pictures}')]
 
@@ -53,6 +55,7 @@ def write_film(
     film_um: np.ndarray,
     statistics: FilmStatistics,
     *,
+    zones: PointZones | None = None,
     stem: str = 'film',
     statistics_file: str = 'stats.json',
     details: Mapping[str, Any] | None = None,
@@ -64,6 +67,7 @@ def write_film(
     Args:
         folder: where to; made if it is not there.
         film_um: (V,) film at the vertices of the surface [um].
+        zones: of the vertices; their names are a column of the table.
         details: more to say in the statistics, such as counts of poses and the files used.
         color_range_um: ends of the colour map in the PLY [um]; both 0 is automatic.
 
@@ -81,8 +85,21 @@ def write_film(
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         write_mesh_ply(paths[0], surface, colours, thickness_um=film_um)
-        rows = np.column_stack([surface.vertices_m, film_um])
+        rows, head, form = np.column_stack([surface.vertices_m, film_um]), CSV_HEADER, ['%.9g'] * 4
+        if zones:
+            rows = np.column_stack([rows.astype(object), _in_table(zones.names)])
+            head, form = f'{head},zone', [*form, '%s']
         with replacing(paths[1]) as temporary:
-            np.savetxt(temporary, rows, '%.9g', ',', header=CSV_HEADER, comments='')
+            np.savetxt(temporary, rows, form, ',', header=head, comments='', encoding='utf-8')
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
+
+
+def _in_table(names: np.ndarray) -> np.ndarray:
+    """Names (V,) as fields of a CSV table."""
+    each, of = np.unique(names, return_inverse=True)
+    quoted = [
+        '"{}"'.format(name.replace('"', '""')) if set(name) & set('",\n') else name
+        for name in each
+    ]
+    return np.array(quoted)[of]

@@ -78,12 +78,15 @@ def _passes(
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
-    files += write_film(folder, surface, result.film_um, result.statistics, overwrite=True)
+    zones = result.wanted.zones
+    files += write_film(
+        folder, surface, result.film_um, result.statistics, zones=zones, overwrite=True
+    )
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(
         surface, result.film_um, result.path, result.statistics, 'Planned passes and their film',
-        result.sentence,
+        result.sentence, zones,
     )  # fmt: skip
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one

@@ -1,0 +1,143 @@
+"""Zones files: regions of a part, each with the film wanted there."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, Field, model_validator
+
+from paint_deposition.errors import PaintError, some
+from paint_deposition.files.meshes import Triangles, read_triangles
+from paint_deposition.files.motion_source import Number, Text
+from paint_deposition.files.refusals import checked
+from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.film.statistics import require_band
+from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
+
+# Of each of red, green and blue: brushes mix the colours along their edge.
+SAME_COLOUR = 40
+# A triangle has a colour if that many of its corners have it.
+CORNERS = 2
+SHOWN_COLOURS = 5
+Corner = Annotated[list[Number], Field(min_length=3, max_length=3)]
+FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
+
+
+def _number_range(written: Any) -> tuple[int, int]:
+    """First and last of '0-119', or of 7."""
+    ends = str(written).split('-')
+    if isinstance(written, bool) or len(ends) > 2 or not all(e.strip().isdecimal() for e in ends):
+        raise ValueError(f'{written!r} is no number and no range of numbers; give {FACES}')
+    first, last = int(ends[0]), int(ends[-1])
+    if last < first:
+        raise ValueError(f'{written!r} ends before it begins; swap the two')
+    return first, last
+
+
+class ZoneEntry(BaseModel, extra='forbid'):
+    """A zone as it is written; paths are relative to its file."""
+
+    name: Annotated[str, BeforeValidator(str), Field(min_length=1, description='what to call it')]
+    target_um: Number = Field(gt=0.0, description='the film wanted, above 0 [um]')
+    tolerance_um: Number = Field(gt=0.0, description='what the film may differ, above 0 [um]')
+    box: Annotated[list[Corner], Field(min_length=2, max_length=2)] | None = Field(
+        None, description='two corners, [[x, y, z], [x, y, z]], in the frame of the mesh [m]'
+    )
+    mesh: Text | None = Field(None, description='the name of a mesh file')
+    mesh_scale: Number | None = Field(
+        None, gt=0.0, description='metres per unit of mesh, above 0; default: as of the part'
+    )
+    body: Text | None = Field(None, description='the name of a body in the mesh file')
+    faces: list[Annotated[tuple[int, int], BeforeValidator(_number_range)]] | None = Field(
+        None, min_length=1, description=FACES
+    )
+    colour: Annotated[str, Field(pattern='^#[0-9a-fA-F]{6}$')] | None = Field(
+        None, description="red, green and blue in hexadecimal digits, as '#ff0000' in quotes"
+    )
+
+    @model_validator(mode='after')
+    def _complete(self) -> 'ZoneEntry':
+        try:
+            require_band(self.target_um, self.tolerance_um)
+        except PaintError as error:
+            raise ValueError(str(error)) from None
+        if self.mesh_scale and not self.mesh:
+            raise ValueError('mesh_scale has no mesh; give both, or --mesh-scale for the part')
+        if not (self.box or self.has_triangles):
+            raise ValueError('it has no place; give box, body, faces, mesh or colour')
+        if self.box and not all(low < high for low, high in zip(*self.box, strict=True)):
+            raise ValueError(f'box is {self.box}; give its lowest corner first, then its highest')
+        return self
+
+    @property
+    def has_triangles(self) -> bool:
+        """Whether the place is told by triangles of a mesh."""
+        return bool(self.mesh or self.body or self.faces or self.colour)
+
+
+def read_zones(
+    path: str | Path, mesh: str | Path, scale: float = 1.0, body: str | None = None
+) -> Zones:
+    """Read the zones of a part.
+
+    Args:
+        path: YAML with a list ``zones``; paths in it are relative to it.
+        mesh, scale, body: the part, as ``read_mesh`` takes it.
+
+    Raises:
+        PaintError: naming the file, the zone and the key at fault, and the remedy.
+    """
+    path = Path(path)
+    content = read_yaml(path, 'zones', PaintError)
+    if not isinstance(content, dict) or [*content] != ['zones'] or not content['zones']:
+        raise PaintError(f"{path}: has no list 'zones'; begin with zones: and give one at least")
+    if not isinstance(content['zones'], list):
+        raise PaintError(f"{path}: 'zones' is no list; begin each zone with a dash")
+    zones: list[Zone] = []
+    for number, written in enumerate(content['zones'], start=1):
+        entry = checked(ZoneEntry, f'{path}: zone {number}', written, PaintError)
+        if entry.name in [zone.name for zone in zones]:
+            raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
+        try:
+            regions = _regions(path.parent, entry, Path(mesh), scale, body)
+        except PaintError as error:
+            raise type(error)(f"{path}: zone '{entry.name}': {error}") from None
+        zones.append(Zone(entry.name, entry.target_um, entry.tolerance_um, regions))
+    return Zones(tuple(zones))
+
+
+def _regions(
+    folder: Path, entry: ZoneEntry, part: Path, scale: float, body: str | None
+) -> tuple[Region, ...]:
+    regions: list[Region] = [Box(np.array(entry.box))] if entry.box else []
+    if entry.has_triangles:
+        mesh = folder / entry.mesh if entry.mesh else part
+        of_mesh = entry.body or (None if entry.mesh else body)
+        found = read_triangles(mesh, entry.mesh_scale or scale, of_mesh, bool(entry.colour))
+        chosen = np.ones(len(found.rows), dtype=bool)
+        if entry.faces:
+            chosen &= _numbered(mesh, entry.faces, found)
+        if entry.colour:
+            chosen &= _coloured(mesh, entry.colour, found)
+        regions.append(Patch(found.vertices_m[found.faces[chosen]]))
+    return tuple(regions)
+
+
+def _numbered(mesh: Path, ranges: list[tuple[int, int]], found: Triangles) -> np.ndarray:
+    highest = int(found.rows[-1])
+    most = max(last for _, last in ranges)
+    if most > highest:
+        raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
+    return np.logical_or.reduce([(found.rows >= a) & (found.rows <= b) for a, b in ranges])
+
+
+def _coloured(mesh: Path, colour: str, found: Triangles) -> np.ndarray:
+    assert found.colours is not None
+    wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
+    alike = np.abs(found.colours.astype(int) - wanted).max(axis=2) <= SAME_COLOUR
+    chosen = alike.sum(axis=1) >= CORNERS
+    if not chosen.any():
+        there, count = np.unique(found.colours.reshape(-1, 3), axis=0, return_counts=True)
+        names = ['#{:02x}{:02x}{:02x}'.format(*one) for one in there[np.argsort(-count)]]
+        raise PaintError(f'{mesh} has no {colour}; its colours are {some(names, SHOWN_COLOURS)}')
+    return chosen

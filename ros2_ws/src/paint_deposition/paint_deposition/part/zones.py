@@ -1,0 +1,204 @@
+"""Zones of a part, each with the film wanted there and what it may differ."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from paint_deposition.errors import PaintError
+from paint_deposition.part.face_tree import FaceTree
+from paint_deposition.part.locating import Location, locate
+from paint_deposition.part.refinement import face_normals
+from paint_deposition.part.surface import Surface
+
+# A point belongs to triangles that it lies over: so little beside them and, since a refined
+# surface bulges from flat triangles, so far above or below [m]; normals agree to 45 degrees.
+BESIDE_M, ABOVE_M, AGREE = 1e-3, 5e-3, 0.7
+NONE = -1
+
+
+class Region(Protocol):
+    """A region of a part's surface."""
+
+    @property
+    def box_m(self) -> np.ndarray:
+        """(2, 3) lowest and highest corner of a box around it [m]."""
+
+    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
+
+    def facing(self, surface: Surface) -> Region:
+        """The same with the outward side of the surface."""
+
+
+@dataclass(frozen=True)
+class Box:
+    """What lies between two corners in the frame of the mesh."""
+
+    box_m: np.ndarray  # (2, 3) lowest and highest corner [m]
+
+    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """As ``Region``."""
+        low, high = self.box_m
+        return np.all((positions_m >= low) & (positions_m <= high), axis=1)
+
+    def facing(self, surface: Surface) -> Box:
+        """As ``Region``: a box has no side."""
+        return self
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Triangles, and what lies over them."""
+
+    corners_m: np.ndarray  # (F, 3, 3) [m]
+
+    @cached_property
+    def box_m(self) -> np.ndarray:
+        """As ``Region``."""
+        return np.stack([self.corners_m.min(axis=(0, 1)), self.corners_m.max(axis=(0, 1))])
+
+    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """As ``Region``."""
+        near, over, place = self._over(positions_m, normals)
+        held = np.zeros(len(positions_m), dtype=bool)
+        held[near] = over & (np.cos(place.angle_rad) >= AGREE)
+        return held
+
+    def facing(self, surface: Surface) -> Patch:
+        """As ``Region``: most of the surface over the triangles says which way they are wound."""
+        near, over, place = self._over(surface.vertices_m, None)
+        cosine = np.einsum('ij,ij->i', place.normals, surface.normals[near])
+        area = surface.vertex_areas_m2[near] * (over & (np.abs(cosine) >= AGREE))
+        return Patch(self.corners_m[:, ::-1]) if area @ np.sign(cosine) < 0.0 else self
+
+    def _over(
+        self, positions_m: np.ndarray, normals: np.ndarray | None
+    ) -> tuple[np.ndarray, np.ndarray, Location]:
+        """Rows (n,) of points near the triangles, which of them lie over one (n,), and where."""
+        low, high = self.box_m
+        inside = (positions_m >= low - ABOVE_M) & (positions_m <= high + ABOVE_M)
+        near = np.flatnonzero(inside.all(axis=1))
+        wanted = None if normals is None else normals[near]
+        place = locate(*self._tree, positions_m[near], wanted, least_cosine=AGREE)
+        above = np.einsum('ij,ij->i', positions_m[near] - place.positions_m, place.normals)
+        beside2 = np.maximum(place.distance_m**2 - above**2, 0.0)
+        return near, (np.abs(above) <= ABOVE_M) & (beside2 <= BESIDE_M**2), place
+
+    @cached_property
+    def _tree(self) -> tuple[FaceTree, np.ndarray]:
+        """The triangles, each with corners and a normal of its own."""
+        corners = self.corners_m.reshape(-1, 3)
+        faces = np.arange(len(corners)).reshape(-1, 3)
+        return FaceTree.of(corners, faces), np.repeat(face_normals(corners, faces), 3, axis=0)
+
+
+@dataclass(frozen=True)
+class Zone:
+    """Part of a part's surface, and the film wanted there."""
+
+    name: str
+    target_um: float  # film wanted [um]
+    tolerance_um: float  # what it may differ either way [um]
+    regions: tuple[Region, ...]  # it is where all of them are
+
+    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
+        return np.logical_and.reduce([one.holds(positions_m, normals) for one in self.regions])
+
+
+@dataclass(frozen=True)
+class Zones:
+    """Zones of a part; the first that holds a point has it."""
+
+    zones: tuple[Zone, ...]
+
+    def __repr__(self) -> str:
+        return f'Zones({", ".join(zone.name for zone in self.zones)})'
+
+    def of(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(N,) number of the zone of points (N, 3) [m] with unit normals (N, 3); -1: none."""
+        number = np.full(len(positions_m), NONE)
+        for k in reversed(range(len(self.zones))):
+            number[self.zones[k].holds(positions_m, normals)] = k
+        return number
+
+    def on(self, surface: Surface) -> PointZones:
+        """The zone of each vertex of a part.
+
+        Raises:
+            PaintError: a zone has no vertex of the part; says why, and the remedy.
+        """
+        facing = [
+            replace(zone, regions=tuple(region.facing(surface) for region in zone.regions))
+            for zone in self.zones
+        ]
+        zones = Zones(tuple(facing))
+        found = PointZones(zones, zones.of(surface.vertices_m, surface.normals))
+        for k, zone in enumerate(zones.zones):
+            if not np.any(found.number == k):
+                raise PaintError(_empty(zone, zones.zones[:k], surface))
+        return found
+
+
+@dataclass(frozen=True)
+class PointZones:
+    """The zone of each of N points on a part."""
+
+    zones: Zones
+    number: np.ndarray  # (N,) of the zone, -1: none
+
+    def __iter__(self) -> Iterator[tuple[Zone, np.ndarray]]:
+        """Each zone that has points, and which (N,) bool these are."""
+        for k, zone in enumerate(self.zones.zones):
+            if (own := self.number == k).any():
+                yield zone, own
+
+    def select(self, rows: np.ndarray) -> PointZones:
+        """Those of some of the points."""
+        return replace(self, number=self.number[rows])
+
+    def at(self, positions_m: np.ndarray, normals: np.ndarray) -> PointZones:
+        """Those of other points (N, 3) [m] of the same part, with outward unit normals (N, 3)."""
+        return replace(self, number=self.zones.of(positions_m, normals))
+
+    @property
+    def names(self) -> np.ndarray:
+        """(N,) of the zones, '' in none."""
+        return np.array([*(zone.name for zone in self.zones.zones), ''])[self.number]
+
+    def wanted_um(
+        self, target_um: float | None = None, tolerance_um: float | None = None
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Target and tolerance (N,) [um], in no zone as given; NaN where nothing is wanted."""
+        zones = self.zones.zones
+        targets = np.array([*(zone.target_um for zone in zones), target_um or np.nan])
+        tolerances = np.array([*(zone.tolerance_um for zone in zones), tolerance_um or 0.0])
+        return targets[self.number], tolerances[self.number]
+
+
+def _empty(zone: Zone, before: tuple[Zone, ...], surface: Surface) -> str:
+    """Why a zone has no vertex of a part."""
+    inside = zone.holds(surface.vertices_m, surface.normals)
+    if inside.any():
+        names = ', '.join(one.name for one in before)
+        return (
+            f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to zones "
+            f'before it ({names}); put it before them'
+        )
+    boxes = ' and '.join(map(_box_words, (region.box_m for region in zone.regions)))
+    part = _box_words(np.stack([surface.vertices_m.min(axis=0), surface.vertices_m.max(axis=0)]))
+    return (
+        f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the part "
+        f'within {part}; give it in the frame and unit of the mesh, or refine the mesh for a '
+        'small zone'
+    )
+
+
+def _box_words(box_m: np.ndarray) -> str:
+    low, high = (', '.join(f'{value:.4g}' for value in corner) for corner in box_m)
+    return f'[{low}] to [{high}] m'
