@@ -6,11 +6,11 @@ from pathlib import Path
 import numpy as np
 import trimesh
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import PoseStamped
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.parameter import Parameter
-from rclpy.qos import QoSProfile, ReliabilityPolicy
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 
@@ -18,6 +18,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.recordings.headers import SET_POINTS
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
+from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -165,6 +166,37 @@ class Robot(Node):
             self.send_pose(
                 stamp, trajectory.positions_m[row], trajectory.quaternions_xyzw[row], frame_id
             )
+
+
+class Broadcaster(Node):
+    """Sends transforms as tf2's broadcasters do."""
+
+    def __init__(self, context) -> None:
+        from tf2_msgs.msg import TFMessage
+
+        super().__init__('broadcaster', context=context)
+        self._kind = TFMessage
+        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._publishers_of = {
+            True: self.create_publisher(TFMessage, '/tf_static', latched),
+            False: self.create_publisher(TFMessage, '/tf', QoSProfile(depth=100)),
+        }
+
+    def send(self, stamp: int, static: bool = False, **poses: Rigid) -> None:
+        """Poses by `parent_to_child`, in one message."""
+        transforms = []
+        for name, pose in poses.items():
+            transform = TransformStamped()
+            transform.header.frame_id, transform.child_frame_id = name.split('_to_')
+            transform.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
+            t, q = transform.transform.translation, transform.transform.rotation
+            t.x, t.y, t.z, q.x, q.y, q.z, q.w = map(float, pose.values)
+            transforms.append(transform)
+        self._publishers_of[static].publish(self._kind(transforms=transforms))
+
+    def has_subscribers(self, count: int = 1) -> bool:
+        each = self._publishers_of.values()
+        return all(publisher.get_subscription_count() >= count for publisher in each)
 
 
 class Onlooker(Node):

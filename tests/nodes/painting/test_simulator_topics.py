@@ -157,7 +157,7 @@ def test_poses_in_an_unknown_frame_are_refused_with_both_names(simulator, robot,
     robot(node).send(MOTION, frame_id='base_link')
     wait_until(lambda: node.inputs[0].poses_refused == len(MOTION))
     # tf knows none either, where it is installed.
-    wait_until(lambda: viewer.reports(POSES, 'no transform between them', b'\x02'))
+    wait_until(lambda: viewer.reports(POSES, 'no transforms connect', b'\x02'))
     assert "they are in frame 'base_link'" in viewer.status(POSES).message
     assert 'set part_pose and part_parent_frame' in viewer.status(POSES).message
     assert node.film.snapshot().film_um.max() == 0.0

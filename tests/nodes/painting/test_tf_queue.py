@@ -3,7 +3,8 @@
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 
-from paint_deposition.nodes.painting.frames import TF_TIMEOUT_S, NoTransform, TfQueue
+from paint_deposition.motion.frame_tree import NoTransform
+from paint_deposition.nodes.painting.frames import TF_TIMEOUT_S, TfQueue
 
 
 class Part:

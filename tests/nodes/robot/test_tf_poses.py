@@ -4,54 +4,22 @@ import importlib.util
 
 import numpy as np
 import pytest
-from geometry_msgs.msg import PoseStamped, TransformStamped
-from rclpy.node import Node
-from rclpy.qos import DurabilityPolicy, QoSProfile
-from rclpy.time import Time
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile
 from scipy.spatial.transform import Rotation
 
-from nodes.cell import START_NS, parameters
+from nodes.cell import START_NS, Broadcaster, parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
 
 needs_tf = pytest.mark.skipif(
-    importlib.util.find_spec('tf2_ros') is None, reason='tf2 comes with a ROS installation'
+    importlib.util.find_spec('tf2_msgs') is None, reason='tf2 comes with a ROS installation'
 )
 STEP_NS = 4_000_000
 FLANGE = Rigid.of([0.0, 0.1, 0.3, *Rotation.from_euler('x', 30.0, degrees=True).as_quat()])
 TCP = [0.0, 0.02, 0.15, *Rotation.from_euler('y', 25.0, degrees=True).as_quat()]
-
-
-class Broadcaster(Node):
-    """Sends transforms as tf2's broadcasters do."""
-
-    def __init__(self, context) -> None:
-        from tf2_msgs.msg import TFMessage
-
-        super().__init__('broadcaster', context=context)
-        self._kind = TFMessage
-        latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._publishers_of = {
-            True: self.create_publisher(TFMessage, '/tf_static', latched),
-            False: self.create_publisher(TFMessage, '/tf', QoSProfile(depth=100)),
-        }
-
-    def send(self, stamp: int, static: bool = False, **poses) -> None:
-        """Poses by `parent_to_child`, in one message."""
-        transforms = []
-        for name, pose in poses.items():
-            transform = TransformStamped()
-            transform.header.frame_id, transform.child_frame_id = name.split('_to_')
-            transform.header.stamp = Time(nanoseconds=int(stamp)).to_msg()
-            t, q = transform.transform.translation, transform.transform.rotation
-            t.x, t.y, t.z, q.x, q.y, q.z, q.w = map(float, pose.values)
-            transforms.append(transform)
-        self._publishers_of[static].publish(self._kind(transforms=transforms))
-
-    def has_subscribers(self) -> bool:
-        return all(each.get_subscription_count() for each in self._publishers_of.values())
 
 
 @pytest.fixture
@@ -140,8 +108,8 @@ def test_a_frame_that_is_not_there_is_named(broadcaster, viewer, wait_until):
 
 
 @pytest.mark.skipif(
-    importlib.util.find_spec('tf2_ros') is not None, reason='tf2 is installed here'
+    importlib.util.find_spec('tf2_msgs') is not None, reason='tf2 is installed here'
 )
 def test_without_tf2_it_says_what_to_install(ros_context):
-    with pytest.raises(PaintError, match='poses from tf need tf2_ros, which is not installed'):
+    with pytest.raises(PaintError, match='poses from tf need tf2_msgs, which is not installed'):
         AtomizerSource(context=ros_context, parameter_overrides=parameters(base_link='world'))

@@ -71,7 +71,7 @@ def _findings() -> Iterator[Finding]:
         f'{pd.__version__} in {Path(pd.__file__).parent}; Python {platform.python_version()}, '
         f'{platform.platform(terse=True)} {platform.machine()}',
     )
-    for look in (_libraries, _ros, _processor, _known_film):
+    for look in (_libraries, _ros, _processor, _rapid, _known_film):
         try:
             yield from look()
         except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
@@ -129,6 +129,14 @@ def _processor() -> Iterator[Finding]:
     folder = Path(pd.__file__).parent if folder.name == '__pycache__' else folder.parent
     sizes = [file.stat().st_size for file in folder.rglob('*.nb[ic]')]
     yield Finding('compiled code', f'{len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}')
+
+
+def _rapid() -> Iterator[Finding]:
+    from paint_deposition.files.rapid.parser import parse_modules
+
+    # The package lark-parser puts another lark in the place of the one that is asked for.
+    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
+    yield Finding('RAPID', 'a program is read', True)
 
 
 def _known_film() -> Iterator[Finding]:

@@ -16,11 +16,12 @@ from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.files.tool_path import is_tool_path, read_tool_path
-from paint_deposition.motion.part_frame import Rigid, at_part, is_frame
+from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, moved
 from paint_deposition.motion.trajectory import Trajectory
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
+    from paint_deposition.motion.frame_tree import FrameTree
 
 PART = 'part'
 
@@ -176,15 +177,18 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         return recorded
     known = ''
     if bag is not None:
-        from paint_deposition.files.recordings.transforms import StaticFrames, poses_over_time
+        from paint_deposition.files.recordings.transforms import read_frames
 
-        static = StaticFrames.from_bag(bag)
-        if place := static.pose_of(part, named):
+        tree = read_frames(bag)
+        if tree.moving_between(named, part):
+            return _in_moving_part_frame(recorded, part, tree)
+        if tree.moving_between(named, part) is not None:
+            place = words(tree.lookup(part, named))
             note = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
-            return _with_note(at_part(recorded, place.values, part), note + words(place))
-        if over_time := poses_over_time(bag, part, named, recorded.stamps_ns):
-            return _in_moving_part_frame(recorded, part, *over_time)
-        known = static.words(named)
+            brought = moved(recorded, tree.lookup(named, part), part)
+            return _with_note(brought, note + place)
+        if fixed := tree.connected(named):
+            known = f' (static transforms connect it to {", ".join(fixed)})'
     if source.frame_id:
         raise RecordingError(
             f"{recorded.source}: its poses are in frame '{named}', the mesh in '{part}', and no "
@@ -198,34 +202,32 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
     return replace(recorded, warnings=(*recorded.warnings, warning))
 
 
-def _in_moving_part_frame(
-    recorded: Trajectory, part: str, known: np.ndarray, places: np.ndarray
-) -> Trajectory:
-    """Transform by the pose of the part (M, 7) at each time where it is known (N,)."""
+def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') -> Trajectory:
+    """Transform by where the part is at each time at which it is known."""
+    from paint_deposition.files.recordings.transforms import lookups
+
     frames = f"'{part}' in '{recorded.frame_id}'"
-    if not known.any():
+    known, transforms = lookups(tree, recorded.frame_id, part, recorded.stamps_ns)
+    if not transforms:
         raise RecordingError(
             f'{recorded.source}: the transforms of {frames} cover none of its poses; their clock '
             'is another, give --part-pose'
         )
-    # One by one, as in the nodes, so that the film is the same to the last bit.
     poses = zip(recorded.positions_m[known], recorded.quaternions_xyzw[known], strict=True)
-    brought = [
-        Rigid.of(place).inverse().applied(*pose) for place, pose in zip(places, poses, strict=True)
-    ]
-    positions, quaternions = map(np.array, zip(*brought, strict=True))
-    moved = replace(
+    each = [transform.applied(*pose) for transform, pose in zip(transforms, poses, strict=True)]
+    positions, quaternions = map(np.array, zip(*each, strict=True))
+    brought = replace(
         recorded, stamps_ns=recorded.stamps_ns[known], positions_m=positions,
         quaternions_xyzw=quaternions, frame_id=part,
     )  # fmt: skip
-    if left_out := len(recorded) - len(moved):
+    if left_out := len(recorded) - len(brought):
         warning = (
             f'{recorded.source}: {left_out} of {len(recorded)} poses are left out, since the '
             f'transforms of {frames} do not cover their time; record /tf from before the first'
             ' pose on'
         )
-        moved = replace(moved, warnings=(*moved.warnings, warning))
-    return _with_note(moved, f'/tf: {len(moved)} poses brought to the moving part, {frames}')
+        brought = replace(brought, warnings=(*brought.warnings, warning))
+    return _with_note(brought, f'/tf: {len(brought)} poses brought to the moving part, {frames}')
 
 
 def words(place: Rigid) -> str:

@@ -12,11 +12,12 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
+from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
-from paint_deposition.nodes.painting.frames import NoTransform, PartFrame, TfQueue
+from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
@@ -165,11 +166,13 @@ class AtomizerInput:
 
     def take_pending(self) -> None:
         """Take all messages in the queues and pass them on."""
+        self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
         self.flush()
 
     def _take(self) -> None:
+        self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
         waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S

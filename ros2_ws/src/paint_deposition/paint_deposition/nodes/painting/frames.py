@@ -3,75 +3,89 @@
 import contextlib
 from collections import deque
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 from geometry_msgs.msg import PoseStamped, TransformStamped
-from rclpy.node import Node
 from rclpy.publisher import Publisher
-from rclpy.time import Time
 
+from paint_deposition.files.recordings.headers import transforms_of
+from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
+from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.node import PaintNode
 
 FRAME_REMEDY = 'set part_pose and part_parent_frame, or frame_id'
+CLOCK_REMEDY = 'publish tf without gaps and by the clock of the poses'
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.
-TF_TIMEOUT_S = 0.5
+TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
 MAX_WAITING = 5000
-
-
-class NoTransform(Exception):
-    """There is no transform for a pose, though with `may_come` there may be one later."""
-
-    def __init__(self, reason: str, may_come: bool = False) -> None:
-        super().__init__(reason)
-        self.may_come = may_come
+TF_QUEUE_DEPTH = 5000
 
 
 class PartFrame:
     """The frame of the part, and the transforms into it.
 
-    They come from the parameter `part_pose` or from tf2, where it is installed. A pose without a
-    frame is taken to be in that of the part.
+    They come from the parameter `part_pose`, and from tf where its messages are installed. A pose
+    without a frame is taken to be in that of the part.
     """
 
-    def __init__(self, node: Node, frame_id: str) -> None:
+    def __init__(self, node: PaintNode, frame_id: str) -> None:
         self.frame_id = frame_id.lstrip('/')
-        self._parent = ''
-        self._from_parent: Rigid | None = None
         self._node = node
         self._publisher: Publisher | None = None
-        # None where tf2 is not installed.
-        self._buffer: Any = None
+        self._tree = FrameTree(live=True)
+        # None where the messages of tf are not installed.
+        self._topics: list[AdaptiveSubscription] = []
         with contextlib.suppress(ImportError):
-            import tf2_ros
+            from tf2_msgs.msg import TFMessage
 
-            self._buffer = tf2_ros.Buffer(node=node)
-            self._buffer.listener = tf2_ros.TransformListener(self._buffer, node)
+            # Deep queues that are emptied before poses are judged: a busy node has its transforms.
+            subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=TF_QUEUE_DEPTH)
+            self._topics = [
+                subscribe('/tf_static', self._take_static, latched=True),
+                subscribe('/tf', self._take),
+            ]
+
+    def take_pending(self) -> None:
+        """Take the transforms in the queues."""
+        for topic in self._topics:
+            topic.take_pending()
+
+    def _take_static(self, message: Any, _sent_ns: int) -> None:
+        for child, parent, _, pose in transforms_of(message):
+            self._tree.fix(child, parent, pose)
+
+    def _take(self, message: Any, _sent_ns: int) -> None:
+        for transform in transforms_of(message):
+            self._tree.add(*transform)
 
     def set_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
         """Set the part's pose [x y z qx qy qz qw] in another frame, [] for none.
 
         It is published on `part_pose`, so that recordings contain it.
         """
-        self.take_part_pose(parent_frame, part_pose)
-        if self._from_parent is None:
+        # As it is published, and so recorded: to the last bit.
+        place = Rigid.of(part_pose).values if len(part_pose) else ()
+        self.take_part_pose(parent_frame, place)
+        if not place:
             return
         if self._publisher is None:
             self._publisher = self._node.create_publisher(
                 TransformStamped, PART_POSE_TOPIC, topics.LATCHED
             )
         placed = TransformStamped(child_frame_id=self.frame_id)
-        placed.header = header(self._parent, self._node.get_clock().now().nanoseconds)
+        placed.header = header(parent_frame.lstrip('/'), self._node.get_clock().now().nanoseconds)
         t, q = placed.transform.translation, placed.transform.rotation
-        t.x, t.y, t.z, q.x, q.y, q.z, q.w = Rigid.of(part_pose).values
+        t.x, t.y, t.z, q.x, q.y, q.z, q.w = place
         self._publisher.publish(placed)
 
     def take_part_pose(self, parent_frame: str, part_pose: Sequence[float]) -> None:
         """The same as another node has published it."""
-        self._parent = parent_frame.lstrip('/')
-        self._from_parent = Rigid.of(part_pose).inverse() if len(part_pose) else None
+        self._tree.place(self.frame_id, parent_frame, part_pose)
 
     def is_own(self, frame_id: str) -> bool:
         """Whether poses in this frame need no transform."""
@@ -83,27 +97,13 @@ class PartFrame:
         Raises:
             NoTransform: there is none, or none yet.
         """
-        if self._from_parent is not None and frame_id.lstrip('/') == self._parent:
-            return self._from_parent
-        if self._buffer is None:
-            raise NoTransform(f'no transform between them is known; {FRAME_REMEDY}')
-        import tf2_ros
-
         try:
-            found = self._buffer.lookup_transform(
-                self.frame_id, frame_id.lstrip('/'), Time(nanoseconds=stamp_ns)
-            )
-        except tf2_ros.TransformException as error:
-            words = ' '.join(str(error).split())
-            reason = f'tf knows no transform between them ({words}); {FRAME_REMEDY}'
-            if isinstance(error, tf2_ros.ExtrapolationException):
-                reason = (
-                    f'tf does not cover the time of the poses ({words}); publish it by the same '
-                    'clock as the poses'
-                )
-            raise NoTransform(reason, may_come=True) from None
-        t, q = found.transform.translation, found.transform.rotation
-        return Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w])
+            return self._tree.lookup(frame_id, self.frame_id, stamp_ns)
+        except NoTransform as missing:
+            is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
+            remedy = CLOCK_REMEDY if is_connected else FRAME_REMEDY
+            may_come = missing.may_come and bool(self._topics)
+            raise NoTransform(f'{missing}; {remedy}', may_come) from None
 
 
 class TfQueue:

@@ -17,7 +17,7 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
-from paint_deposition.nodes.recording.initial_messages import InitialMessages
+from paint_deposition.nodes.recording.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.recording.part_runs import part_data, unused_name
 from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
@@ -142,7 +142,7 @@ class RunRecorder(ManagedNode):
         if len(types) > 1:
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
-        depth = POSE_QUEUE_DEPTH if is_pose else QUEUE_DEPTH
+        depth = POSE_QUEUE_DEPTH if is_pose or name == TF else QUEUE_DEPTH
         profile = compatible_qos([publisher.qos_profile for publisher in publishers], depth)
         topic = self._topics.get(name)
         if topic is None:

@@ -23,8 +23,8 @@ from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF
 from paint_deposition.files.recordings.transforms import (
     PART_POSE_TYPE,
     STATIC,
-    StaticFrames,
     part_pose_topics,
+    read_frames,
 )
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.trajectory import Trajectory
@@ -156,10 +156,8 @@ class ReplayedTransforms:
 
 def _part_pose_hint(bag: Bag) -> str:
     """The parameters of the simulator that replace the transforms, for a warning."""
-    for parent, child, place in StaticFrames.from_bag(bag).places:
-        if child == 'part':
-            values = ', '.join(f'{value:.9g}' for value in place.values)
-            return (
-                f"; set part_parent_frame: '{parent}' and part_pose: [{values}] of the simulator"
-            )
+    if placed := read_frames(bag).placed('part'):
+        parent, place = placed
+        values = ', '.join(f'{value:.9g}' for value in place.values)
+        return f"; set part_parent_frame: '{parent}' and part_pose: [{values}] of the simulator"
     return "; set the simulator's part_parent_frame and part_pose"

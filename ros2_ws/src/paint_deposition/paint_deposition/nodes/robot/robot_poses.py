@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
-from rclpy.time import Time
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError, RecordingError, did_you_mean
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns, transforms_of
 from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.motion.frame_tree import FrameTree, NoTransform
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 
@@ -21,8 +21,6 @@ from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Stat
 TakePose = Callable[[int, Rigid, int], None]
 SILENT_S = 2.0
 QUEUE_DEPTH = 5000
-# A transform that is older than the newest by more is from a restarted stream [ns].
-STREAM_RESTART_NS = 1_000_000_000
 
 
 class JointPoses:
@@ -94,8 +92,8 @@ class PublishedPoses:
 class TfPoses:
     """Looks up the pose of frame `tip` in `base` at each stamp of a moving transform between them.
 
-    A pose waits until all transforms between the frames are known at its time or later; tf2
-    interpolates those with other stamps.
+    A pose waits until all transforms between the frames are known at its time or later;
+    those with other stamps are interpolated.
 
     Args:
         node: subscribes to tf.
@@ -103,26 +101,22 @@ class TfPoses:
         take_pose: called with each pose, in the order of the stamps.
 
     Raises:
-        PaintError: tf2 is not installed.
+        PaintError: tf2_msgs is not installed.
     """
 
     def __init__(self, node: PaintNode, base: str, tip: str, take_pose: TakePose) -> None:
         try:
-            import tf2_ros
             from tf2_msgs.msg import TFMessage
         except ImportError:
             raise PaintError(
-                f'{node.get_name()}: poses from tf need tf2_ros, which is not installed; install '
-                'tf2_ros_py of your ROS distribution, or give urdf_file'
+                f'{node.get_name()}: poses from tf need tf2_msgs, which is not installed; install '
+                'it from your ROS distribution, or give urdf_file'
             ) from None
         self.base, self.tip = base.lstrip('/'), tip.lstrip('/')
         self._take_pose = take_pose
-        self._tf2 = tf2_ros
-        self._buffer = tf2_ros.Buffer()
-        self._parents: dict[str, str] = {}
+        self._tree = FrameTree(live=True)
         # (stamp, child frame) of the moving transforms whose poses are not published yet.
         self._waiting: deque[tuple[int, str]] = deque(maxlen=QUEUE_DEPTH)
-        self._newest_ns: dict[str, int] = {}
         self._published_ns = 0
         self._failed_lookups = 0
         self._received_s = time.monotonic()
@@ -133,51 +127,27 @@ class TfPoses:
         node.create_subscription(TFMessage, '/tf', self._take, QoSProfile(depth=QUEUE_DEPTH))
 
     def _take_static(self, message: Any) -> None:
-        for transform in message.transforms:
-            self._connect(transform)
-            self._buffer.set_transform_static(transform, 'tf')
+        for child, parent, _, pose in transforms_of(message):
+            self._tree.fix(child, parent, pose)
 
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
-        for transform in message.transforms:
-            child, stamp = self._connect(transform), stamp_ns(transform.header)
-            if stamp < self._newest_ns.get(child, 0) - STREAM_RESTART_NS:
-                self._restart()
-            self._buffer.set_transform(transform, 'tf')
-            self._newest_ns[child] = max(stamp, self._newest_ns.get(child, 0))
+        for child, parent, stamp, pose in transforms_of(message):
+            if self._tree.add(child, parent, stamp, pose):
+                self._waiting.clear()
+                self._published_ns = 0
             self._waiting.append((stamp, child))
         self._publish_due(info['source_timestamp'])
-
-    def _connect(self, transform: Any) -> str:
-        child = transform.child_frame_id.lstrip('/')
-        self._parents[child] = transform.header.frame_id.lstrip('/')
-        return child
-
-    def _restart(self) -> None:
-        self._buffer.clear()  # static transforms stay
-        self._waiting.clear()
-        self._newest_ns.clear()
-        self._published_ns = 0
-
-    def _ancestors(self, frame: str) -> list[str]:
-        """A frame, its parent and so on up to the root."""
-        chain = [frame]
-        while chain[-1] in self._parents and len(chain) <= len(self._parents):
-            chain.append(self._parents[chain[-1]])
-        return chain
 
     @property
     def _moving(self) -> set[str]:
         """Frames between tip and base that move in their parents; none if not connected."""
-        from_tip, from_base = self._ancestors(self.tip), self._ancestors(self.base)
-        if from_tip[-1] != from_base[-1]:
-            return set()
-        return (set(from_tip) ^ set(from_base)) & self._newest_ns.keys()
+        return self._tree.moving_between(self.tip, self.base, self._published_ns) or set()
 
     def _publish_due(self, sent_ns: int) -> None:
         moving = self._moving
         if not moving:
             return
-        known_ns = min(self._newest_ns[child] for child in moving)
+        known_ns = min(map(self._tree.newest_ns, moving))
         relevant = [(at_ns, child) for at_ns, child in self._waiting if child in moving]
         later = [(at_ns, child) for at_ns, child in relevant if at_ns > known_ns]
         self._waiting = deque(later, maxlen=QUEUE_DEPTH)
@@ -185,17 +155,16 @@ class TfPoses:
         for stamp in sorted(due):
             self._published_ns = stamp
             try:
-                found = self._buffer.lookup_transform(self.base, self.tip, Time(nanoseconds=stamp))
-            except self._tf2.TransformException:
+                pose = self._tree.lookup(self.tip, self.base, stamp)
+            except NoTransform:
                 self._failed_lookups += 1
                 continue
-            t, q = found.transform.translation, found.transform.rotation
             self._received_s = time.monotonic()
-            self._take_pose(stamp, Rigid.of([t.x, t.y, t.z, q.x, q.y, q.z, q.w]), sent_ns)
+            self._take_pose(stamp, pose, sent_ns)
 
     def status(self) -> Status:
         """Whether tf connects tip and base, and transforms arrive."""
-        frames = sorted({*self._parents, *self._parents.values()})
+        frames = self._tree.names
         values = {
             'frames': ' '.join(frames) or 'none',
             'moving frames between tip and base': ' '.join(sorted(self._moving)) or 'none',

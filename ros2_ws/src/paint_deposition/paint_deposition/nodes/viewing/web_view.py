@@ -19,7 +19,7 @@ from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.trigger import relative_flow
 from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
-from paint_deposition.nodes.painting.frames import NoTransform, PartFrame
+from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
@@ -105,6 +105,11 @@ class WebView(PaintNode):
         self.scene = Scene()
         self._frame = PartFrame(self, self.values['frame_id'])
         self._flow: dict[str, float] = {}
+        # The simulator, which cannot paint a pose without a transform, says why.
+        self._waiting = {
+            name: TfQueue(partial(self._move_gun, name), lambda *_: None)
+            for name in self.values['atomizers'] or ['']
+        }
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
         self._rmse_um = float('nan')
@@ -187,8 +192,11 @@ class WebView(PaintNode):
     # --- the guns
 
     def _take_motion(self) -> None:
+        self._frame.take_pending()
         for topic in self._inputs:
             topic.take_pending()
+        for waiting in self._waiting.values():
+            waiting.process(time.monotonic())
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         t, q = placed.transform.translation, placed.transform.rotation
@@ -199,14 +207,14 @@ class WebView(PaintNode):
             self._flow[gun] = relative_flow(state.spraying, state.flow)
 
     def _take_pose(self, gun: str, message: PoseStamped, _sent_ns: int) -> None:
+        self._waiting[gun].add(message, time.monotonic())
+
+    def _move_gun(self, gun: str, message: PoseStamped) -> None:
         p, q = message.pose.position, message.pose.orientation
         pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
         frame_id, stamp = message.header.frame_id, stamp_ns(message.header)
         if not self._frame.is_own(frame_id):
-            try:
-                pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
-            except NoTransform:  # the simulator, which cannot paint it, says why
-                return
+            pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
         batch = PoseBatch(np.array([stamp]), pose[0][None], pose[1][None])
         for position, z_axis in zip(*batch.finite_axes(), strict=True):
             # Without any state the gun is taken to spray, as the simulator does.

@@ -25,6 +25,7 @@ const receive = {
     Object.assign(state, { scenes, history: [], readings: null, guns: [] });
     if (state.scene >= scenes.length) state.scene = 0;
     view.clearTrack();
+    find('track').hidden = true;
     view.showGuns([]);
     find('replay').hidden = !replayed;
     showChoices();
@@ -50,6 +51,7 @@ const receive = {
     if (series === 'track') {
       if (!first) view.clearTrack();
       view.addTrack(rows);
+      find('track').hidden = !view.segments;
     } else {
       state.history.length = first;
       for (let at = 0; at < rows.length; at += COLUMNS.length) state.history.push(rows.subarray(at, at + COLUMNS.length));

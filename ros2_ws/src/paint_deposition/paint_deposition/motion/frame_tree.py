@@ -1,0 +1,222 @@
+"""Where frames are in one another over time, by the rules of tf2: live and from a recording."""
+
+from bisect import bisect_left
+from collections.abc import Sequence
+from functools import reduce
+from itertools import pairwise
+from operator import matmul
+
+import numpy as np
+
+from paint_deposition.motion.part_frame import Rigid
+
+# Where a frame was between two transforms that are further apart is not known. A live pose waits
+# as long for its transform, so that a recording has the same poses as the nodes had.
+LONGEST_GAP_NS = 2_000_000_000
+# A live transform that is older than the newest by more is from a restarted stream [ns].
+RESTART_NS = 1_000_000_000
+# As in tf2 [ns].
+REMEMBERED_NS = 10_000_000_000
+
+
+class NoTransform(Exception):
+    """There is no transform, though with `may_come` there may be one later."""
+
+    def __init__(self, reason: str, may_come: bool = False) -> None:
+        super().__init__(reason)
+        self.may_come = may_come
+
+
+class _Motion:
+    """The poses of a frame over time, each in the parent that it had then."""
+
+    def __init__(self) -> None:
+        self.stamps_ns: list[int] = []
+        self.poses: list[tuple[str, np.ndarray]] = []
+
+    def add(self, stamp_ns: int, parent: str, pose: np.ndarray) -> None:
+        row = bisect_left(self.stamps_ns, stamp_ns)
+        is_known = row < len(self.stamps_ns) and self.stamps_ns[row] == stamp_ns
+        self.stamps_ns[row : row + is_known] = [stamp_ns]
+        self.poses[row : row + is_known] = [(parent, pose)]
+
+    def forget(self, before_ns: int) -> None:
+        row = bisect_left(self.stamps_ns, before_ns)
+        del self.stamps_ns[:row], self.poses[:row]
+
+    def parent(self, stamp_ns: int) -> str:
+        row = bisect_left(self.stamps_ns, stamp_ns)
+        if row == len(self.stamps_ns) or self.stamps_ns[row] > stamp_ns:
+            row = max(row - 1, 0)
+        return self.poses[row][0]
+
+    def pose(self, frame: str, stamp_ns: int) -> Rigid:
+        """In its parent, interpolated between the transforms before and after."""
+        stamps, row = self.stamps_ns, bisect_left(self.stamps_ns, stamp_ns)
+        if row < len(stamps) and stamps[row] == stamp_ns:
+            return Rigid.of(self.poses[row][1])
+        of = f"the pose of '{frame}' at {1e-9 * stamp_ns:.3f} s is not known"
+        if row == len(stamps):
+            raise NoTransform(f'{of}: the newest of tf is of {1e-9 * stamps[-1]:.3f} s', True)
+        if row == 0:
+            raise NoTransform(f'{of}: the first of tf is of {1e-9 * stamps[0]:.3f} s')
+        gap_ns, (parent, before), (next_parent, after) = (
+            stamps[row] - stamps[row - 1], *self.poses[row - 1 : row + 1]
+        )  # fmt: skip
+        if gap_ns > LONGEST_GAP_NS:
+            raise NoTransform(f'{of}: tf has none for {1e-9 * gap_ns:.2f} s')
+        if parent != next_parent:
+            return Rigid.of(before)
+        return _between(before, after, (stamp_ns - stamps[row - 1]) / gap_ns)
+
+
+def _between(before: np.ndarray, after: np.ndarray, share: float) -> Rigid:
+    """The pose (7,) at a share of the way between two."""
+    from pytransform3d.rotations import quaternion_slerp
+
+    pose = (1.0 - share) * before + share * after
+    if not np.array_equal(before[3:], after[3:]):
+        pose[3:] = quaternion_slerp(before[3:], after[3:], share, shortest_path=True)
+    return Rigid.of(pose)
+
+
+class FrameTree:
+    """Frames, each with its pose in its parent, fixed or over time.
+
+    Args:
+        live: poses over time come in order, and are remembered for ten seconds.
+    """
+
+    def __init__(self, live: bool = False) -> None:
+        self._live = live
+        # Parent and pose of a frame that does not move; of these, where the user says that it is.
+        self._fixed: dict[str, tuple[str, Rigid]] = {}
+        self._placed: dict[str, tuple[str, Rigid]] = {}
+        self._moving: dict[str, _Motion] = {}
+        # Transforms that hold at any time.
+        self._lasting: dict[tuple[str, str], Rigid] = {}
+
+    @property
+    def names(self) -> list[str]:
+        """All frames, by name."""
+        parents = {parent for parent, _ in self._still.values()}
+        parents |= {parent for motion in self._moving.values() for parent, _ in motion.poses}
+        return sorted(parents | self._still.keys() | self._moving.keys())
+
+    def fix(self, child: str, parent: str, pose: Sequence[float]) -> None:
+        """Take a static transform, which replaces earlier ones of the frame."""
+        self._lasting.clear()
+        self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
+
+    def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
+        """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
+        self._lasting.clear()
+        self._placed.pop(_name(child), None)
+        if len(pose):
+            self._placed[_name(child)] = _name(parent), Rigid.of(pose)
+
+    def add(self, child: str, parent: str, stamp_ns: int, pose: Sequence[float]) -> bool:
+        """Take a transform at one time.
+
+        Returns:
+            Whether a live stream began again: poses over time from before it are forgotten.
+        """
+        restarted = self._live and stamp_ns < self.newest_ns(child) - RESTART_NS
+        if restarted:
+            self._moving.clear()
+        if _name(child) not in self._moving:
+            self._lasting.clear()
+        motion = self._moving.setdefault(_name(child), _Motion())
+        motion.add(stamp_ns, _name(parent), np.array(pose, dtype=float))
+        if self._live:
+            motion.forget(motion.stamps_ns[-1] - REMEMBERED_NS)
+        return restarted
+
+    def placed(self, child: str) -> tuple[str, Rigid] | None:
+        """Parent and pose of a frame that does not move, None if it does or is not known."""
+        return self._still.get(_name(child))
+
+    @property
+    def _still(self) -> dict[str, tuple[str, Rigid]]:
+        return self._fixed | self._placed
+
+    def newest_ns(self, child: str) -> int:
+        """Stamp of the newest pose of a frame over time, 0 without any."""
+        motion = self._moving.get(_name(child))
+        return motion.stamps_ns[-1] if motion else 0
+
+    def stamps_ns(self, child: str) -> list[int]:
+        """The stamps of the poses of a frame over time."""
+        return self._moving[_name(child)].stamps_ns
+
+    def _ancestors(self, frame: str, stamp_ns: int) -> list[str]:
+        """A frame, its parent at that time and so on up to the root."""
+        chain, still = [_name(frame)], self._still
+        while len(chain) <= len(still) + len(self._moving):
+            if chain[-1] in still:
+                chain.append(still[chain[-1]][0])
+            elif chain[-1] in self._moving:
+                chain.append(self._moving[chain[-1]].parent(stamp_ns))
+            else:
+                break
+        return chain
+
+    def _up(self, one: str, other: str, stamp_ns: int) -> tuple[list[str], list[str]]:
+        """The frames from either up to, and without, the first that both are in."""
+        chains = self._ancestors(one, stamp_ns), self._ancestors(other, stamp_ns)
+        shared = next((frame for frame in chains[0] if frame in chains[1]), None)
+        if shared is None:
+            raise NoTransform(f"no transforms connect '{one}' to '{other}'", may_come=True)
+        up, down = (chain[: chain.index(shared)] for chain in chains)
+        return up, down
+
+    def moving_between(self, one: str, other: str, stamp_ns: int = 0) -> set[str] | None:
+        """The frames between two that move in their parents; None if they are not connected."""
+        try:
+            up, down = self._up(one, other, stamp_ns)
+        except NoTransform:
+            return None
+        return {*up, *down} & self._moving.keys() - self._still.keys()
+
+    def connected(self, frame: str) -> list[str]:
+        """The other frames that a frame is connected with by fixed ones."""
+        return [
+            name for name in self.names
+            if name != _name(frame) and self.moving_between(frame, name) == set()
+        ]  # fmt: skip
+
+    def lookup(self, source: str, target: str, stamp_ns: int = 0) -> Rigid:
+        """The pose of frame `source` in `target` at that time, which brings poses from one to
+        the other.
+
+        Raises:
+            NoTransform: it is not known, or not yet.
+        """
+        if lasting := self._lasting.get((source, target)):
+            return lasting
+        up, down = self._up(source, target, stamp_ns)
+        placed, back = self._product(up, stamp_ns), self._product(down, stamp_ns)
+        if back is not None:
+            placed = back.inverse() @ placed if placed else back.inverse()
+        found = placed or Rigid.of([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+        if not self.moving_between(source, target, stamp_ns):
+            self._lasting[source, target] = found
+        return found
+
+    def _product(self, chain: list[str], stamp_ns: int) -> Rigid | None:
+        """The pose of the first frame of a chain in the parent of the last."""
+        still = self._still
+        steps = [
+            still[frame][1] if frame in still
+            else self._moving[frame].pose(frame, stamp_ns)
+            for frame in chain
+        ]  # fmt: skip
+        return reduce(matmul, reversed(steps)) if steps else None
+
+    def longest_gap_s(self, child: str) -> float:
+        """Between two poses of a frame over time."""
+        return 1e-9 * max((b - a for a, b in pairwise(self.stamps_ns(child))), default=0)
+
+
+def _name(frame: str) -> str:
+    return frame.lstrip('/')
