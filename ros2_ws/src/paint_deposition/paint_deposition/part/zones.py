@@ -12,6 +12,7 @@ import numpy as np
 from paint_deposition.errors import PaintError
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.locating import Location, locate
+from paint_deposition.part.points import box_words
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
@@ -190,15 +191,9 @@ def _empty(zone: Zone, before: tuple[Zone, ...], surface: Surface) -> str:
             f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to zones "
             f'before it ({names}); put it before them'
         )
-    boxes = ' and '.join(map(_box_words, (region.box_m for region in zone.regions)))
-    part = _box_words(np.stack([surface.vertices_m.min(axis=0), surface.vertices_m.max(axis=0)]))
+    boxes = ' and '.join(box_words(region.box_m) for region in zone.regions)
     return (
-        f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the part "
-        f'within {part}; give it in the frame and unit of the mesh, or refine the mesh for a '
-        'small zone'
+        f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the part within "
+        f'{box_words(surface.vertices_m)}; give it in the frame and unit of the mesh, or refine '
+        'the mesh for a small zone'
     )
-
-
-def _box_words(box_m: np.ndarray) -> str:
-    low, high = (', '.join(f'{value:.4g}' for value in corner) for corner in box_m)
-    return f'[{low}] to [{high}] m'
