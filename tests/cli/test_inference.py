@@ -189,7 +189,7 @@ def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
     content = json.loads((tmp_path / 'comparison.json').read_text())
     assert set(content) == {
         'geometry', 'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences',
-        'notes', 'provenance',
+        'notes', 'zones', 'provenance',
     }  # fmt: skip
     assert content['noise']['source'] == 'repeats'
     door = content['misfits'][0]
