@@ -91,6 +91,15 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
 
 
+def test_a_point_read_in_two_layers_is_not_measured_again(tmp_path):
+    (tmp_path / 'door.csv').write_text(
+        'point,x_m,y_m,z_m,thickness_um,layer\n1,0,0,0,20,base\n1,0,0,0,41,total\n'
+        '2,1,0,0,21,base\n2,1,0,0,22,base\n'
+    )
+    figures = json.loads(paint('inspect', 'door.csv', '--json', cwd=tmp_path).stdout)
+    assert (figures['points'], figures['repeated']) == (3, ['2, base'])
+
+
 @pytest.mark.parametrize('heading', ['Auftrag', 'Schichtdicke soll [µm]', 'Schichtdicke Lack'])
 def test_readings_without_a_known_thickness_are_told_the_headings_that_are(heading, tmp_path):
     (tmp_path / 'door.csv').write_text(f'x_m;y_m;z_m;{heading}\n0;0;0;20,5\n1;0;0;21,5\n')

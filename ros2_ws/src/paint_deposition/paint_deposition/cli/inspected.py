@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,10 @@ def readings_in(path: Path, points_file: Path | None) -> tuple[dict[str, Any], s
     from paint_deposition.part.points import box_words
 
     readings = pd.read_readings(path, points_file)
+    # A point that is read in two layers is two points.
+    named = zip(readings.point, readings.layer, strict=True)
+    places = [f'{point}, {layer}' if layer else point for point, layer in named]
+    readings = replace(readings, point=np.array(places))
     film, means, noise = readings.thickness_um, PointMeans.of(readings), gauge_noise(readings)
     zeros, repeated = (
         list(dict.fromkeys(readings.point[rows].tolist()))
