@@ -71,9 +71,9 @@ def results_scenes(folder: Path) -> tuple[list[Scene], list[str]]:
 def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
     """Each part with each model, the last model first."""
     data = ReportData.of(SideBySide(by_model))
-    wanted = data.target_um or 0.0, data.tolerance_um or 0.0
     scenes = []
     for row, (experiment, painted) in enumerate(zip(data.experiments, data.painted, strict=True)):
+        wanted = data.study.campaign.target_of(experiment)
         films = [film.film_um for film in painted]
         at = data.rows_of(row)
         residuals = [comparison.points.select(at) for comparison in data.comparisons]

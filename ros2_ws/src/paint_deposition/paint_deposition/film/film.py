@@ -163,21 +163,15 @@ class Film:
         The geometry is that of the first gun; `atomizers` has each.
         """
         coats = {'coats': [coat.to_dict() for coat in self.coats]} if self.coats else {}
-        return (
-            self.statistics.to_dict()
-            | coats
-            | {
-                'frame_id': self.trajectory.frame_id,
-                'down': self.surface.down.tolist(),
-                'effects': list(
-                    dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)
-                ),
-                'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
-                'paint': paint_figures(self),
-                'poses': self.counts.to_dict(),
-                'geometry': self.guns[0].geometry.to_dict(),
-                'atomizers': [gun.to_dict() for gun in self.guns],
-                'notes': list(self.notes),
-                'warnings': list(self.warnings),
-            }
-        )
+        return self.statistics.to_dict() | coats | {
+            'frame_id': self.trajectory.frame_id,
+            'down': self.surface.down.tolist(),
+            'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
+            'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
+            'paint': paint_figures(self),
+            'poses': self.counts.to_dict(),
+            'geometry': self.guns[0].geometry.to_dict(),
+            'atomizers': [gun.to_dict() for gun in self.guns],
+            'notes': list(self.notes),
+            'warnings': list(self.warnings),
+        }  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.coats import TOTAL, sum_um
+from paint_deposition.film.coats import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
@@ -83,23 +83,14 @@ class ReportData:
         """What it may differ [um]."""
         return self.study.campaign.tolerance_um
 
-    def target_of(self, experiment: Experiment) -> tuple[float, float]:
-        """Target and tolerance of the film read [um]; 0 is none, as for some of the coats."""
-        wanted = self.target_um or 0.0, self.tolerance_um or 0.0
-        return wanted if experiment.layer == TOTAL else (0.0, 0.0)
-
     @cached_property
     def wanted_um(self) -> tuple[np.ndarray, np.ndarray]:
         """Target and tolerance (P,) at the points, those of their zones [um]; NaN: none."""
+        target_of = self.study.campaign.target_of
         each = [
-            wanted_at(
-                one.measured_points.positions_m[:, 0], *self.target_of(one),
-                one.zones and one.zones.at(
-                    one.measured_points.positions_m, one.measured_points.normals
-                ),
-            )
+            wanted_at(one.means.mean_um, *target_of(one), one.zones_of_points)
             for one in self.experiments
-        ]  # fmt: skip
+        ]
         target, tolerance = map(np.concatenate, zip(*each, strict=True))
         return target, tolerance
 

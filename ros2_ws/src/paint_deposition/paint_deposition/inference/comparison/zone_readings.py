@@ -74,10 +74,9 @@ def zone_readings(campaign: Campaign, readings: Residuals) -> tuple[ZoneReadings
     """The zones of each experiment, by the residuals of all N readings used."""
     owner, found = campaign.experiment_of[campaign.means.owner], []
     for number, experiment in enumerate(campaign.experiments):
-        if experiment.zones is None:
+        of, own = experiment.zones_of_points, readings.select(owner == number)
+        if of is None:
             continue
-        places, own = experiment.measured_points, readings.select(owner == number)
-        of = experiment.zones.at(places.positions_m, places.normals)
         points = experiment.readings.point
         for k, zone in enumerate(of.zones.zones):
             inside = (of.number == k)[experiment.means.owner]

@@ -136,6 +136,12 @@ class Experiment:
         moved = f'moved onto the surface by {median:.1f} mm (median), {largest:.1f} mm at most'
         return f'{self.readings.understood or self.readings.source}; {moved}'
 
+    @cached_property
+    def zones_of_points(self) -> PointZones | None:
+        """The zones of the P measured points; None without zones."""
+        points = self.measured_points
+        return self.zones and self.zones.at(points.positions_m, points.normals)
+
     @property
     def groups(self) -> np.ndarray:
         """(P,) group label of each point."""
@@ -201,6 +207,11 @@ class Campaign:
     def positions_m(self) -> np.ndarray:
         """(P, 3) measured points on the surfaces [m]."""
         return np.concatenate([e.measured_points.positions_m for e in self.experiments])
+
+    def target_of(self, experiment: Experiment) -> tuple[float, float]:
+        """Target and tolerance of the film read [um]; 0 is none, as for some of the coats."""
+        wanted = self.target_um or 0.0, self.tolerance_um or 0.0
+        return wanted if experiment.layer == TOTAL else (0.0, 0.0)
 
     @property
     def brushes(self) -> frozenset[int]:

@@ -157,7 +157,7 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for k, experiment in enumerate(data.experiments):
         measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
-        target_um, tolerance_um = data.target_of(experiment)
+        target_um, tolerance_um = data.study.campaign.target_of(experiment)
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=target_um, target_tolerance_um=tolerance_um, zones=experiment.zones,
