@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint docs format lock audit sbom clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint docs format lock audit sbom wheel clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -76,6 +76,9 @@ docs: build  ## build the site of the documentation into runs/site, links checke
 
 format: build  ## put imports and layout in order
 	@$(IN_ENVIRONMENT) ruff check --fix . ; ruff format .
+
+wheel: build  ## build the wheel with compiled code in it, for this Python, into dist/
+	@setup/wheel.sh
 
 lock: build  ## pin the newest library versions that all supported Pythons can use
 	$(PIN) requirements/core.in -o requirements/core.txt

@@ -12,11 +12,11 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.errors import ModelError
+from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.laws import Ray, in_precision
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath

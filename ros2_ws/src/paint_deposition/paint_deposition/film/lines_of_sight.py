@@ -5,10 +5,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
 from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.kernel.threads import THREADS
 from paint_deposition.part.points import SurfacePoints

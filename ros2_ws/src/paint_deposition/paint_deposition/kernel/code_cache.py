@@ -56,8 +56,8 @@ def _compiled_with(value: Any, seen: set[int]) -> Iterator[bytes]:
 
 @cache
 def _source_of(module: str) -> bytes:
-    """A module's name and a digest of its file."""
-    file = getattr(sys.modules.get(module), '__file__', None)
+    """A module's name and a digest of its file; NumPy's functions are Numba's own in its code."""
+    file = None if module == 'numpy' else getattr(sys.modules.get(module), '__file__', None)
     try:
         source = Path(file).read_bytes() if file else b''
     except OSError:

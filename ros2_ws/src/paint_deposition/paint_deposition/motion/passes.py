@@ -26,9 +26,9 @@ shows only now, and the heading was that of the approach.
 import math
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import njit
 from paint_deposition.motion.strokes import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,

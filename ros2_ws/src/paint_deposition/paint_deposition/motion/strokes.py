@@ -16,7 +16,8 @@ A stroke is new while its ``length_m`` is zero.
 import math
 
 import numpy as np
-from numba import njit
+
+from paint_deposition.kernel.compiler import njit
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01

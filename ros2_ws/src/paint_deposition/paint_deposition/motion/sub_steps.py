@@ -10,7 +10,8 @@ other rows came in the same call: a live stream and an offline run give the same
 import math
 
 import numpy as np
-from numba import njit
+
+from paint_deposition.kernel.compiler import njit
 
 # A turn of the tool moves the far end of the spray; this lever turns it into a travel [m].
 LEVER_M = 0.3

@@ -5,9 +5,9 @@ from bisect import bisect_right, insort
 from operator import itemgetter
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.kernel.compiler import njit
 
 # The brush of a motion that names none: the only one.
 ONLY_BRUSH = 0

@@ -7,9 +7,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.kernel.blocks import bounding_box_m
+from paint_deposition.kernel.compiler import njit
 
 # Faces in a leaf of the tree.
 LEAF = 8

@@ -3,9 +3,9 @@
 import math
 
 import numpy as np
-from numba import njit
 from scipy.sparse import coo_array
 
+from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.threads import shared_among_threads
 
 # Near vertices shape the parabola by far the most.

@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numba import njit
 
 from paint_deposition.errors import MeshError
+from paint_deposition.kernel.compiler import njit
 from paint_deposition.part.edges import edges_of
 
 # How many times longer than its base a sliver's sides are.

@@ -1,0 +1,25 @@
+"""Numba's compiler, set to one kind of processor instead of the one at hand.
+
+What is compiled on one machine then serves the others, so that a wheel can bring compiled code.
+The package compiles through the `njit` of this module alone.
+"""
+
+import llvmlite.binding as llvm
+from numba import config, njit
+
+__all__ = ['njit']
+
+# Intel since Haswell (2013), AMD since Excavator (2015), by what tells them from older ones.
+KIND = 'x86-64-v3'
+ITS_FEATURES = ('avx2', 'bmi2', 'f16c', 'fma', 'lzcnt', 'movbe')
+
+
+def _choose_processor() -> None:
+    """Choose the kind, unless the user's NUMBA_CPU_NAME names one or this processor is no such."""
+    has = llvm.get_host_cpu_features()
+    if config.CPU_NAME is None and all(has.get(feature) for feature in ITS_FEATURES):
+        config.CPU_NAME = KIND
+        config.CPU_FEATURES = ''
+
+
+_choose_processor()
