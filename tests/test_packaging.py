@@ -283,13 +283,18 @@ def run(repository, tmp_path_factory):
         done = subprocess.run(command, capture_output=True, text=True)
         assert done.returncode == 0, done.stderr
     shutil.rmtree(source)
+    # With compiled code beside the modules, as in the wheels of setup/wheel.sh.
+    (modules,) = folder.glob(f'venv/lib/python3*/site-packages/{PACKAGE}')
+    for compiled in (SOURCES / PACKAGE / PACKAGE).rglob('*.nb[ic]'):
+        target = modules / compiled.relative_to(SOURCES / PACKAGE / PACKAGE)
+        target.parent.mkdir(exist_ok=True)
+        shutil.copy(compiled, target)
     # The environment lies in a repository of another project, as environments do.
     subprocess.run(['git', 'init', '--quiet', folder], check=True)
     who = ['-c', 'user.name=Somebody', '-c', 'user.email=somebody@example.org']
     message = ['commit', '--quiet', '--allow-empty', '--message', 'Begin']
     subprocess.run(['git', '-C', folder, *who, *message], check=True)
-    # What is compiled here runs once.
-    bare = {'HOME': os.environ['HOME'], 'NUMBA_OPT': '0'}
+    bare = {'HOME': os.environ['HOME']}
 
     def run(name: str, *arguments: object) -> subprocess.CompletedProcess:
         command = [folder / 'venv/bin' / name, *map(str, arguments)]
@@ -298,7 +303,6 @@ def run(repository, tmp_path_factory):
     return run
 
 
-# In one process, for what is not optimised is compiled anew in each.
 AT_WORK = """
 import sys
 import paint_deposition as pd

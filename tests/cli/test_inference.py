@@ -284,10 +284,10 @@ def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
 
 
 @pytest.mark.slow
-def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(tmp_path):
-    """Both panel and door: it is put into the model in place of the law, and compared."""
+def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alone, tmp_path):
+    """It is put into the model in place of the law, and compared."""
     file, output = tmp_path / 'my_incidence.py', tmp_path / 'out'
-    done = paint('refit', CAMPAIGN, '--add', 'learned:incidence_deg', '--as-effect', file,
+    done = paint('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
                  '-o', output)  # fmt: skip
     assert done.returncode == 0, done.stderr
     content = json.loads((output / 'diagnosis.json').read_text())
@@ -298,7 +298,7 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(tmp_path)
     own = {key: model[key] for key in ('planar', 'projection')}
     own['effects'] = [{'file': str(file), **values}]
     (tmp_path / 'own.yaml').write_text(yaml.safe_dump(own))
-    done = paint('compare', CAMPAIGN, '--model', output / 'model.yaml', '--model',
+    done = paint('compare', door_alone, '--model', output / 'model.yaml', '--model',
                  tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
     assert done.returncode == 0, done.stderr
     learned, own = (
@@ -306,7 +306,7 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(tmp_path)
         for name in ('model', 'own')
     )
     assert sum(r**2 for r in own) < 1.3 * sum(r**2 for r in learned)
-    again = paint('refit', CAMPAIGN, '--add', 'learned:incidence_deg', '--as-effect', file,
+    again = paint('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
                   '-o', output)  # fmt: skip
     assert_refused(again, 'my_incidence.py is there already', 'give another name')
 

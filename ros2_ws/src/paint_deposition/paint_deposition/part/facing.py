@@ -68,7 +68,7 @@ def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
     gun_side = -axes.mean(axis=0)
     if np.linalg.norm(gun_side) < CANCELLED:
         return surface
-    known = replace(surface, gun_side=gun_side)
+    known = surface.seen_from(gun_side)
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
 

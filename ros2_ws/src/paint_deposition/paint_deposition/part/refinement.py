@@ -132,9 +132,10 @@ def edge_lengths_m(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 def _face_vectors(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(F, 3) normals as long as the parallelograms are large."""
-    a, b, c = np.asarray(vertices_m, dtype=np.float64)[faces].transpose(1, 0, 2)
-    return np.cross(b - a, c - a)
+    """(F, 3) normals as long as the parallelograms are large: `np.cross` takes thrice the time."""
+    a, b, c = np.asarray(vertices_m, dtype=np.float64)[faces.T]
+    (x, y, z), (u, v, w) = (b - a).T, (c - a).T
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u], axis=1)
 
 
 def _lengths(vectors: np.ndarray) -> np.ndarray:

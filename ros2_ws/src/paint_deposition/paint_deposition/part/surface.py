@@ -1,7 +1,7 @@
 """The part's surface as a refined triangle mesh, and where points lie on it."""
 
 import hashlib
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -118,6 +118,13 @@ class Surface:
         """Digest of the refined mesh: the same for the same vertices and faces in one order."""
         content = self.vertices_m.astype('<f8').tobytes() + self.faces.astype('<i8').tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
+
+    def seen_from(self, gun_side: np.ndarray) -> 'Surface':
+        """The same part with the gun (3,) on that side; what rays and searches need is shared."""
+        known = replace(self, gun_side=gun_side)
+        made = vars(self).items()
+        vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
+        return known
 
     @property
     def area_m2(self) -> float:
