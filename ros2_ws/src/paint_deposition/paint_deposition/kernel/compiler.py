@@ -1,7 +1,7 @@
 """Numba's compiler, set to one kind of processor instead of the one at hand.
 
 What is compiled on one machine then serves the others, so that a wheel can bring compiled code.
-The package compiles through the `njit` of this module alone.
+The setting is that of the whole process; the package compiles through this `njit` alone.
 """
 
 import llvmlite.binding as llvm
