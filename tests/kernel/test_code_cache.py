@@ -54,6 +54,7 @@ print(_find.py_func.__qualname__, *box_distance.stats.cache_hits.values())
 """
 
 
+@pytest.mark.slow
 def test_code_that_a_wheel_brings_is_found_in_another_place_and_with_another_numpy(tmp_path):
     """In a copy of the package elsewhere, with files of another time."""
     package = Path(paint_deposition.__file__).parent
