@@ -42,7 +42,9 @@ def test_variants_have_files_of_their_own_so_that_processes_cannot_swap_them(emp
         assert sum(loaded.stats.cache_hits.values()) == 1
 
 
-MEASURE = """
+# The name of a function that uses NumPy, and how often compiled code of another was found on disk;
+# the file given stands for that of another NumPy.
+LOOK_ON_DISK = """
 import sys
 import numpy as np
 np.__file__ = sys.argv[1]
@@ -58,7 +60,7 @@ print(_find.py_func.__qualname__, *box_distance.stats.cache_hits.values())
 def test_code_that_a_wheel_brings_is_found_in_another_place_and_with_another_numpy(tmp_path):
     """In a copy of the package elsewhere, with files of another time."""
     package = Path(paint_deposition.__file__).parent
-    told = []
+    numpy_file, told = Path(__file__), []
     for folder, source in (('first', package), ('second', tmp_path / 'first/paint_deposition')):
         compiled = ['*.nb[ic]'] if folder == 'first' else []
         ignore = shutil.ignore_patterns('*.pyc', 'static', *compiled)
@@ -67,7 +69,8 @@ def test_code_that_a_wheel_brings_is_found_in_another_place_and_with_another_num
             os.utime(file, (1e9, 1e9))
         environment = os.environ | {'PYTHONPATH': str(copy.parent)}
         environment.pop('NUMBA_CACHE_DIR', None)
-        command = [sys.executable, '-c', MEASURE, copy / 'errors.py' if told else __file__]
+        command = [sys.executable, '-c', LOOK_ON_DISK, numpy_file]
         done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
         told.append(done.stdout.split())
+        numpy_file = package / 'errors.py'
     assert told[1] == [*told[0], '1']
