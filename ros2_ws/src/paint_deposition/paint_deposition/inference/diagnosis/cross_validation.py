@@ -4,7 +4,6 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.evidence import left_out
 from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.learning import MOST_LAWS, choose_laws
 from paint_deposition.inference.diagnosis.search import Stage
@@ -47,18 +46,20 @@ class LeftOut:
     def _errors_um(self, folds: np.ndarray, without: frozenset[str]) -> np.ndarray:
         run = self.stages[0].here.run
         options = [option for option in self.options if option.learns not in without]
-        deviation = np.empty((MOST_LAWS + 1, len(folds)))
+        predicted_um = np.empty((MOST_LAWS + 1, len(folds)))
         for fold in np.unique(folds):
             out = folds == fold
             found = _found_without(self.stages, out)
-            plain = run.plain(found.fit)
             nulls = found.nulls(found.fit).select(~out)
             kept = [option.select(~out) for option in options]
             laws = choose_laws(nulls, kept, run.freedom)
             learned = [size * options[k].columns for k, size in laws]
             for count in range(MOST_LAWS + 1):
-                deviation[count, out] = left_out(plain, learned[:count], out)
-        return np.array([root_mean_square(each * run.study.sigma_um) for each in deviation])
+                if count <= len(learned):
+                    free = np.hstack(learned[:count]) if count else None
+                    without_um = run.study.predicted_without_um(found.fit, out, free)
+                predicted_um[count, out] = without_um[out]
+        return np.array([root_mean_square(run.study.measured_um - each) for each in predicted_um])
 
 
 def _found_without(stages: Sequence[Stage], out: np.ndarray) -> Trial:

@@ -107,29 +107,6 @@ class NullModel:
         return NullModel.of(self.columns[rows], self.raw[rows], kept)
 
 
-def left_out(null: NullModel, added: Sequence[np.ndarray], out: np.ndarray) -> np.ndarray:
-    """Deviations of readings from what the others predict, by the model and the levels of parts.
-
-    Args:
-        null: what the model varies. added: directions (P, n) of what it has besides.
-        out: (P,) bool, the readings left out.
-    """
-    columns = np.hstack([null.columns, *added])
-    kept = columns[~out]
-    precision = np.eye(columns.shape[1]) + kept.T @ kept
-    amounts = np.linalg.solve(precision, kept.T @ null.raw[~out])
-    return null.raw[out] - columns[out] @ amounts
-
-
-def hold_out(null: NullModel, folds: np.ndarray) -> np.ndarray:
-    """(P,) deviations over the noise of points while those of their fold (P,) were left out."""
-    deviation = np.empty(len(folds))
-    for fold in np.unique(folds):
-        out = folds == fold
-        deviation[out] = left_out(null, [], out)
-    return deviation
-
-
 @dataclass(frozen=True)
 class Principal:
     """Whitened directions of one explanation, turned to be orthogonal to each other."""

@@ -32,6 +32,7 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
+OTHER_ERROR = 0.3
 # The size of an effect is what it changes at this share of the points at the most.
 LARGEST = 0.95
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
@@ -166,12 +167,12 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
-    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
+    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model, True)]
     return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
 
 
 def _laws_off(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel, anywhere: bool = False
 ) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
     """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
     covariates = {
@@ -196,6 +197,10 @@ def _laws_off(
             else:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None
+        others = [name for name in covariates if name not in own] if anywhere else []
+        for name in others:
+            root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+            yield effect, OTHER_ERROR / np.sqrt(len(others)) * change[:, np.newaxis] * root, None
 
 
 def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:

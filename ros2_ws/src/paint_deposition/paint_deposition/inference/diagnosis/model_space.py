@@ -170,11 +170,6 @@ class ModelSpace:
         return self.evidences[int(self.share.argmax())]
 
     @cached_property
-    def log_evidence(self) -> float:
-        """Log evidence of the model at all sizes, with or without something unknown beside it."""
-        return float(np.logaddexp(self._log_null, self._log_null + self.alone[UNKNOWN]))
-
-    @cached_property
     def alone(self) -> dict[str, float]:
         """Logarithm of each cause's odds against nothing missing, most probable first."""
         terms: dict[str, list[float]] = {}
@@ -221,6 +216,27 @@ class ModelSpace:
         found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
         by_chance = self._evidence(np.hstack(draws))
         return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
+
+    def p_value_of_size(self, seed: int) -> float:
+        """Probability of fields this large over the parts if sprays differed as usual ones do.
+
+        The statistic is the score of such fields (Rao), summed over their lengths.
+        """
+        sizes = self.nature[int(self.share.argmax())].sizes
+        usual = self.remainder.covariance(self.remainder.usual(sizes))
+        null = self.central.null.with_remainder(usual)
+        score = np.zeros_like(usual)
+        for settings, parts in zip(self.remainder.settings, self.remainder.parts, strict=True):
+            field = null.whiten(null.whiten(settings + parts).T)
+            score += field / np.trace(field)
+        found, *by_chance = (
+            np.einsum('pd,pq,qd->d', each, score, each)
+            for each in (
+                null.deviation[:, np.newaxis],
+                simulated(len(usual), self.freedom, DRAWS, seed),
+            )
+        )
+        return float((1 + np.count_nonzero(by_chance[0] >= found)) / (1 + DRAWS))
 
     def _evidence(self, raw: np.ndarray) -> np.ndarray:
         """(D,) log evidence that any cause acts against none, for deviations (P, D)."""
@@ -304,7 +320,11 @@ def left_over(study: Study, fit: Fit) -> RemainderFigures:
     return ModelSpace(weighed, [], remainder, freedom).figures
 
 
-def inclusion_of(log_weights: Sequence[float], nothing: float) -> float:
-    """Probability of any of some refitted models against one without what they have more."""
-    odds = np.logaddexp.reduce((np.array(log_weights) - nothing) / COARSENED)
-    return float((1.0 - PRIOR_UNKNOWN) * expit(odds))
+def weight_of(log_evidence: float, log_prior: float) -> float:
+    """Logarithm of the posterior weight of a refitted model."""
+    return log_evidence / COARSENED + log_prior
+
+
+def inclusion_of(log_weights: Sequence[float], others: Sequence[float]) -> float:
+    """Probability of any of some refitted models against others without what they have more."""
+    return float(expit(np.logaddexp.reduce(log_weights) - np.logaddexp.reduce(others)))

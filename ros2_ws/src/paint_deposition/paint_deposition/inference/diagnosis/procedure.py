@@ -75,11 +75,14 @@ def diagnose(
     search = Search(run)
     nothing = search.nothing.space
     run.left_over = nothing.figures
-    p_value = nothing.p_value(seed)
+    of_causes, of_size = nothing.p_value(seed), nothing.p_value_of_size(seed)
+    p_value = min(1.0, 2.0 * min(of_causes, of_size))
     if p_value >= ALPHA:
         return _nothing_missing(run, search.nothing, p_value)
     progress('refitting with what may be missing')
-    stages = search.stages()
+    stages, groups = [Stage(search.nothing, [])], {}
+    if 2.0 * of_causes < ALPHA:
+        stages = search.stages()
     best, groups = search.groups(stages[-1].here)
     run.fit = run.fitted_with([*best.effects.values()])
     run.left_over, run.remainder = best.space.figures, best.best.null.remainder

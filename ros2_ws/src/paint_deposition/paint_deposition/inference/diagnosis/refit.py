@@ -10,7 +10,6 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
-from paint_deposition.inference.diagnosis.evidence import left_out
 from paint_deposition.inference.diagnosis.explanations import (
     ADDITION_UM,
     FACTOR,
@@ -19,7 +18,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     of_random,
 )
 from paint_deposition.inference.diagnosis.learning import Nulls, by_size
-from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of
+from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of, weight_of
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
@@ -78,7 +77,7 @@ def refit(
         return _with_learned(run, law, nothing.nulls(run.fit), p_value)
     progress(f'fitting with {added.id}')
     before, with_it = run.history[-1], search.with_effect(nothing, added.id)
-    probability = inclusion_of([with_it.log_weight - with_it.log_prior], nothing.log_weight)
+    probability = inclusion_of([weight_of(with_it.log_evidence, 0.0)], [nothing.log_weight])
     run.left_over, run.remainder = with_it.space.figures, with_it.best.null.remainder
     run.record(added.id, run.fitted_with([*with_it.effects.values()]))
     run.accepted.append(run.described((added.id,), probability, before))
@@ -140,12 +139,13 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
 
 def _holdout_um(run: Run, nulls: Nulls, options: Sequence[Explanation]) -> float:
     """Error on points left out [um], the law's kind, length and size chosen without them."""
-    folds, plain = run.study.folds(), run.plain(run.fit)
-    deviation = np.empty(len(folds))
+    folds = run.study.folds()
+    predicted_um = np.empty(len(folds))
     for fold in np.unique(folds):
         out = folds == fold
         kept = [explanation.select(~out) for explanation in options]
         weights = _log_bayes_factors(run, nulls.select(~out), kept)
         explanation, size = _best(options, weights)
-        deviation[out] = left_out(plain, [size * explanation.columns], out)
-    return root_mean_square(deviation * run.study.sigma_um)
+        free = size * explanation.columns
+        predicted_um[out] = run.study.predicted_without_um(run.fit, out, free)[out]
+    return root_mean_square(run.study.measured_um - predicted_um)

@@ -40,6 +40,8 @@ FOOTPRINTS, SIDES = (0.02, 0.06, 0.2), 0.02
 # the film is a twentieth.
 SETTINGS, USUAL_SETTING = (0.006, 0.02, 0.06), (0.02, 2.0)
 PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
+# Most by which usual sprays differ.
+MOST_USUAL = 0.03
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
 BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
@@ -112,14 +114,17 @@ class Footprints:
             basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length * radii).at_knots
             for length in FOOTPRINT_LENGTHS
         ])  # fmt: skip
-        pattern = fit.jacobian[:, : len(fit.parameters.pattern)]
         of_film = basis.film_um / study.sigma_um[:, np.newaxis]
+        # Both are of the flux alone: effects would bend the one and not the other.
+        bare = fit.parameters.pattern.jacobian(fit.vector[: len(fit.parameters.pattern)])
+        terms = study.forward.terms(fit.model.model_copy(update={'effects': ()}))
+        pattern = terms.derivatives_um() @ bare / study.sigma_um[:, np.newaxis]
         columns, laws = [], []
         for size in FOOTPRINTS:
             of_wave = np.where(HARMONICS % 2, min(size, SIDES), size)
             off = np.tile(of_wave, radii)[:, np.newaxis]
             free = np.minimum(off / at_knots, MOST_OF_FLUX) * fields
-            beside, followed = beside_pattern(basis, free, study, fit)
+            beside, followed = beside_pattern(basis, free, pattern, study, fit)
             change = of_film @ free - pattern @ followed
             columns.append(np.hstack([of_film @ (TAILS * tails), change]))
             laws.append(RandomLaw(basis, np.hstack([TAILS * tails, beside])))
@@ -198,9 +203,10 @@ class Remainder:
         ]
 
     def usual(self, sizes: Sizes) -> Sizes:
-        """The same with settings and parts as sprays usually differ."""
-        part = USUAL_PART[0] if sizes.part else 0.0
-        return replace(sizes, setting=USUAL_SETTING[0], part=part)
+        """The same with settings and parts that differ no more than those of usual sprays."""
+        return replace(
+            sizes, setting=min(sizes.setting, MOST_USUAL), part=min(sizes.part, MOST_USUAL)
+        )
 
     def covariance(self, sizes: Sizes) -> np.ndarray:
         """(P, P) covariance of all that is left over."""

@@ -14,9 +14,7 @@ from scipy.special import softmax
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.model_space import (
-    COARSENED,
     CREDIBLE,
-    PRIOR_UNKNOWN,
     SURE,
     inclusion_of,
 )
@@ -49,10 +47,10 @@ class Stage:
         """The set that the readings, or some (P,), call for: one that was tried, or this."""
 
         def weight(trial: Trial) -> float:
-            return trial.log_weight_alone if rows is None else trial.log_weight_of(rows)
+            return trial.log_weight if rows is None else trial.log_weight_of(rows)
 
         weights = [weight(trial) for trial in self.tried]
-        if not weights or inclusion_of(weights, weight(self.here)) <= SURE:
+        if not weights or inclusion_of(weights, [weight(self.here)]) <= SURE:
             return self.here
         return self.tried[int(np.argmax(weights))]
 
@@ -96,7 +94,7 @@ class Search:
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
-        if known is None or trial.log_weight_alone > known.log_weight_alone + SAME:
+        if known is None or trial.log_evidence > known.log_evidence + SAME:
             self._trials[trial.names] = trial
         return self._trials[trial.names]
 
@@ -125,14 +123,14 @@ class Search:
         """
         nothing = self.nothing
         tried = [self.with_effect(nothing, name) for name in nothing.proposed]
-        best = max(tried, key=lambda one: one.log_weight_alone, default=nothing)
-        if best.log_evidence_alone <= nothing.log_evidence_alone + MISLEADS:
+        best = max(tried, key=lambda one: one.log_weight, default=nothing)
+        if best.log_evidence <= nothing.log_evidence + MISLEADS:
             return nothing
         others = self.run.fitted_with(
             [*best.effects.values()], model=self.run.start, starts=STARTS
         )
         anew = [Trial.around(self.run, best.names, fit) for fit in (best.fit, others)]
-        best = max(anew, key=lambda one: one.log_evidence_alone)
+        best = max(anew, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
         self._patterns = (nothing.fit.model,)
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
@@ -142,8 +140,8 @@ class Search:
     def _in_another_pattern(self, stage: Stage) -> Trial:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""
         here = stage.here
-        for trial in sorted(stage.tried, key=lambda one: -one.log_weight_alone):
-            gain = trial.log_evidence_alone - here.log_evidence_alone
+        for trial in sorted(stage.tried, key=lambda one: -one.log_weight):
+            gain = trial.log_evidence - here.log_evidence
             again = self.without(trial, *(trial.names - here.names)) if gain > SAME else here
             if again is not here:
                 self._tried = {names for names in self._tried if not names > here.names}
@@ -160,8 +158,9 @@ class Search:
             if names > trial.names and len(names) == len(trial.names) + 1
             for name in names - trial.names
         }
-        shares = softmax(np.array([trial.log_weight, *weights.values()]) / COARSENED)[1:]
-        found = dict(zip(weights, (1.0 - PRIOR_UNKNOWN) * shares, strict=True))
+        without = trial.log_weight, trial.log_weight_unknown
+        shares = softmax([*without, *weights.values()])[len(without) :]
+        found = dict(zip(weights, shares.tolist(), strict=True))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
@@ -190,6 +189,7 @@ class Search:
         weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
         found = sorted(weights, key=lambda cause: -weights[cause])
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
-        shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
+        shares = np.cumsum(softmax([weights[cause] for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
-        return tuple(members), inclusion_of([*weights.values()], others.log_weight)
+        without = others.log_weight, others.log_weight_unknown
+        return tuple(members), inclusion_of([*weights.values()], without)

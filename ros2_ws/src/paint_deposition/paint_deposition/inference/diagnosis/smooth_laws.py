@@ -247,7 +247,7 @@ def flux_around(pattern: PlanarPattern, reach_m: float, radii: int) -> np.ndarra
 
 
 def beside_pattern(
-    basis: Basis, at_knots: np.ndarray, study: Study, fit: Fit
+    basis: Basis, at_knots: np.ndarray, pattern: np.ndarray, study: Study, fit: Fit
 ) -> tuple[np.ndarray, np.ndarray]:
     """What is left of deviations of a footprint when the pattern has followed them.
 
@@ -255,7 +255,9 @@ def beside_pattern(
     and pattern are free to go far away together.
 
     Args:
-        basis: of footprints. at_knots: (K, n) deviations. fit: of the pattern.
+        basis: of footprints. at_knots: (K, n) deviations.
+        pattern: (P, k) change of the readings by the pattern's entries, over the noise.
+        fit: of the pattern.
 
     Returns:
         (K, n) the deviations, and (k, n) by how much the pattern's entries follow each.
@@ -277,7 +279,7 @@ def beside_pattern(
     change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
     # A pattern that hardly shows in the readings would go anywhere.
     scale = fit.parameters.prior.factor[:count, :count]
-    slopes = fit.jacobian[:, :count] @ scale
+    slopes = pattern @ scale
     followed = scale @ np.linalg.lstsq(slopes, change, rcond=HARDLY_SHOWS)[0]
     return at_knots - relative @ followed, followed
 

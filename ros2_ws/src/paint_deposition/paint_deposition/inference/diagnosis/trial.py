@@ -12,11 +12,13 @@ from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_error
 from paint_deposition.inference.diagnosis.learning import Nulls
 from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
     SIZES,
     ModelSpace,
     Weighed,
     log_odds,
     probable_sizes,
+    weight_of,
 )
 from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
 from paint_deposition.inference.diagnosis.run import Run
@@ -94,37 +96,47 @@ class Trial:
 
     @cached_property
     def log_weight(self) -> float:
-        """Logarithm of the posterior weight of this set, something unknown acting or not."""
+        """Logarithm of the posterior weight of this set, nothing unknown acting."""
+        return weight_of(self.log_evidence, self.log_prior)
+
+    @cached_property
+    def log_weight_unknown(self) -> float:
+        """The same if something unknown acts beside it."""
+        unknown = self.of_unknown.alone[UNKNOWN] - log_odds(PRIOR_UNKNOWN)
+        prior = self.log_prior + log_odds(PRIOR_UNKNOWN)
+        return weight_of(self.log_evidence + unknown, prior)
+
+    @cached_property
+    def of_unknown(self) -> ModelSpace:
+        """What is outside the library and may be missing beside it."""
         run = self.run
-        space = ModelSpace(self.weighed, run.any_form, self.remainder, run.freedom)
-        return space.log_evidence + self.log_prior
+        return ModelSpace(self.weighed, run.any_form, self.remainder, run.freedom)
 
     @cached_property
-    def log_weight_alone(self) -> float:
-        """The same weight if nothing unknown can act."""
-        return self.log_evidence_alone + self.log_prior
-
-    @cached_property
-    def log_evidence_alone(self) -> float:
-        """Its evidence then, whatever the prior of the set."""
-        nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature))
-
-    @property
-    def log_prior(self) -> float:
-        """Logarithm of the prior odds of this set, its amplitudes being of any of the sizes.
+    def log_evidence(self) -> float:
+        """Its evidence, nothing unknown acting, the amplitudes being of any of the sizes.
 
         The fit takes each as normal with its typical size as the standard deviation.
         """
-        entries = self.fit.parameters.of_effects
+        nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
+        return float(np.logaddexp.reduce(nature)) + self._of_sizes
+
+    @property
+    def _of_sizes(self) -> float:
+        """What the mixture of sizes changes of the log evidence."""
+        entries, found = self.fit.parameters.of_effects, 0.0
         amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
-        found = log_odds(PRIOR_EFFECT) * len(self.names)
         for name in self.names:
             own = [amount for amount, entry in zip(amounts, entries, strict=True)
                    if entry.effect == name and not entry.is_shape]  # fmt: skip
             by_size = 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
             found += float(np.logaddexp.reduce(by_size)) - np.log(len(SIZES))
         return found
+
+    @property
+    def log_prior(self) -> float:
+        """Logarithm of the prior odds of this set."""
+        return log_odds(PRIOR_EFFECT) * len(self.names)
 
     @cached_property
     def space(self) -> ModelSpace:
@@ -143,4 +155,4 @@ class Trial:
         """The same weight with some of the readings (P,), at the best size of the remainder."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.run.freedom)[0]
-        return float(evidence + self.best.sizes.log_prior + self.log_prior)
+        return weight_of(evidence + self.best.sizes.log_prior + self._of_sizes, self.log_prior)

@@ -7,13 +7,14 @@ from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import Any, Literal
 
+import numpy as np
+
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
-from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out
 from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -84,10 +85,13 @@ class Step:
     @staticmethod
     def of(study: Study, added: str, fit: Fit) -> Step:
         """Compute the errors of a fit, those on points left out too."""
-        null = NullModel.around(fit, study.nuisance)
-        left_out_um = hold_out(null, study.folds()) * study.sigma_um
+        predicted_um, folds = np.empty(len(study)), study.folds()
+        for fold in np.unique(folds):
+            out = folds == fold
+            predicted_um[out] = study.predicted_without_um(fit, out)[out]
         fitted = study.residuals(fit.predicted_um)
-        return Step(added, fit, fitted.rmse_um, root_mean_square(left_out_um))
+        left_out_um = root_mean_square(study.measured_um - predicted_um)
+        return Step(added, fit, fitted.rmse_um, left_out_um)
 
 
 @dataclass(frozen=True)

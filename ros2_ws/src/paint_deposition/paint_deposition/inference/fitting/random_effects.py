@@ -1,8 +1,10 @@
 """Random effects: differences between parts and gauge sessions that have no cause of interest.
 
 They are independent for every part and session. Only differences count: what all have in common
-is for K1 and the effects to explain. A part that was painted with something switched off has a
-level of its own, independent of the others.
+is for K1 and the effects to explain. Parts and sessions of which no reading is used have none: the
+model predicts them at the centre of their prior, as it predicts a part that is still unpainted. A
+part that was painted with something switched off has a level of its own, independent of the
+others.
 """
 
 from dataclasses import dataclass
@@ -57,7 +59,7 @@ class Amount:
 
 
 def random_effects(
-    campaign: Campaign, measured_um: np.ndarray, sigma_um: np.ndarray
+    campaign: Campaign, measured_um: np.ndarray, sigma_um: np.ndarray, used: np.ndarray
 ) -> tuple[RandomEffects, ...]:
     """A film level per part and a gauge zero per session, where there are several.
 
@@ -65,12 +67,13 @@ def random_effects(
         campaign: whose readings name their session; those of a part that do not are a session
             of their own.
         measured_um, sigma_um: (P,) the points and their standard deviations [um].
+        used: (P,) bool, the points that the model is fitted to.
     """
     names = tuple(experiment.name for experiment in campaign.experiments)
     part_of = campaign.experiment_of[:, np.newaxis] == np.arange(len(names))
     off = np.array([bool(experiment.switched_off) for experiment in campaign.experiments])
-    mixing = np.diag(OTHER_LEVEL_SHARE * off)
-    mixing[np.ix_(~off, ~off)] = LEVEL_SHARE * _contrasts(np.count_nonzero(~off))
+    known = part_of[used].any(axis=0)
+    mixing = np.diag(OTHER_LEVEL_SHARE * (off & known)) + LEVEL_SHARE * _contrasts(known & ~off)
     level = RandomEffects(
         'part level', '%', names, 100.0 * mixing,
         part_of @ mixing * (measured_um / sigma_um)[:, np.newaxis],
@@ -81,10 +84,10 @@ def random_effects(
     shares = np.column_stack(
         [np.bincount(means.owner, labels == session) / means.repeats for session in sessions]
     )
+    zeros = SESSION_UM * _contrasts(shares[used].any(axis=0))
     zero = RandomEffects(
-        'gauge zero', 'µm', sessions, SESSION_UM * _contrasts(len(sessions)),
-        SESSION_UM * shares @ _contrasts(len(sessions)) / sigma_um[:, np.newaxis],
-    )  # fmt: skip
+        'gauge zero', 'µm', sessions, zeros, shares @ zeros / sigma_um[:, np.newaxis]
+    )
     return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
@@ -107,6 +110,6 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
     return tuple(found)
 
 
-def _contrasts(count: int) -> np.ndarray:
-    """(n, n) amounts without what all n have in common."""
-    return np.eye(count) - 1.0 / count
+def _contrasts(known: np.ndarray) -> np.ndarray:
+    """(n, n) amounts without what all those of n that are known (n,) have in common."""
+    return np.diag(1.0 * known) - np.outer(known, known) / max(np.count_nonzero(known), 1)

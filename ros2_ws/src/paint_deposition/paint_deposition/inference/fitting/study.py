@@ -26,9 +26,11 @@ from paint_deposition.inference.readings.residuals import Residuals, root_mean_s
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-# What facets cost the film is left out below this share of the noise, and reported from this. The
-# estimate is off by this share of itself, see ``film.facet_error``.
-LEAST_FACETS, WORTH_REPORTING, FACETS_OFF = 0.1, 1.0, 0.5
+# What facets cost the film is left out below this share of the noise, and reported from this.
+LEAST_FACETS, WORTH_REPORTING = 0.1, 1.0
+# Starts of a fit to some of the readings, and the standard deviation of one that is not used [um].
+STARTS_WITHOUT = 4
+NOT_USED_UM = 1e9
 
 
 @dataclass(frozen=True)
@@ -84,16 +86,12 @@ class Study:
 
     @cached_property
     def sigma_um(self) -> np.ndarray:
-        """(P,) standard deviation of the points: gauge, texture, what is not known of facets."""
-        facets_um = 0.0 if self.facet_um is None else FACETS_OFF * self.facet_um
+        """(P,) standard deviation of the points: gauge, texture, and what facets cost."""
+        facets_um = 0.0 if self.facet_um is None else self.facet_um
         return np.hypot(np.hypot(self.gauge_um, self.texture.share * self.measured_um), facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
-        """The same with what facets cost under a model, if it shows beside the noise.
-
-        How much of it is true is fitted for each part: it is one of the nuisance directions. What
-        it does not follow is noise of its own.
-        """
+        """The same with what facets cost under a model, if it shows beside the noise."""
         parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
         facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
         if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
@@ -192,39 +190,52 @@ class Study:
     @cached_property
     def random_effects(self) -> tuple[RandomEffects, ...]:
         """By how much parts and gauge sessions differ; none with one part and one session."""
-        return random_effects(self.campaign, self.measured_um, self.sigma_um)
+        every = np.ones(len(self), dtype=bool)
+        return random_effects(self.campaign, self.measured_um, self.sigma_um, every)
 
     @cached_property
     def nuisance(self) -> np.ndarray:
-        """(P, n) nuisance directions over the noise: random effects, and facets of each part."""
-        facets = [direction[:, np.newaxis] for direction in self._facets.values()]
-        none = np.empty((len(self), 0))
-        return np.hstack([none, *facets, *(effects.columns for effects in self.random_effects)])
+        """(P, n) nuisance directions over the noise: those of the random effects."""
+        return _columns(self.random_effects, len(self))
 
-    @property
-    def _facets(self) -> dict[str, np.ndarray]:
-        """By experiment, (P,) what its facets cost the film, over the noise."""
-        if self.facet_um is None:
-            return {}
-        owner, over_noise = self.campaign.experiment_of, self.facet_um / self.sigma_um
-        return {
-            experiment.name: direction
-            for number, experiment in enumerate(self.campaign.experiments)
-            if (direction := np.where(owner == number, over_noise, 0.0)).any()
-        }
+    def predicted_without_um(
+        self, fit: Fit, out: np.ndarray, free: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(P,) film by the model of a fit, refitted without some readings [um].
+
+        Args:
+            fit: whose parameters are fitted anew, from where they are.
+            out: (P,) bool, the readings left out.
+            free: (P, n) directions over the noise, of unit variance, that are fitted, too, and
+                count as predicted; default: none.
+        """
+        effects = random_effects(self.campaign, self.measured_um, self.sigma_um, ~out)
+        nuisance, own = _columns(effects, len(self)), np.empty((len(self), 0))
+        own = own if free is None else free
+        count, kept = own.shape[1], (~out)[:, np.newaxis]
+        found = fit_readings(
+            self.forward, self.measured_um, np.where(out, NOT_USED_UM, self.sigma_um),
+            replace(fit.parameters, start=fit.model), STARTS_WITHOUT,
+            nuisance=kept * np.hstack([own, nuisance]),
+        )  # fmt: skip
+        amounts = found.amplitudes[0][:count]
+        return found.predicted_um + self.sigma_um * (own @ amounts)
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
+        if self.facet_um is None:
+            return ()
         found = []
-        for name, direction in self._facets.items():
-            off_um = np.abs(direction * self.sigma_um)
+        owner = self.campaign.experiment_of
+        for number, name in enumerate(e.name for e in self.campaign.experiments):
+            off_um = np.where(owner == number, np.abs(self.facet_um), 0.0)
             worst = int(off_um.argmax())
             if off_um[worst] > WORTH_REPORTING * self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
                     f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '
-                    f'has a noise of {self.gauge_um[worst]:.1f} µm. That was allowed for as far '
-                    'as it can be estimated; export the mesh finer.'
+                    f'has a noise of {self.gauge_um[worst]:.1f} µm. That counts as noise; export '
+                    'the mesh finer.'
                 )
         return tuple(found)
 
@@ -275,3 +286,8 @@ class Study:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""
         means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
         return np.round(means).astype(int)
+
+
+def _columns(effects: Sequence[RandomEffects], count: int) -> np.ndarray:
+    """(P, n) directions of random effects at so many points."""
+    return np.hstack([np.empty((count, 0)), *(each.columns for each in effects)])
