@@ -22,6 +22,8 @@ RADII_M = (0.08, 0.12, 0.18, 0.26, 0.36)
 BANDS = 6
 FEWEST = 2
 MOST_REGIONS = 6
+# A region that is wider than this share of its part has no place across it [%].
+MOST_OF_WIDTH = 60.0
 # Significance level: the probability that noise alone gives a part any region.
 SIGNIFICANCE = 0.02
 DRAWS = 1000
@@ -108,16 +110,17 @@ def _described(
 
 
 def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
-    """The thirds of the part's height, and the half as seen by the gun if it lies in one only."""
+    """The thirds of the part's height, and the share of its width from the left, if not all."""
     low, high = np.quantile(values['height_fraction'][region], [0.1, 0.9])
     first, last = (int(min(2, max(0, 3 * value))) for value in (low, high))
     thirds = ['lower third', 'middle third', 'upper third'][first : last + 1]
     vertical = 'full height' if len(thirds) == 3 else ' and '.join(thirds)
     across = values['across_m']
     share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
-    if share.min() > 0.5:
-        return f'{vertical}, right half'
-    return f'{vertical}, left half' if share.max() < 0.5 else vertical
+    left, right = 100.0 * np.quantile(share, [0.1, 0.9])
+    if right - left > MOST_OF_WIDTH:
+        return vertical
+    return f'{vertical} at {left:.0f} to {right:.0f} % of the width from the left'
 
 
 @dataclass(frozen=True)

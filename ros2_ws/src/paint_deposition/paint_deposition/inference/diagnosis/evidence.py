@@ -6,7 +6,6 @@ with a known covariance. Whitening them by the covariance under the null hypothe
 pattern's parameters; every explanation then adds a low-rank term to the identity.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 

@@ -28,7 +28,7 @@ from paint_deposition.inference.left_over import FootprintProfile, RemainderFigu
 # beyond nature.
 PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
-SIZES = np.array([0.5, 1.0, 2.0])
+SIZES = np.array([0.5, 1.0, 2.0, 4.0])
 # An effect acts for certain from this posterior probability of its group on.
 SURE = 0.7
 # Differences of log weight between refitted models count as so many times smaller (a coarsened

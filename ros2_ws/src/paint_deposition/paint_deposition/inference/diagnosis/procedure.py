@@ -29,6 +29,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     of_places,
 )
 from paint_deposition.inference.diagnosis.learning import choose_laws
+from paint_deposition.inference.diagnosis.remainder import MOST_USUAL
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Group, Search, Stage
 from paint_deposition.inference.diagnosis.trial import Trial
@@ -75,13 +76,12 @@ def diagnose(
     search = Search(run)
     nothing = search.nothing.space
     run.left_over = nothing.figures
-    of_causes, of_size = nothing.p_value(seed), nothing.p_value_of_size(seed)
-    p_value = min(1.0, 2.0 * min(of_causes, of_size))
+    p_value = search.nothing.p_value
     if p_value >= ALPHA:
         return _nothing_missing(run, search.nothing, p_value)
     progress('refitting with what may be missing')
     stages, groups = [Stage(search.nothing, [])], {}
-    if 2.0 * of_causes < ALPHA:
+    if search.nothing.p_value_of_causes < ALPHA:
         stages = search.stages()
     best, groups = search.groups(stages[-1].here)
     run.fit = run.fitted_with([*best.effects.values()])
@@ -105,18 +105,24 @@ def _nothing_missing(run: Run, nothing: Trial, p_value: float) -> Diagnosis:
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
     rmse_um, noise_um = run.history[0].rmse_um, run.study.noise_floor_um
     _learn(run, nothing, LeftOut([Stage(nothing, [])], of_footprint(run.study, run.fit)))
+    beyond_um = float(np.sqrt(max(run.history[-1].rmse_um ** 2 - noise_um**2, 0.0)))
+    share = beyond_um / float(np.max(run.fit.predicted_um))
+    beyond = (
+        f'The model misses the readings by {beyond_um:.2f} µm beyond gauge and texture '
+        f'({noise_um:.2f} µm), {100.0 * share:.1f} % of the thickest film'
+    )
+    if share > MOST_USUAL:
+        unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
+        reason = f'{beyond}: sprays of one setting differ by {100.0 * MOST_USUAL:.0f} % at most.'
+        return run.diagnosis(p_value, 'unknown_effect', f'{reason} {unknown}', (), unknown)
     if run.accepted:
-        unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)
+        unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
         reason = 'The footprint differs from the two Gaussians of eq. (1); it was learned.'
         return run.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
     if rmse_um < BEYOND_NOISE * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
         return run.diagnosis(p_value, 'none_missing', reason)
-    reason = (
-        f'The model misses the readings by {rmse_um:.2f} µm, where gauge and texture scatter by '
-        f'{noise_um:.2f}: no more than the usual variation between sprays, or a footprint that '
-        'differs from eq. (1), would. A part sprayed otherwise would show more.'
-    )
+    reason = f'{beyond}: sprays of one setting usually differ by as much.'
     return run.diagnosis(p_value, 'none_missing', reason)
 
 
@@ -194,8 +200,13 @@ def _conclude(run: Run, best: Trial, others: tuple[EffectClass, ...], p_value: f
         names = ', and '.join(_in_words(c) for c in named)
         return run.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
     if best.space.inclusion(UNKNOWN) > 0.5 or not others:
-        unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)
-        reason = f'Something outside the library shows against {unknown.covariate}.'
+        unknown = locate_unexplained(run.study, run.history[0].fit, best, run.seed)
+        reason = f'Something outside the library acts. {unknown}'
+        if len(set(best.usual.setting_of)) == 1:
+            reason += (
+                ' All parts were painted alike: it may belong to the part or to the spray. Spray '
+                'the same part another way.'
+            )
         return run.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
         f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
@@ -206,8 +217,6 @@ def _conclude(run: Run, best: Trial, others: tuple[EffectClass, ...], p_value: f
 def _others(run: Run, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:
     """Effects that may act beside those that were accepted, as probable as this."""
     known = {member for found in run.accepted for member in found.members}
-    if run.testable:
-        known |= set(run.testable[0])
     found = []
     for cause, probability in probabilities.items():
         if cause in known or probability < WORTH_LISTING:

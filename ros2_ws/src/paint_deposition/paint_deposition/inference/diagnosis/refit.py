@@ -23,6 +23,7 @@ from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
@@ -63,18 +64,18 @@ def refit(
     search = Search(run)
     nothing = search.nothing
     run.left_over, run.remainder = nothing.space.figures, nothing.best.null.remainder
-    p_value = nothing.space.p_value(seed)
+    p_value = nothing.p_value
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'
         if not missing:
             return run.diagnosis(p_value, 'none_missing', f'{reason}.')
-        unknown = locate_unexplained(run.study, run.fit, seed)
+        unknown = locate_unexplained(run.study, run.fit, nothing, seed)
         reason += '; something is missing, which diagnose can tell.'
         return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
     if law is not None:
         progress(f'learning {law.id}')
-        return _with_learned(run, law, nothing.nulls(run.fit), p_value)
+        return _with_learned(run, law, nothing, p_value)
     progress(f'fitting with {added.id}')
     before, with_it = run.history[-1], search.with_effect(nothing, added.id)
     probability = inclusion_of([weight_of(with_it.log_evidence, 0.0)], [nothing.log_weight])
@@ -90,9 +91,9 @@ def refit(
     return run.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
 
 
-def _with_learned(run: Run, law: type[LearnedLaw], nulls: Nulls, p_value: float) -> Diagnosis:
+def _with_learned(run: Run, law: type[LearnedLaw], nothing: Trial, p_value: float) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence beside what may vary."""
-    options = _options(run, law)
+    options, nulls = _options(run, law), nothing.nulls(run.fit)
     weights = _log_bayes_factors(run, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before = run.history[-1]
@@ -105,7 +106,7 @@ def _with_learned(run: Run, law: type[LearnedLaw], nulls: Nulls, p_value: float)
     )
     if p_value >= ALPHA:
         return run.diagnosis(p_value, 'none_missing', reason)
-    unknown = locate_unexplained(run.study, run.history[0].fit, run.seed)
+    unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
     return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
 
 

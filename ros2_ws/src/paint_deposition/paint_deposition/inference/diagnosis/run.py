@@ -235,6 +235,7 @@ class Run:
     ) -> Diagnosis:
         """Put the results together."""
         not_testable, detectable = self.testable or ((), {})
+        listed = {member for c in (*self.accepted, *others) for member in c.members}
         return Diagnosis(
             self.study,
             verdict,
@@ -244,7 +245,7 @@ class Run:
             (*self.accepted, *others),
             tuple(self.history),
             unknown,
-            not_testable,
+            tuple(name for name in not_testable if name not in listed),
             detectable,
             remarks=self.remarks,
             remainder=self.left_over,

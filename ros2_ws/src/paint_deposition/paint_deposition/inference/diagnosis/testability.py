@@ -7,8 +7,8 @@ import numpy as np
 from paint_deposition.inference.diagnosis.model_space import CauseEvidence
 from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 
-# Smallest signal-to-noise ratio, at typical amplitude and with the pattern refitted, at which an
-# effect counts as testable.
+# Smallest signal-to-noise ratio, at the largest amplitude that is physical and with the pattern
+# refitted, at which an effect counts as testable.
 TESTABLE = 2.0
 # An amplitude is detectable if the test that something is missing, at this level, finds it with
 # this power.
@@ -33,8 +33,10 @@ def testability(space: CauseEvidence, seed: int) -> Testability:
     null, draws = space.evidence(draws), draws[:, :DRAWS]
     not_testable, detectable = [], {}
     for effect_id, found in shapes.items():
+        most = [np.maximum(np.abs(s.low), np.abs(s.high)) for s in found]
         # Along the combination of amplitudes that shows most.
-        if max(np.linalg.norm(space.null.whiten(s.columns), 2) for s in found) >= TESTABLE:
+        seen = (space.null.whiten(s.columns * m) for s, m in zip(found, most, strict=True))
+        if max(np.linalg.norm(columns, 2) for columns in seen) >= TESTABLE:
             detectable[effect_id] = _detectable(space, found, null, draws)
         else:
             not_testable.append(effect_id)

@@ -95,6 +95,20 @@ class Trial:
         )
 
     @cached_property
+    def p_value_of_causes(self) -> float:
+        """Probability of at least this much evidence for any cause if none acted beside it."""
+        return min(1.0, 2.0 * self.space.p_value(self.run.seed))
+
+    @property
+    def p_value(self) -> float:
+        """The same, or of fields over the parts larger than those of usual sprays.
+
+        Two tests were made, so that each counts twice (Bonferroni).
+        """
+        of_size = min(1.0, 2.0 * self.space.p_value_of_size(self.run.seed))
+        return min(self.p_value_of_causes, of_size)
+
+    @cached_property
     def log_weight(self) -> float:
         """Logarithm of the posterior weight of this set, nothing unknown acting."""
         return weight_of(self.log_evidence, self.log_prior)

@@ -4,6 +4,7 @@ import numpy as np
 
 from paint_deposition.inference.comparison.comparison import misfit_regions
 from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
+from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
@@ -14,17 +15,19 @@ DRAWS = 1000
 CURVE_POINTS = 15
 
 
-def locate_unexplained(study: Study, fit: Fit, seed: int) -> Unknown:
+def locate_unexplained(study: Study, fit: Fit, nothing: Trial, seed: int) -> Unknown:
     """Regress the deviations on each covariate, smoothly, and take the one that explains most.
 
-    The p-value is that of the maximum over all covariates under the null hypothesis.
+    The p-value is that of the maximum over all covariates if sprays differed as usual ones do.
 
     Args:
         study: the readings.
         fit: the model so far.
+        nothing: whose discrepancy is that of the sprays.
         seed: of the simulated deviations.
     """
-    null = NullModel.around(fit, study.nuisance)
+    usual = nothing.remainder.covariance(nothing.remainder.usual(nothing.best.sizes))
+    null = NullModel.around(fit, study.nuisance, remainder=usual)
     draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
     found, by_chance = [], np.zeros(DRAWS)
     for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
@@ -37,16 +40,24 @@ def locate_unexplained(study: Study, fit: Fit, seed: int) -> Unknown:
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
     order = np.argsort(covariate.values)
-    shown = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
+    points = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
     regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
+    names = [experiment.name for experiment in study.campaign.experiments]
+    shown = [name for name in names if name in {region.experiment for region in regions}]
+    first = regions[0] if regions else None
+    mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
     return Unknown(
         covariate.name,
         float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
         {
-            covariate.name: covariate.values[shown].tolist(),
-            'residual_um': (smooth[shown] @ coefficients).tolist(),
+            covariate.name: covariate.values[points].tolist(),
+            'residual_um': (smooth[points] @ coefficients).tolist(),
         },
-        regions[0].description if regions else 'no single place stands out',
+        first.description if first else 'no single place stands out',
+        tuple(shown),
+        shown[0] if shown and shown == names[-len(shown) :] != names else '',
+        first.mean_residual_um if first else 0.0,
+        first.mean_residual_um / (mean_um - first.mean_residual_um) if first else 0.0,
     )
 
 

@@ -63,7 +63,26 @@ class Unknown:
     covariate: str  # the one that the residual depends on most
     p_value: float  # of that dependence
     curve: dict[str, list[float]]  # values of the covariate and mean residual there [um]
-    where: str  # in words
+    where: str  # the place where it is strongest, in words
+    parts: tuple[str, ...]  # names of those on which it shows
+    since: str  # name of the first of them, if it shows on all that follow and on none before
+    # Mean residual at that place [um], and over the film that the model has there.
+    mean_residual_um: float
+    share: float
+
+    def __str__(self) -> str:
+        more, since = 'more' if self.mean_residual_um > 0.0 else 'less', ''
+        if self.since:
+            since = f', since {self.since}'
+        elif len(self.parts) > 1:
+            since = f', on {", ".join(self.parts)}'
+        if not self.parts:
+            return f'It shows most against {self.covariate}; {self.where}.'
+        return (
+            f'At the {self.where.partition(", ")[0]} of {self.parts[0]} there is '
+            f'{abs(self.mean_residual_um):.1f} µm ({100.0 * abs(self.share):.0f} %) {more} than '
+            f'the model says{since}; it shows most against {self.covariate}.'
+        )
 
 
 @dataclass(frozen=True)
