@@ -26,8 +26,8 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.inference.diagnosis.procedure import diagnose
-from paint_deposition.inference.diagnosis.run import Run
 from paint_deposition.inference.diagnosis.search import Search
+from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.kernel.threads import THREADS
@@ -37,7 +37,7 @@ MODEL = DepositionModel()
 
 
 @dataclass
-class Stage:
+class SearchStage:
     """The best times of a piece of work."""
 
     wall_s: float = math.inf
@@ -78,7 +78,7 @@ def films(campaign: Campaign, rounds: int) -> None:
     head = f'{pairs} pairs of point and sub-step'
     print(f'\n{head:53}{"wall":>9}{"processor":>11}{"ns/pair":>9}')
     for name, model in (('', MODEL), (', all laws of the kernel', law)):
-        film, terms = Stage(), Stage()
+        film, terms = SearchStage(), SearchStage()
         for k in range(10 * rounds):
             gain = model.planar.K1_cm3_per_s * (1.0 + 1e-6 * k)  # else it is still there
             other = model.planar.model_copy(update={'K1_cm3_per_s': gain})
@@ -94,13 +94,15 @@ def films(campaign: Campaign, rounds: int) -> None:
 
 def stages(campaign: Campaign, rounds: int) -> dict[str, Any]:
     """Print the stages of a diagnosis, and return them."""
-    table: dict[str, Stage] = {}
+    table: dict[str, SearchStage] = {}
 
     def timed(name: str, work: Callable[[], Any]) -> Any:
-        return table.setdefault(name, Stage()).of(work)
+        return table.setdefault(name, SearchStage()).of(work)
 
     for _ in range(rounds):
-        run = timed('first fit', lambda: Run(campaign, MODEL, EFFECTS, 0, lambda line: None))
+        run = timed(
+            'first fit', lambda: DiagnosisState(campaign, MODEL, EFFECTS, 0, lambda line: None)
+        )
         search = timed('evidence of what may be missing', lambda run=run: Search(run))
         timed('p-value', lambda search=search: search.nothing.space.p_value(0))
         timed('search of the missing effects', lambda search=search: search.stages())

@@ -11,8 +11,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.left_over import FootprintProfile, RemainderFigures
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import (
     footprint_figure,
@@ -108,9 +108,9 @@ def test_a_footprint_is_the_pattern_times_its_factor(study):
 def test_the_footprint_is_shown_with_its_band(study):
     radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
-    left_over = RemainderFigures(0.02, 0.0, 0.03, 0.1, profile)
+    left_over = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, profile)
     assert profile_figure(shown(study)) is None
-    diagnosed = replace(shown(study), diagnosis=SimpleNamespace(remainder=left_over))
+    diagnosed = replace(shown(study), diagnosis=SimpleNamespace(discrepancy=left_over))
     band, plain, found = profile_figure(diagnosed)['charts'][0]['data']
     assert (plain['y'] == eq1).all()
     assert (found['y'] == eq1 + 0.1).all()

@@ -8,8 +8,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import hat_weights
-from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.remainder import Footprints, Remainder
+from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
+from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -92,14 +92,14 @@ def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
     return basis.random(1.0, length)
 
 
-def no_remainder(count: int) -> Remainder:
+def no_discrepancy(count: int) -> ModelDiscrepancy:
     """Nothing that nature leaves over at so many readings."""
     none = np.zeros((count, count))
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
     laws = 3 * (footprint_law(none[:1, :1]),)
     footprint = Footprints(3 * (none[:, :1],), laws, none[0, :1], none[0, :1])
-    return Remainder(MODEL, footprint, none, fields, fields, False, lengths_m, one_setting)
+    return ModelDiscrepancy(MODEL, footprint, none, fields, fields, False, lengths_m, one_setting)
 
 
 def footprint_law(at_knots: np.ndarray) -> RandomLaw:

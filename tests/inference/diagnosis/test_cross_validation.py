@@ -10,19 +10,17 @@ from inference.diagnosis.linear import (
     PARAMETERS,
     fit_linear,
     linear_fit,
-    no_remainder,
+    no_discrepancy,
     null_of,
     smooth_curves,
 )
-from paint_deposition.inference.diagnosis.cross_validation import LeftOut
-from paint_deposition.inference.diagnosis.evidence import NullModel, hold_out, left_out
+from paint_deposition.inference.diagnosis.discrepancy import DiscrepancyHyperparameters
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.learning import MOST_LAWS, Nulls
-from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, Weighed, log_odds
-from paint_deposition.inference.diagnosis.remainder import Sizes
-from paint_deposition.inference.diagnosis.search import Stage
+from paint_deposition.inference.diagnosis.gaussian import NullModel, hold_out, left_out
+from paint_deposition.inference.diagnosis.learning import MOST_LAWS, LeftOut, NullModels
+from paint_deposition.inference.diagnosis.model_space import PRIOR_EFFECT, WeightedNull, log_odds
+from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.smooth_laws import RandomLaw
-from paint_deposition.inference.diagnosis.trial import Trial
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 READINGS = 24
@@ -52,7 +50,7 @@ PLACE = np.linspace(0.0, KNOTS - 1.0, POINTS)
 FORM = np.where(np.arange(POINTS) % 4 == 0, 2.0, 0.2)
 OTHER = np.where(np.arange(POINTS) % 5 == 0, 2.0, -0.3)
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
-NOTHING_LEFT = no_remainder(POINTS)
+NOTHING_LEFT = no_discrepancy(POINTS)
 
 
 @dataclass(frozen=True)
@@ -71,17 +69,17 @@ class LinearRun:
 
     study: Points
     freedom: float = np.inf
-    any_form: tuple[Explanation, ...] = ()
+    nonparametric_laws: tuple[Explanation, ...] = ()
 
     def plain(self, fit: NullModel) -> NullModel:
         return fit
 
 
-class LinearTrial(Trial):
-    """A set of effects on such a run, beside which nature leaves nothing over."""
+class LinearTrial(EffectSet):
+    """A set of effects on such a state, beside which nature leaves nothing over."""
 
     @property
-    def remainder(self):
+    def discrepancy(self):
         return self.usual
 
     @property
@@ -90,12 +88,12 @@ class LinearTrial(Trial):
 
     @property
     def weighed(self):
-        return [Weighed.of(self.fit, self.usual, size, np.inf) for size in self.sizes]
+        return [WeightedNull.of(self.fit, self.usual, size, np.inf) for size in self.sizes]
 
     def nulls(self, fit):
         sizes = self.best.sizes
-        beside = fit.with_remainder(self.usual.covariance(sizes))
-        return Nulls(fit.with_remainder(self.usual.of_parts(sizes)), beside, beside, beside)
+        beside = fit.with_discrepancy(self.usual.covariance(sizes))
+        return NullModels(fit.with_discrepancy(self.usual.of_parts(sizes)), beside, beside, beside)
 
 
 def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> LinearTrial:
@@ -105,14 +103,20 @@ def trial(change: np.ndarray, *forms: np.ndarray, seed=0, sigma_um=None) -> Line
     null = NullModel.of(np.hstack([base.columns, *effects]), base.raw + change)
     study = Points(np.full(POINTS, SIGMA_UM) if sigma_um is None else sigma_um)
     names = frozenset(f'effect {k}' for k in range(len(forms)))
-    return LinearTrial(LinearRun(study), names, null, NOTHING_LEFT, [Sizes(0.0, 0.0, 0, 0, 0.0)])
+    return LinearTrial(
+        LinearRun(study),
+        names,
+        null,
+        NOTHING_LEFT,
+        [DiscrepancyHyperparameters(0.0, 0.0, 0, 0, 0.0)],
+    )
 
 
-def stages_of(change: np.ndarray, **options) -> list[Stage]:
+def stages_of(change: np.ndarray, **options) -> list[SearchStage]:
     """The search from nothing on to the effect and to another one beside it."""
     nothing, edge, both = (trial(change, *forms, **options)
                            for forms in ((), (FORM,), (FORM, OTHER)))  # fmt: skip
-    found = [Stage(nothing, [edge]), Stage(edge, [both]), Stage(both, [])]
+    found = [SearchStage(nothing, [edge]), SearchStage(edge, [both]), SearchStage(both, [])]
     last = next(k for k, stage in enumerate(found) if stage.chosen() is stage.here)
     return found[: last + 1]
 
@@ -183,7 +187,11 @@ def test_a_point_left_out_has_no_part_in_its_own_prediction():
             trial(WAVE + 2.0 * FORM + added * out, *forms, sigma_um=out.astype(float))
             for forms in (nothing, edge)
         )
-        return POINTS * LeftOut([Stage(here, [tried]), Stage(tried, [])], CURVES).errors_um() ** 2
+        return (
+            POINTS
+            * LeftOut([SearchStage(here, [tried]), SearchStage(tried, [])], CURVES).errors_um()
+            ** 2
+        )
 
     curvature = square(100.0) + square(-100.0) - 2.0 * square(0.0)
     assert curvature == pytest.approx(2.0 * out.sum() * 100.0**2, rel=1e-9)

@@ -18,7 +18,11 @@ from inference.diagnosis.linear import (
 from inference.diagnosis.linear import prior_covariance as covariance_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
-from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, simulated
+from paint_deposition.inference.diagnosis.gaussian import (
+    NullModel,
+    OrthogonalDirections,
+    simulated,
+)
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.model.coordinates import PATTERN
@@ -37,8 +41,8 @@ def columns():
 
 
 @pytest.fixture
-def remainder(columns):
-    """A covariance of what nature leaves over."""
+def discrepancy(columns):
+    """A covariance of the discrepancy."""
     return 2.0 * columns @ columns.T
 
 
@@ -53,7 +57,7 @@ def log_factor(columns, deviations, sides=None, sizes=None, freedom=np.inf) -> f
     """The log Bayes factor of whitened directions (P, n) for whitened deviations (P,)."""
     known = np.zeros(columns.shape[1]) if sides is None else np.array(sides, dtype=float)
     scaled = columns if sizes is None else columns * sizes
-    principal = Principal.of(scaled, known)
+    principal = OrthogonalDirections.of(scaled, known)
     return principal.log_bayes_factors(deviations[:, np.newaxis], np.ones(1), freedom)[0, 0]
 
 
@@ -64,22 +68,24 @@ def test_whitening_makes_the_null_model_standard_normal(fit, columns):
     assert null.lower @ null.deviation == pytest.approx(deviation(fit))
 
 
-def test_what_nature_leaves_over_is_the_same_as_covariance_and_as_columns(fit, columns, remainder):
-    there = NullModel.around(fit, columns, remainder=remainder)
+def test_what_nature_leaves_over_is_the_same_as_covariance_and_as_columns(
+    fit, columns, discrepancy
+):
+    there = NullModel.around(fit, columns, discrepancy=discrepancy)
     beside = null_of(fit, columns).beside(np.sqrt(2.0) * columns)
-    for other in (beside, null_of(fit, columns).with_remainder(remainder)):
+    for other in (beside, null_of(fit, columns).with_discrepancy(discrepancy)):
         assert other.lower @ other.lower.T == pytest.approx(there.lower @ there.lower.T)
         assert other.deviation == pytest.approx(there.deviation)
-    assert there.with_remainder(0.0 * remainder).deviation == pytest.approx(
+    assert there.with_discrepancy(0.0 * discrepancy).deviation == pytest.approx(
         null_of(fit, columns).deviation
     )
 
 
-@pytest.mark.parametrize('with_remainder', [False, True])
+@pytest.mark.parametrize('with_discrepancy', [False, True])
 def test_some_of_the_readings_have_the_covariance_among_them(
-    fit, columns, remainder, with_remainder
+    fit, columns, discrepancy, with_discrepancy
 ):
-    null = NullModel.around(fit, columns, remainder=remainder if with_remainder else None)
+    null = NullModel.around(fit, columns, discrepancy=discrepancy if with_discrepancy else None)
     rows = np.arange(READINGS) % 3 > 0
     part = null.select(rows)
     covariance = null.lower @ null.lower.T
@@ -88,9 +94,9 @@ def test_some_of_the_readings_have_the_covariance_among_them(
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 9.0])
-def test_log_evidence_is_the_log_density_up_to_a_constant(fit, columns, remainder, freedom):
+def test_log_evidence_is_the_log_density_up_to_a_constant(fit, columns, discrepancy, freedom):
     """So that null models of the same readings can be compared."""
-    nulls = [NullModel.around(fit, columns, remainder=size * remainder) for size in (0.1, 1.0)]
+    nulls = [NullModel.around(fit, columns, discrepancy=size * discrepancy) for size in (0.1, 1.0)]
     data = np.random.default_rng(5).normal(size=(READINGS, 4))
     differences = []
     for null in nulls:
@@ -191,7 +197,7 @@ def test_directions_that_nothing_shows_do_not_count(count: int) -> None:
     seen = random.normal(size=(12, count))
     columns = np.hstack([seen, seen @ random.normal(size=(count, 30))])
     data = random.normal(size=(12, 5))
-    found = Principal.of(columns, np.zeros(columns.shape[1]))
+    found = OrthogonalDirections.of(columns, np.zeros(columns.shape[1]))
     assert found.columns.shape[1] == min(count, 12)
     factor = found.log_bayes_factors(data, np.array([0.7]), np.inf)[0]
     covariance = np.eye(12) + 0.49 * columns @ columns.T
@@ -212,6 +218,6 @@ def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
     draws = simulated(READINGS, 8.0, 4, seed=6)
     shifts = np.random.default_rng(8).normal(size=(READINGS, 3))
     moved = (draws[:, np.newaxis] + shifts[:, :, np.newaxis]).reshape(READINGS, -1)
-    principal = Principal.of(columns, np.array([side, 0.0, 0.0]))
+    principal = OrthogonalDirections.of(columns, np.array([side, 0.0, 0.0]))
     expected = principal.log_bayes_factors(moved, SIZES, 8.0)
     np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)

@@ -18,11 +18,11 @@ from paint_deposition.inference.diagnosis.explanations import (
     LAW_ERROR,
     UNKNOWN,
     law_errors,
-    of_any_form,
+    neutral_shapes,
+    nonparametric_laws_of,
     of_effects,
     of_footprint,
 )
-from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
@@ -113,7 +113,7 @@ def test_a_reading_where_no_paint_lands_has_no_error_of_a_free_law():
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
     fit = study.fit(FreeParameters.of(MODEL))
-    for found in (of_any_form(study, MODEL), of_footprint(study, fit)):
+    for found in (nonparametric_laws_of(study, MODEL), of_footprint(study, fit)):
         assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
         for explanation in found:
             assert explanation.cause == UNKNOWN

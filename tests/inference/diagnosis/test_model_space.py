@@ -7,15 +7,21 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
-from inference.diagnosis.linear import bounds, footprint_law, linear_fit, no_remainder, null_of
+from inference.diagnosis.linear import bounds, footprint_law, linear_fit, no_discrepancy, null_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space
-from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.inference.diagnosis.discrepancy import (
+    BEYOND_NATURE,
+    DiscrepancyHyperparameters,
+    Footprints,
+    ModelDiscrepancy,
+)
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
+from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
 from paint_deposition.inference.diagnosis.model_space import (
     LEAST_SHARE,
     MOST_SIZES,
@@ -23,17 +29,10 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_UNKNOWN,
     SIZES,
     ModelSpace,
-    Weighed,
+    WeightedNull,
     log_odds,
-    probable_sizes,
+    probable_hyperparameters,
 )
-from paint_deposition.inference.diagnosis.remainder import (
-    BEYOND_NATURE,
-    Footprints,
-    Remainder,
-    Sizes,
-)
-from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
 from paint_deposition.inference.fitting.smooth_fields import smooth
 
 READINGS, NULL_RUNS = 60, 300
@@ -41,7 +40,9 @@ READINGS, NULL_RUNS = 60, 300
 CHANCE = 0.01
 # Places along a part, and the film over the noise.
 PLACE, FILM = np.linspace(0.0, 3.0, READINGS), 40.0
-SMALL, LARGE, BEYOND = (Sizes(share, 0.0, 1, 2, 0.0) for share in (0.006, 0.06, BEYOND_NATURE))
+SMALL, LARGE, BEYOND = (
+    DiscrepancyHyperparameters(share, 0.0, 1, 2, 0.0) for share in (0.006, 0.06, BEYOND_NATURE)
+)
 # A change that neighbours share, and one that they do not, of one length.
 WAVE = np.sin(2.0 * PLACE)
 JAGGED = np.linalg.norm(WAVE) * np.linalg.qr(
@@ -65,13 +66,13 @@ SHARES = (0.1, 0.3, 1.0)
 
 
 @pytest.fixture
-def remainder() -> Remainder:
+def discrepancy() -> ModelDiscrepancy:
     """Smooth fields along the part, and one deviation of the footprint."""
     away = np.abs(np.subtract.outer(PLACE, PLACE))
     fields = tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0))
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
     return replace(
-        no_remainder(READINGS),
+        no_discrepancy(READINGS),
         settings=fields,
         footprint=Footprints(
             tuple(size * footprint for size in SHARES),
@@ -120,20 +121,27 @@ def shifted(null: NullModel, change: np.ndarray) -> NullModel:
 def space_of(
     plain: NullModel,
     found: list[Explanation],
-    remainder: Remainder,
-    *sizes: Sizes,
+    discrepancy: ModelDiscrepancy,
+    *sizes: DiscrepancyHyperparameters,
     freedom: float = np.inf,
 ) -> ModelSpace:
-    weighed = [Weighed.of(plain, remainder, one, freedom) for one in sizes or (SMALL,)]
-    return ModelSpace(weighed, found, remainder, freedom)
+    weighed = [WeightedNull.of(plain, discrepancy, one, freedom) for one in sizes or (SMALL,)]
+    return ModelSpace(weighed, found, discrepancy, freedom)
 
 
-def p_values(plain, found, remainder, of: Sizes, known: tuple[Sizes, ...], freedom) -> np.ndarray:
-    """Of readings that a remainder of one size made, tested at the sizes that are known."""
-    null = plain.with_remainder(remainder.covariance(of))
+def p_values(
+    plain,
+    found,
+    discrepancy,
+    of: DiscrepancyHyperparameters,
+    known: tuple[DiscrepancyHyperparameters, ...],
+    freedom,
+) -> np.ndarray:
+    """Of readings that a discrepancy of one size made, tested at the sizes that are known."""
+    null = plain.with_discrepancy(discrepancy.covariance(of))
     draws = simulated(READINGS, freedom, NULL_RUNS, seed=11)
     spaces = (
-        space_of(NullModel.of(plain.columns, raw), found, remainder, *known, freedom=freedom)
+        space_of(NullModel.of(plain.columns, raw), found, discrepancy, *known, freedom=freedom)
         for raw in (null.lower @ draws).T
     )
     return np.array([space.p_value(seed) for seed, space in enumerate(spaces)])
@@ -142,27 +150,29 @@ def p_values(plain, found, remainder, of: Sizes, known: tuple[Sizes, ...], freed
 @pytest.mark.slow
 @pytest.mark.parametrize(('size', 'freedom'), [(SMALL, np.inf), (LARGE, 15.0)])
 def test_the_p_value_is_uniform_where_nothing_is_missing(
-    plain, found, remainder, freedom, size, monkeypatch
+    plain, found, discrepancy, freedom, size, monkeypatch
 ):
     monkeypatch.setattr(model_space, 'DRAWS', 99)
-    values = p_values(plain, found, remainder, size, (size,), freedom)
+    values = p_values(plain, found, discrepancy, size, (size,), freedom)
     assert kstest(values, 'uniform').pvalue > CHANCE
     # Where the size is not known either, alarms are at most as frequent as they may be.
-    values = p_values(plain, found, remainder, size, (SMALL, LARGE, BEYOND), freedom)
+    values = p_values(plain, found, discrepancy, size, (SMALL, LARGE, BEYOND), freedom)
     for level in (0.01, 0.05, 0.2):
         assert np.count_nonzero(values <= level) <= binom.isf(CHANCE, NULL_RUNS, level)
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 12.0])
-def test_odds_are_those_of_densities_averaged_over_all_sizes(plain, remainder, freedom):
+def test_odds_are_those_of_densities_averaged_over_all_sizes(plain, discrepancy, freedom):
     edge = law(EdgeBuild(), JAGGED, sides=(0,))
     unknown = field(np.stack([WAVE, JAGGED], axis=1))
     there = shifted(plain, 0.5 * JAGGED)
     sizes = [replace(SMALL, log_prior=-1.0), replace(LARGE, log_prior=-0.5), BEYOND]
-    space = space_of(there, [edge, unknown], remainder, *sizes, freedom=freedom)
+    space = space_of(there, [edge, unknown], discrepancy, *sizes, freedom=freedom)
 
-    def density(one: Sizes, columns: np.ndarray) -> float:
-        covariance = plain.with_remainder(remainder.covariance(one) + columns @ columns.T).lower
+    def density(one: DiscrepancyHyperparameters, columns: np.ndarray) -> float:
+        covariance = plain.with_discrepancy(
+            discrepancy.covariance(one) + columns @ columns.T
+        ).lower
         covariance = covariance @ covariance.T
         if np.isinf(freedom):
             value = multivariate_normal.logpdf(there.raw, cov=covariance)
@@ -186,14 +196,14 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes(plain, remainder, f
     total = logsumexp([0.0, of_edge, of_unknown])
     assert space.inclusion('edge_build') == pytest.approx(np.exp(of_edge - total))
     # Models are compared with one another as they are, and with something unknown beside them.
-    other = space_of(shifted(plain, 0.0 * WAVE), [edge, unknown], remainder, *sizes)
+    other = space_of(shifted(plain, 0.0 * WAVE), [edge, unknown], discrepancy, *sizes)
     assert space.log_evidence - space._log_null == pytest.approx(np.logaddexp(0.0, of_unknown))
     assert np.isfinite(other.log_evidence)
 
 
-def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found, remainder):
+def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found, discrepancy):
     planted = of_cause(found, 'corner_slowdown')[1]
-    space = space_of(shifted(plain, 1.5 * planted.columns[:, 0]), found, remainder)
+    space = space_of(shifted(plain, 1.5 * planted.columns[:, 0]), found, discrepancy)
     assert space.p_value(seed=0) < 0.01
     assert next(iter(space.alone)) == 'corner_slowdown'
     assert space.inclusion('corner_slowdown') > 0.95
@@ -203,102 +213,104 @@ def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found,
     assert effect.gain / typical == pytest.approx(1.5, abs=0.35)
 
 
-def test_nothing_is_proposed_where_nothing_acts(plain, found, remainder):
-    space = space_of(plain, found, remainder, SMALL, LARGE, BEYOND)
+def test_nothing_is_proposed_where_nothing_acts(plain, found, discrepancy):
+    space = space_of(plain, found, discrepancy, SMALL, LARGE, BEYOND)
     assert space.p_value(seed=0) > 0.05
     assert all(space.inclusion(cause) < 0.3 for cause in space.alone)
 
 
-def test_the_wrong_sign_is_not_taken_for_an_effect(plain, found, remainder):
+def test_the_wrong_sign_is_not_taken_for_an_effect(plain, found, discrepancy):
     (faraday,) = of_cause(found, 'faraday_shielding')
     right, wrong = (
-        space_of(shifted(plain, 1.5 * sign * faraday.columns[:, 0]), found, remainder)
+        space_of(shifted(plain, 1.5 * sign * faraday.columns[:, 0]), found, discrepancy)
         for sign in (1.0, -1.0)
     )
     assert right.inclusion('faraday_shielding') > 0.8
     assert wrong.inclusion('faraday_shielding') < 0.05
 
 
-def test_odds_do_not_depend_on_the_number_of_shapes(plain, found, remainder):
+def test_odds_do_not_depend_on_the_number_of_shapes(plain, found, discrepancy):
     """The same law said ten times is no more probable than said once."""
     (edge,) = of_cause(found, 'edge_build')
     there = shifted(plain, 0.8 * edge.columns[:, 0])
     others = [e for e in found if e.cause != 'edge_build']
     copies = [law(EdgeBuild(), edge.columns[:, 0], sides=(1,), share=0.1) for _ in range(10)]
-    once, many = (space_of(there, [*others, *of], remainder) for of in ([edge], copies))
+    once, many = (space_of(there, [*others, *of], discrepancy) for of in ([edge], copies))
     assert 0.05 < once.inclusion('edge_build') < 0.999
     assert many.alone == pytest.approx(once.alone)
     assert many.p_value(seed=1) == once.p_value(seed=1)
 
 
-def test_something_outside_the_library_is_unknown(plain, found, remainder):
+def test_something_outside_the_library_is_unknown(plain, found, discrepancy):
     change = 4.0 * of_cause(found, UNKNOWN)[0].columns @ np.random.default_rng(16).normal(size=6)
-    space = space_of(shifted(plain, change), found, remainder)
+    space = space_of(shifted(plain, change), found, discrepancy)
     assert next(iter(space.alone)) == UNKNOWN
     assert space.inclusion(UNKNOWN) > 0.95
     # So is a setting that differs by more than nature's do, even if nothing is looked for.
     random = np.random.default_rng(3).normal(size=READINGS)
-    beyond = np.linalg.cholesky(remainder.settings[1] + 1e-6 * np.eye(READINGS)) @ random
+    beyond = np.linalg.cholesky(discrepancy.settings[1] + 1e-6 * np.eye(READINGS)) @ random
     there = shifted(plain, BEYOND_NATURE * beyond)
-    alone = space_of(there, [], remainder, SMALL, BEYOND)
+    alone = space_of(there, [], discrepancy, SMALL, BEYOND)
     assert alone.inclusion(UNKNOWN) > 0.95
     assert alone.p_value(seed=0) < 0.01
-    assert space_of(plain, [], remainder, SMALL, BEYOND).inclusion(UNKNOWN) < 0.05
+    assert space_of(plain, [], discrepancy, SMALL, BEYOND).inclusion(UNKNOWN) < 0.05
 
 
 @pytest.mark.parametrize(('form', 'hidden'), [(WAVE, True), (JAGGED, False)], ids=['wave', 'not'])
-def test_what_nature_may_leave_over_is_no_effect(plain, remainder, form, hidden):
-    """A large remainder swallows a smooth change, and none that neighbours do not share."""
+def test_what_nature_may_leave_over_is_no_effect(plain, discrepancy, form, hidden):
+    """A large discrepancy swallows a smooth change, and none that neighbours do not share."""
     there, edge = shifted(plain, 2.0 * form), law(EdgeBuild(), 2.0 * form, sides=(1,))
-    small, large = (space_of(there, [edge], remainder, size) for size in (SMALL, LARGE))
+    small, large = (space_of(there, [edge], discrepancy, size) for size in (SMALL, LARGE))
     assert small.p_value(seed=0) < 0.01
     assert small.inclusion('edge_build') > 0.95
     assert (large.p_value(seed=0) > 0.05) == hidden
     assert (large.inclusion('edge_build') < 0.2) == hidden
     # Where both sizes are possible, the readings decide between them, and so it is in between.
-    both = space_of(there, [edge], remainder, SMALL, LARGE).inclusion('edge_build')
+    both = space_of(there, [edge], discrepancy, SMALL, LARGE).inclusion('edge_build')
     assert large.inclusion('edge_build') <= both + 1e-9 <= small.inclusion('edge_build') + 2e-9
 
 
-def test_the_size_that_made_the_readings_is_found(plain, remainder):
+def test_the_size_that_made_the_readings_is_found(plain, discrepancy):
     random = np.random.default_rng(4)
     for true, other in ((SMALL, LARGE), (LARGE, SMALL)):
-        null = plain.with_remainder(remainder.covariance(true))
+        null = plain.with_discrepancy(discrepancy.covariance(true))
         there = NullModel.of(plain.columns, null.lower @ random.normal(size=READINGS))
-        space = space_of(there, [], remainder, SMALL, LARGE)
+        space = space_of(there, [], discrepancy, SMALL, LARGE)
         assert space.share.sum() == pytest.approx(1.0)
         assert space.share[[SMALL, LARGE].index(true)] > 0.9
         assert space.central.null.lower == pytest.approx(null.lower)
         assert abs(space.figures.setting_share - true.setting) < 0.1 * LARGE.setting
-        kept = probable_sizes(there, remainder, [], np.inf)
+        kept = probable_hyperparameters(there, discrepancy, [], np.inf)
         shares = [size.setting for size in kept if not size.is_beyond_nature]
         assert true.setting in shares
         assert other.setting not in shares
 
 
-def test_the_deviation_of_the_footprint_is_told(plain, remainder):
-    columns = tuple(3.0 * column for column in remainder.footprint.columns)
-    loud = replace(remainder, footprint=replace(remainder.footprint, columns=columns))
+def test_the_deviation_of_the_footprint_is_told(plain, discrepancy):
+    columns = tuple(3.0 * column for column in discrepancy.footprint.columns)
+    loud = replace(discrepancy, footprint=replace(discrepancy.footprint, columns=columns))
     there = shifted(plain, 2.0 * columns[SMALL.footprint][:, 0])
     figures = space_of(there, [], loud).figures
     assert figures.footprint_of_peak == pytest.approx(0.2, abs=0.02)
     assert figures.profile.found - figures.profile.eq1 == pytest.approx(0.2, abs=0.02)
     assert 0.0 < figures.profile.sd < 0.02
-    assert figures.length_m == remainder.lengths_m[SMALL.length]
+    assert figures.length_m == discrepancy.lengths_m[SMALL.length]
     assert 'the footprint differs from two Gaussians by 20 % of its peak' in str(figures)
     assert 'parts painted alike' not in str(figures)
 
 
-def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, remainder):
-    """A strong effect that is smooth looks like a large remainder as long as it is missing."""
+def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, discrepancy):
+    """A strong effect that is smooth looks like a large discrepancy as long as it is missing."""
     there, edge = shifted(plain, 6.0 * WAVE), law(EdgeBuild(), 6.0 * WAVE, sides=(1,))
-    without, with_it = (probable_sizes(there, remainder, e, np.inf) for e in ([], [edge]))
+    without, with_it = (
+        probable_hyperparameters(there, discrepancy, e, np.inf) for e in ([], [edge])
+    )
     for kept in (without, with_it):
         beyond = [size.is_beyond_nature for size in kept]
         assert {size.footprint for size in kept} == set(range(len(SHARES)))
         assert beyond.count(False) <= MOST_SIZES * len(SHARES)
         assert beyond.count(True) == len(SHARES)
     assert min(s.setting for s in with_it) < min(s.setting for s in without)
-    weights = [Weighed.of(there, remainder, s, np.inf).log_weight for s in without
+    weights = [WeightedNull.of(there, discrepancy, s, np.inf).log_weight for s in without
                if not s.is_beyond_nature]  # fmt: skip
     assert min(np.exp(weights - logsumexp(weights))) > LEAST_SHARE

@@ -8,6 +8,7 @@ import pytest
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.inference.diagnosis.discrepancy import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.explanations import FACTOR
 from paint_deposition.inference.diagnosis.next_experiment import (
     EDGE_MARGIN_M,
@@ -15,7 +16,6 @@ from paint_deposition.inference.diagnosis.next_experiment import (
     propose,
     with_proposals,
 )
-from paint_deposition.inference.diagnosis.remainder import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
 from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_along
 from paint_deposition.inference.diagnosis.sprays import MENU, together

@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from inference.diagnosis.linear import KNOWN, PARAMETERS, linear_fit
-from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
+from paint_deposition.inference.fitting.posterior import PatternShift
 from paint_deposition.model.coordinates import PATTERN
 
 FIT = linear_fit(np.random.default_rng(0), 20, parameters=KNOWN)

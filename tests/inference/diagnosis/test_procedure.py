@@ -67,7 +67,7 @@ def test_nothing_is_found_where_nothing_is_missing(nothing_found):
     assert set(nothing_found.detectable) | set(nothing_found.not_testable) == set(EFFECTS)
     misfits = nothing_found.comparisons[0].misfits
     assert [m.label for m in misfits if m.kind == 'group'] == ['column 1']
-    figures = nothing_found.remainder
+    figures = nothing_found.discrepancy
     # The paint shop's sprays are even, and its footprint is that of eq. (1).
     assert 0.0 < figures.setting_share < 0.03
     assert figures.part_share == 0.0
@@ -113,9 +113,9 @@ def test_a_wrong_footprint_is_not_blamed_on_physics(tmp_path):
     # What is learned names no effect.
     assert set(diagnosis.accepted) <= {'learned:footprint'}
     peak = diagnosis.to_dict()['footprint']['deviation_of_peak']
-    assert peak == diagnosis.remainder.footprint_of_peak > 0.1
+    assert peak == diagnosis.discrepancy.footprint_of_peak > 0.1
     # A calibration says so, too.
-    assert pd.calibrate(campaign).remainder.footprint_of_peak > 0.1
+    assert pd.calibrate(campaign).discrepancy.footprint_of_peak > 0.1
 
 
 def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path):

@@ -12,7 +12,12 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose, marks_at
-from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged, power, slope
+from paint_deposition.inference.diagnosis.reading_exchange import (
+    CandidateDesign,
+    exchanged,
+    power,
+    slope,
+)
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.part.gauge_places import grid_places
 
@@ -21,9 +26,9 @@ EFFECT_OF = np.array(['a', 'a', 'b', 'c', 'd'])
 
 
 @pytest.fixture
-def marks() -> Marks:
+def marks() -> CandidateDesign:
     random = np.random.default_rng(4)
-    return Marks(
+    return CandidateDesign(
         3.0 * random.normal(size=(PLACES, FREE)), random.normal(size=(PLACES, COLUMNS)), EFFECT_OF
     )
 
@@ -66,7 +71,7 @@ def test_the_exchange_finds_the_best_of_all_sets():
     from itertools import combinations
 
     random = np.random.default_rng(8)
-    marks = Marks(random.normal(size=(10, 1)), 2.0 * random.normal(size=(10, 3)),
+    marks = CandidateDesign(random.normal(size=(10, 1)), 2.0 * random.normal(size=(10, 3)),
                   np.array(['a', 'b', 'c']))  # fmt: skip
     apart = np.arange(10)[:, np.newaxis] * np.eye(3)[0]
     best = max(marks.around(np.array(rows)).worth for rows in combinations(range(10), 3))

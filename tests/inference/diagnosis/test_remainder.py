@@ -1,4 +1,4 @@
-"""What nature leaves over: which parts share it, and how large it is where."""
+"""The discrepancy: which parts share it, and how large it is where."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ from booth import MODEL
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
-from paint_deposition.inference.diagnosis.remainder import (
+from paint_deposition.inference.diagnosis.discrepancy import (
     FINE_RADII,
     FOOTPRINTS,
     LENGTHS,
     SIDEWAYS,
     TAILS,
-    Remainder,
+    ModelDiscrepancy,
     painted_alike,
 )
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
@@ -45,15 +45,15 @@ def study() -> Study:
 
 
 @pytest.fixture(scope='module')
-def remainder(study) -> Remainder:
-    return Remainder.of(study, at_model(study))
+def discrepancy(study) -> ModelDiscrepancy:
+    return ModelDiscrepancy.of(study, at_model(study))
 
 
 @pytest.fixture(scope='module')
-def alone() -> tuple[Study, Remainder]:
+def alone() -> tuple[Study, ModelDiscrepancy]:
     """The door as the only part."""
     study = study_of(on_door(count=16))
-    return study, Remainder.of(study, at_model(study))
+    return study, ModelDiscrepancy.of(study, at_model(study))
 
 
 def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.ndarray:
@@ -61,8 +61,8 @@ def between(study: Study, covariance: np.ndarray, one: int, other: int) -> np.nd
     return covariance[np.ix_(owner == one, owner == other)]
 
 
-def test_everything_left_over_is_a_covariance(remainder, alone):
-    for found in (remainder, alone[1]):
+def test_everything_left_over_is_a_covariance(discrepancy, alone):
+    for found in (discrepancy, alone[1]):
         for sizes in found.choices():
             covariance = found.covariance(sizes)
             np.testing.assert_allclose(covariance, covariance.T, rtol=1e-6, atol=1e-12)
@@ -70,8 +70,8 @@ def test_everything_left_over_is_a_covariance(remainder, alone):
             assert values[0] > -1e-9 * values[-1]
 
 
-def test_choices_are_as_probable_as_one(remainder, alone):
-    for found, parts in ((remainder, True), (alone[1], False)):
+def test_choices_are_as_probable_as_one(discrepancy, alone):
+    for found, parts in ((discrepancy, True), (alone[1], False)):
         choices = found.choices()
         for beyond in (False, True):
             prior = [s.log_prior for s in choices if s.is_beyond_nature == beyond]
@@ -80,35 +80,35 @@ def test_choices_are_as_probable_as_one(remainder, alone):
         assert found.is_repeated == parts
         assert all((sizes.part > 0.0) == parts for sizes in choices)
     # Sizes in the middle of what was measured are the most probable.
-    best = max((s for s in remainder.choices() if not s.is_beyond_nature),
+    best = max((s for s in discrepancy.choices() if not s.is_beyond_nature),
                key=lambda s: s.log_prior)  # fmt: skip
     assert (best.setting, best.part) == (0.02, 0.01)
 
 
 @pytest.mark.parametrize('k', range(len(LENGTHS)))
-def test_parts_painted_alike_share_the_setting_and_differ_by_the_part(study, remainder, k):
+def test_parts_painted_alike_share_the_setting_and_differ_by_the_part(study, discrepancy, k):
     """They were measured at the same places."""
-    settings, parts = remainder.settings[k], remainder.parts[k]
+    settings, parts = discrepancy.settings[k], discrepancy.parts[k]
     own = between(study, settings, FIRST, FIRST)
     assert own.any()
     assert between(study, settings, FIRST, SECOND) == pytest.approx(own)
     assert between(study, parts, FIRST, FIRST) == pytest.approx(own)
     assert not between(study, parts, FIRST, SECOND).any()
     assert not between(study, parts, DOOR, DOOR).any()
-    shapes = between(study, remainder.shapes, FIRST, FIRST)
-    assert between(study, remainder.shapes, FIRST, SECOND) == pytest.approx(shapes)
+    shapes = between(study, discrepancy.shapes, FIRST, FIRST)
+    assert between(study, discrepancy.shapes, FIRST, SECOND) == pytest.approx(shapes)
 
 
-def test_parts_painted_otherwise_share_the_footprint_alone(study, remainder):
-    for sizes in remainder.choices():
-        assert not between(study, remainder.of_parts(sizes), DOOR, FIRST).any()
-        assert between(study, remainder.of_footprint(sizes), DOOR, FIRST).any()
+def test_parts_painted_otherwise_share_the_footprint_alone(study, discrepancy):
+    for sizes in discrepancy.choices():
+        assert not between(study, discrepancy.of_parts(sizes), DOOR, FIRST).any()
+        assert between(study, discrepancy.of_footprint(sizes), DOOR, FIRST).any()
 
 
 def test_fields_fall_with_the_root_of_the_film_and_with_the_distance(alone):
-    study, remainder = alone
+    study, discrepancy = alone
     film_um = study.forward.predict_um(MODEL)
-    for covariance, length_m in zip(remainder.settings, remainder.lengths_m, strict=True):
+    for covariance, length_m in zip(discrepancy.settings, discrepancy.lengths_m, strict=True):
         scale = np.sqrt(film_um * film_um.max()) / study.sigma_um
         assert np.sqrt(np.diag(covariance)) == pytest.approx(scale)
         places = study.campaign.positions_m
@@ -162,8 +162,8 @@ def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
 
 
 def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
-    study, remainder = alone
-    columns, law = remainder.footprint.columns[-1], remainder.footprint.laws[-1]
+    study, discrepancy = alone
+    columns, law = discrepancy.footprint.columns[-1], discrepancy.footprint.laws[-1]
     by_knots = law.change_um / study.sigma_um[:, np.newaxis]
     assert columns[:, :2] == pytest.approx(by_knots[:, :2])
     # The pattern follows between the knots, too.
@@ -176,11 +176,11 @@ def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
 
 def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
     """Along the tool's x and y alike; one setting alone has no pattern but the model's."""
-    study, remainder = alone
+    study, discrepancy = alone
     radius = np.linspace(0.0, 0.5, 2001)
     flux = mean_flux(radius)
     width_m = np.sqrt(np.trapezoid(radius**3 * flux) / np.trapezoid(radius * flux))
-    values, vectors = np.linalg.eigh(remainder.shapes)
+    values, vectors = np.linalg.eigh(discrepancy.shapes)
     seen = values > 1e-6 * values[-1]
     assert seen.sum() == 2
     for name in ('offset_x_m', 'offset_y_m'):
@@ -192,10 +192,10 @@ def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
         assert np.sum(along**2 / values[seen]) == pytest.approx(1.0, rel=0.1)
 
 
-def test_the_pattern_differs_between_settings_but_not_in_its_level(study, remainder):
+def test_the_pattern_differs_between_settings_but_not_in_its_level(study, discrepancy):
     fit = at_model(study)
     door = study.campaign.experiment_of == DOOR
-    shapes = between(study, remainder.shapes, DOOR, DOOR)
+    shapes = between(study, discrepancy.shapes, DOOR, DOOR)
     values, vectors = np.linalg.eigh(shapes)
     seen = vectors[:, values > 1e-9 * values[-1]]
     assert seen.shape[1] > 2
@@ -209,21 +209,23 @@ def test_the_pattern_differs_between_settings_but_not_in_its_level(study, remain
     assert max(left(name) for name in ('K2', 'r_m')) < 1e-6
 
 
-def test_beside_another_fit_only_pattern_and_place_vary_otherwise(study, remainder):
+def test_beside_another_fit_only_pattern_and_place_vary_otherwise(study, discrepancy):
     moved = MODEL.with_effect(TcpOffset(offset_x_m=0.03))
-    around = remainder.around(study, at_model(study, moved))
-    assert around.settings is remainder.settings
-    assert around.footprint is remainder.footprint
-    assert not np.allclose(around.shapes, remainder.shapes)
-    np.testing.assert_allclose(remainder.around(study, at_model(study)).shapes, remainder.shapes)
+    around = discrepancy.around(study, at_model(study, moved))
+    assert around.settings is discrepancy.settings
+    assert around.footprint is discrepancy.footprint
+    assert not np.allclose(around.shapes, discrepancy.shapes)
+    np.testing.assert_allclose(
+        discrepancy.around(study, at_model(study)).shapes, discrepancy.shapes
+    )
 
 
 def test_where_no_paint_lands_nothing_is_left_over():
     """On the back of a plate the model predicts exactly 0."""
     study = study_of(plate_with_a_back())
     assert study.forward.predict_um(MODEL)[-1] == 0.0
-    remainder = Remainder.of(study, at_model(study))
-    covariance = remainder.covariance(remainder.choices()[-1])
+    discrepancy = ModelDiscrepancy.of(study, at_model(study))
+    covariance = discrepancy.covariance(discrepancy.choices()[-1])
     assert not covariance[-1].any()
     assert (np.diag(covariance)[:-1] > 0.0).all()
 

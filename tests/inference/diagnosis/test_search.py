@@ -21,9 +21,8 @@ from paint_deposition.inference.diagnosis.model_space import (
     SURE,
     log_odds,
 )
-from paint_deposition.inference.diagnosis.run import Run
-from paint_deposition.inference.diagnosis.search import SAME, Search, Stage
-from paint_deposition.inference.diagnosis.trial import Trial
+from paint_deposition.inference.diagnosis.search import SAME, EffectSet, Search, SearchStage
+from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.readings.campaign import Campaign
 
@@ -42,7 +41,7 @@ class Twin(EdgeBuild):
 
 def searching(campaign: Campaign, library: Iterable[type[Effect]]) -> Search:
     known = {effect.id: effect for effect in library}
-    return Search(Run(campaign, BASE, known, seed=0, progress=lambda line: None))
+    return Search(DiagnosisState(campaign, BASE, known, seed=0, progress=lambda line: None))
 
 
 @pytest.fixture(scope='module')
@@ -53,7 +52,7 @@ def search() -> Search:
 
 
 @pytest.fixture(scope='module')
-def stages(search) -> list[Stage]:
+def stages(search) -> list[SearchStage]:
     return search.stages()
 
 
@@ -75,14 +74,14 @@ def test_the_set_found_is_the_one_planted(search, stages):
 
 def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     best = stages[-1].here
-    assert best.fit.remainder is not None
+    assert best.fit.discrepancy is not None
     # A strong effect is fitted as weaker than it is, as what is usual is its prior.
     assert 0.6 * EDGE.gain < best.effects['edge_build'].gain < 1.1 * EDGE.gain
     drift = best.effects['flow_drift'].drift_per_pass
     assert 0.5 * DRIFT.drift_per_pass < drift < 1.1 * DRIFT.drift_per_pass
     # Amplitudes far from the typical ones are less unlikely than one size says.
     assert best.log_prior >= 2.0 * log_odds(PRIOR_EFFECT) - 1.0
-    # One size of what nature leaves over bears nearly all the weight of this set.
+    # One size of the discrepancy bears nearly all the weight of this set.
     everything = np.ones(len(best.run.study), dtype=bool)
     assert best.log_weight_of(everything) == pytest.approx(best.log_weight_alone, abs=1.5)
     # Something unknown beside it adds to it.
@@ -128,23 +127,25 @@ def test_nothing_is_added_where_nothing_acts(clean):
     assert stage.chosen(rows) is stage.here
 
 
-def misled(search: Search) -> Trial:
+def misled(search: Search) -> EffectSet:
     """A fit without effects that has come to rest in a wrong pattern."""
-    run = search.run
+    state = search.run
     wrong = search.nothing.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
     model = search.nothing.fit.model.model_copy(update={'planar': wrong})
-    study, parameters = run.study, search.nothing.fit.parameters
+    study, parameters = state.study, search.nothing.fit.parameters
     vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
     fit = Fit(
         parameters, vector, model, predicted_um,
         (study.measured_um - predicted_um) / study.sigma_um,
         derivatives(study.forward, parameters, vector, study.sigma_um),
-        True, study.nuisance, search.nothing.fit.remainder,
+        True, study.nuisance, search.nothing.fit.discrepancy,
     )  # fmt: skip
     return replace(search.nothing, fit=fit)
 
 
-def replace_state(search: Search, nothing: Trial, trials: dict, tried: set) -> tuple[dict, set]:
+def replace_state(
+    search: Search, nothing: EffectSet, trials: dict, tried: set
+) -> tuple[dict, set]:
     """Let a search begin again from other trials; those that it had."""
     had = search._trials, search._tried
     search.nothing, search._trials, search._tried = nothing, trials, tried

@@ -10,10 +10,9 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space, testability
-from paint_deposition.inference.diagnosis.evidence import NullModel, simulated
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.model_space import CauseEvidence
-from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
+from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
+from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 from paint_deposition.inference.diagnosis.testability import LEVEL, POWER
 
 READINGS = 60
@@ -56,7 +55,7 @@ def found() -> list[Explanation]:
 def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, null, found, monkeypatch):
     """Through the test that the diagnosis makes, on readings that the effect has moved."""
     monkeypatch.setattr(model_space, 'DRAWS', 500)
-    space = CauseEvidence(null, found, freedom)
+    space = EffectEvidence(null, found, freedom)
     _, detectable = testability.testability(space, seed=3)
     limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - LEVEL)
     noise = simulated(READINGS, freedom, RUNS, seed=6)
@@ -69,22 +68,22 @@ def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, null, fou
         assert low <= seen <= high, effect
 
 
-@pytest.mark.parametrize('remainder', [0.0, 4.0])
-def test_what_nature_leaves_over_makes_less_detectable(null, found, remainder):
+@pytest.mark.parametrize('discrepancy', [0.0, 4.0])
+def test_what_nature_leaves_over_makes_less_detectable(null, found, discrepancy):
     """It is part of the null hypothesis, along a direction in which an effect shows."""
     along = found[1].columns
-    beside = null.with_remainder(remainder * along @ along.T)
+    beside = null.with_discrepancy(discrepancy * along @ along.T)
     detectable = [
-        testability.testability(CauseEvidence(one, found, np.inf), seed=3)[1]
+        testability.testability(EffectEvidence(one, found, np.inf), seed=3)[1]
         for one in (null, beside)
     ]
     before, after = (one.get('edge_build', {}).get('gain', np.inf) for one in detectable)
     assert np.isfinite(before)
-    assert after > 1.3 * before if remainder else after == before
+    assert after > 1.3 * before if discrepancy else after == before
 
 
 def test_what_hides_in_the_pattern_is_not_testable(null):
     """A direction that the pattern takes up whole shows nothing, however strong."""
     hidden = null.columns[:, 0] / np.linalg.norm(null.columns[:, 0])
-    space = CauseEvidence(null, [law(EdgeBuild(), hidden, 1)], np.inf)
+    space = EffectEvidence(null, [law(EdgeBuild(), hidden, 1)], np.inf)
     assert testability.testability(space, seed=0) == (('edge_build',), {})

@@ -12,7 +12,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis.procedure import diagnose
-from paint_deposition.inference.diagnosis.run import trouble_with
+from paint_deposition.inference.diagnosis.state import trouble_with
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.outliers import (
     FittedPoints,

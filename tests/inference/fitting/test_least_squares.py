@@ -128,9 +128,9 @@ def test_nuisance_directions_are_allowed_for(forward, exact):
     truth = parameters.encode(TRUTH)
     assert np.linalg.norm(lenient.vector - truth) < 0.5 * np.linalg.norm(strict.vector - truth)
     assert lenient.marginal.chi_square < 0.2 * strict.chi_square
-    # What nature leaves over is the same as a covariance.
-    remainder = nuisance @ nuisance.T
-    same = fit_readings(forward, wrong, sigma, parameters, remainder=remainder)
+    # The discrepancy is the same as a covariance.
+    discrepancy = nuisance @ nuisance.T
+    same = fit_readings(forward, wrong, sigma, parameters, discrepancy=discrepancy)
     assert same.vector == pytest.approx(lenient.vector, abs=1e-6)
     assert same.objective == pytest.approx(lenient.objective)
 

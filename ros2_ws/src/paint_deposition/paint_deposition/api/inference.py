@@ -14,7 +14,7 @@ from paint_deposition.files.effect_source import needs_file, source_of
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
-from paint_deposition.inference.diagnosis.model_space import left_over
+from paint_deposition.inference.diagnosis.model_space import discrepancy_of
 from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted
@@ -55,7 +55,7 @@ def calibrate(
     doubts = require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
     found = calibrated(campaign, model, seed, progress)
     found = replace(found, warnings=(*doubts, *found.warnings))
-    return replace(found, remainder=left_over(found.study, found.fit))
+    return replace(found, discrepancy=discrepancy_of(found.study, found.fit))
 
 
 def compare(

@@ -106,10 +106,10 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
         f'chi2 per degree of freedom {result.chi_square_per_freedom:.2f}, gauge noise '
         f'{noise.typical_um:.2f} µm ({noise.source})'
     )
-    if result.remainder and result.remainder.footprint_of_peak:
+    if result.discrepancy and result.discrepancy.footprint_of_peak:
         yield (
             'the footprint differs from two Gaussians by '
-            f'{100.0 * result.remainder.footprint_of_peak:.0f} % of its peak; '
+            f'{100.0 * result.discrepancy.footprint_of_peak:.0f} % of its peak; '
             'paint refit CAMPAIGN --add learned:footprint learns it'
         )
 
@@ -319,6 +319,6 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         yield f'next: {todo}: {words.separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
-    for note in (*diagnosis.study.notes, *diagnosis.left_over):
+    for note in (*diagnosis.study.notes, *diagnosis.discrepancy_note):
         yield f'note: {note}'
     yield from options.geometry_lines(diagnosis)

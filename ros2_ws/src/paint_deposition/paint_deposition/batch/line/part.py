@@ -21,7 +21,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
-from paint_deposition.inference.diagnosis.sensitivities import mark_um
+from paint_deposition.inference.diagnosis.explanations import mark_um
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study

@@ -9,15 +9,30 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.evidence import NullModel, Principal
-from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, PLACE, Explanation
+from paint_deposition.inference.comparison.comparison import misfit_regions
+from paint_deposition.inference.diagnosis.explanations import (
+    FOOTPRINT,
+    PLACE,
+    Explanation,
+    law_errors,
+)
+from paint_deposition.inference.diagnosis.gaussian import (
+    NullModel,
+    OrthogonalDirections,
+    simulated,
+)
 from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
+from paint_deposition.inference.diagnosis.verdict import Unknown
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.residuals import root_mean_square
 
 MOST_LAWS = 2
 
 
 @dataclass(frozen=True)
-class Nulls:
+class NullModels:
     """What a law of each kind must say more than."""
 
     # For a footprint: pattern, nuisance, what the accepted laws may be off by, and what nature
@@ -29,29 +44,43 @@ class Nulls:
     # For a map: all of it, with what nature usually leaves over of parts and settings; the most
     # probable may be what is unknown.
     place: NullModel
-    any_form: NullModel  # for all others: all of it
+    nonparametric_laws: NullModel  # for all others: all of it
+
+    @staticmethod
+    def around(best: EffectSet, fit: Fit) -> 'NullModels':
+        """Those beside a set of effects, and a fit of the model with it."""
+        study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
+        plain = NullModel.around(fit, study.nuisance)
+        off = law_errors(study, fit, best.names, best.usual.model)
+        correction = plain.with_discrepancy(discrepancy.covariance(sizes))
+        return NullModels(
+            plain.with_discrepancy(discrepancy.of_parts(sizes)).beside(off),
+            correction,
+            plain.with_discrepancy(discrepancy.covariance(discrepancy.usual(sizes))).beside(off),
+            correction.beside(off),
+        )
 
     def of(self, explanation: Explanation) -> NullModel:
         """That for an explanation."""
         if explanation.corrects:
             return self.correction
         kinds = {FOOTPRINT: self.footprint, PLACE: self.place}
-        return kinds.get(explanation.learns, self.any_form)
+        return kinds.get(explanation.learns, self.nonparametric_laws)
 
-    def beside(self, columns: np.ndarray) -> 'Nulls':
+    def beside(self, columns: np.ndarray) -> 'NullModels':
         """The same where some directions (P, n) may vary, too."""
         return self._each(lambda null: null.beside(columns))
 
-    def select(self, rows: np.ndarray) -> 'Nulls':
+    def select(self, rows: np.ndarray) -> 'NullModels':
         """The same for some of the readings."""
         return self._each(lambda null: null.select(rows))
 
-    def _each(self, change: Callable[[NullModel], NullModel]) -> 'Nulls':
-        return Nulls(*(change(getattr(self, each.name)) for each in fields(self)))
+    def _each(self, change: Callable[[NullModel], NullModel]) -> 'NullModels':
+        return NullModels(*(change(getattr(self, each.name)) for each in fields(self)))
 
 
 def choose_laws(
-    nulls: Nulls, explanations: Sequence[Explanation], freedom: float
+    nulls: NullModels, explanations: Sequence[Explanation], freedom: float
 ) -> list[tuple[int, float]]:
     """The laws that the readings call for, strongest first.
 
@@ -86,5 +115,125 @@ def choose_laws(
 
 def by_size(null: NullModel, explanation: Explanation, freedom: float) -> np.ndarray:
     """(S,) log Bayes factor of a law at every size."""
-    found = Principal.of(null.whiten(explanation.columns), explanation.sides)
+    found = OrthogonalDirections.of(null.whiten(explanation.columns), explanation.sides)
     return found.log_bayes_factors(null.deviation[:, np.newaxis], SIZES, freedom)[:, 0]
+
+
+class LeftOut:
+    """Errors on readings left out, of a search and the laws learned after it.
+
+    For each fold the choice is repeated with the other readings between the sets of effects that
+    were tried: as long as it is the same, it goes on to the next stage. The fits of the sets are
+    shared by all folds.
+
+    Args:
+        stages: of the search.
+        options: laws of any form that may be learned.
+    """
+
+    def __init__(self, stages: Sequence[SearchStage], options: Sequence[Explanation]) -> None:
+        self.stages, self.options = stages, options
+        self._known: dict[tuple[frozenset[str], bool], np.ndarray] = {}
+
+    def errors_um(
+        self, without: frozenset[str] = frozenset(), patches: bool = False
+    ) -> np.ndarray:
+        """(n,) with effects and 0 to n - 1 laws, all found without what is left out [um].
+
+        Args:
+            without: covariates of laws that are not learned.
+            patches: leave out patches of parts, even where there are several parts.
+        """
+        key = without, patches
+        if key not in self._known:
+            study = self.stages[0].here.state.study
+            folds = study.patches() if patches else study.folds()
+            self._known[key] = self._errors_um(folds, without)
+        return self._known[key]
+
+    def _errors_um(self, folds: np.ndarray, without: frozenset[str]) -> np.ndarray:
+        state = self.stages[0].here.state
+        options = [option for option in self.options if option.learns not in without]
+        predicted_um = np.empty((MOST_LAWS + 1, len(folds)))
+        for fold in np.unique(folds):
+            out = folds == fold
+            found = _found_without(self.stages, out)
+            nulls = NullModels.around(found, found.fit).select(~out)
+            kept = [option.select(~out) for option in options]
+            laws = choose_laws(nulls, kept, state.freedom)
+            learned = [size * options[k].columns for k, size in laws]
+            for count in range(MOST_LAWS + 1):
+                if count <= len(learned):
+                    free = np.hstack(learned[:count]) if count else None
+                    without_um = state.study.predicted_without_um(found.fit, out, free)
+                predicted_um[count, out] = without_um[out]
+        return np.array(
+            [root_mean_square(state.study.measured_um - each) for each in predicted_um]
+        )
+
+
+def _found_without(stages: Sequence[SearchStage], out: np.ndarray) -> EffectSet:
+    """The set of effects that is found while some readings (P,) are left out."""
+    for stage, following in zip(stages, [*stages[1:], None], strict=True):
+        chosen = stage.chosen(~out)
+        if following is None or chosen.names != following.here.names:
+            break
+    return chosen
+
+
+# Degree of the polynomials in the ranks of a covariate.
+DEGREE = 4
+DRAWS = 1000
+CURVE_POINTS = 15
+
+
+def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) -> Unknown:
+    """Regress the deviations on each covariate, smoothly, and take the one that explains most.
+
+    The p-value is that of the maximum over all covariates if sprays differed as usual ones do.
+
+    Args:
+        study: the readings.
+        fit: the model so far.
+        nothing: whose discrepancy is that of the sprays.
+        seed: of the simulated deviations.
+    """
+    usual = nothing.discrepancy.covariance(nothing.discrepancy.usual(nothing.best.sizes))
+    null = NullModel.around(fit, study.nuisance, discrepancy=usual)
+    draws = simulated(len(study), study.noise.degrees_of_freedom, DRAWS, seed)
+    found, by_chance = [], np.zeros(DRAWS)
+    for covariate in filter(lambda c: c.varies, study.covariates(fit.model)):
+        smooth = _smooth(covariate.values) / study.sigma_um[:, np.newaxis]
+        directions, _ = np.linalg.qr(null.whiten(smooth))
+        found.append((float(np.sum((directions.T @ null.deviation) ** 2)), covariate))
+        by_chance = np.maximum(by_chance, np.sum((directions.T @ draws) ** 2, axis=0))
+    strength, covariate = max(found, key=lambda item: item[0])
+    smooth = np.column_stack([np.ones(len(study)), _smooth(covariate.values)])
+    weights = 1.0 / study.sigma_um[:, np.newaxis]
+    coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
+    order = np.argsort(covariate.values)
+    points = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
+    regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
+    names = [experiment.name for experiment in study.campaign.experiments]
+    shown = [name for name in names if name in {region.experiment for region in regions}]
+    first = regions[0] if regions else None
+    mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
+    return Unknown(
+        covariate.name,
+        float((1 + np.count_nonzero(by_chance >= strength)) / (1 + DRAWS)),
+        {
+            covariate.name: covariate.values[points].tolist(),
+            'residual_um': (smooth[points] @ coefficients).tolist(),
+        },
+        first.description if first else 'no single place stands out',
+        tuple(shown),
+        shown[0] if shown and shown == names[-len(shown) :] != names else '',
+        first.mean_residual_um if first else 0.0,
+        first.mean_residual_um / (mean_um - first.mean_residual_um) if first else 0.0,
+    )
+
+
+def _smooth(values: np.ndarray) -> np.ndarray:
+    """(P, DEGREE) polynomials of the values' ranks, so that outliers have no leverage."""
+    ranks = np.argsort(np.argsort(values)) / max(len(values) - 1, 1)
+    return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, DEGREE)[:, 1:]

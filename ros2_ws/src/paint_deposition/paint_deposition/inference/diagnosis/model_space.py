@@ -1,7 +1,7 @@
 """The evidence of what may be missing beside one fitted model.
 
 Each cause is missing or not, independently of the others before the readings; its laws in a few
-shapes and at several sizes are averaged. How large the remainder of nature is and how far it
+shapes and at several sizes are averaged. How large the discrepancy of nature is and how far it
 reaches is not known before either: every hypothesis is weighed at several of its sizes, and its
 evidence is averaged over them, too. All of it is linear around the fit, which is quick and good
 enough to test whether anything is missing, and to propose what.
@@ -16,12 +16,19 @@ from scipy.special import expit
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.footprint import WAVES
-from paint_deposition.inference.diagnosis.evidence import NullModel, Principal, simulated
+from paint_deposition.inference.diagnosis.discrepancy import (
+    DiscrepancyHyperparameters,
+    ModelDiscrepancy,
+)
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
-from paint_deposition.inference.diagnosis.remainder import Remainder, Sizes
+from paint_deposition.inference.diagnosis.gaussian import (
+    NullModel,
+    OrthogonalDirections,
+    simulated,
+)
+from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.left_over import FootprintProfile, RemainderFigures
 
 # Prior probability that a cause is missing: an effect of the library; and, as one effect more,
 # something outside it, half of which shows over a covariate and half as a setting that differs
@@ -54,7 +61,7 @@ def log_odds(probability: float) -> float:
 LOG_ODDS_UNKNOWN = log_odds(PRIOR_UNKNOWN) - float(np.log(2.0))
 
 
-class CauseEvidence:
+class EffectEvidence:
     """Log evidence of each explanation alone, against one null model.
 
     Args:
@@ -67,7 +74,9 @@ class CauseEvidence:
         self, null: NullModel, explanations: Sequence[Explanation], freedom: float
     ) -> None:
         self.null, self.explanations, self.freedom = null, explanations, freedom
-        self.principal = [Principal.of(null.whiten(e.columns), e.sides) for e in explanations]
+        self.principal = [
+            OrthogonalDirections.of(null.whiten(e.columns), e.sides) for e in explanations
+        ]
 
     @cached_property
     def of_readings(self) -> np.ndarray:
@@ -113,47 +122,51 @@ def log_share(explanation: Explanation) -> float:
     return float(odds + np.log(explanation.share / len(SIZES)))
 
 
-class Weighed(NamedTuple):
-    """Sizes of the remainder, the null model with it, and the logarithm of its weight."""
+class WeightedNull(NamedTuple):
+    """Sizes of the discrepancy, the null model with it, and the logarithm of its weight."""
 
-    sizes: Sizes
+    sizes: DiscrepancyHyperparameters
     null: NullModel
     log_weight: float
 
     @staticmethod
     def of(
-        plain: NullModel, remainder: Remainder, sizes: Sizes, freedom: float, share: float = 1.0
-    ) -> 'Weighed':
+        plain: NullModel,
+        discrepancy: ModelDiscrepancy,
+        sizes: DiscrepancyHyperparameters,
+        freedom: float,
+        share: float = 1.0,
+    ) -> 'WeightedNull':
         """Weigh one choice by its evidence and its prior, of which this hypothesis has a share."""
-        null = plain.with_remainder(remainder.covariance(sizes))
+        null = plain.with_discrepancy(discrepancy.covariance(sizes))
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
         prior = sizes.log_prior + float(np.log(share))
         if sizes.is_beyond_nature:
             prior += LOG_ODDS_UNKNOWN
-        return Weighed(sizes, null, evidence + prior)
+        return WeightedNull(sizes, null, evidence + prior)
 
 
 class ModelSpace:
-    """What may be missing beside a model, whatever the size of what nature leaves over.
+    """What may be missing beside a model, whatever the size of the discrepancy.
 
     Args:
-        weighed: the null hypothesis at the sizes of the remainder that matter.
+        weighed: the null hypothesis at the sizes of the discrepancy that matter.
         explanations: of all causes.
-        remainder: what the sizes are of.
+        discrepancy: what the sizes are of.
         freedom: degrees of freedom of the noise estimate.
     """
 
     def __init__(
         self,
-        weighed: Sequence[Weighed],
+        weighed: Sequence[WeightedNull],
         explanations: Sequence[Explanation],
-        remainder: Remainder,
+        discrepancy: ModelDiscrepancy,
         freedom: float,
     ) -> None:
-        self.explanations, self.remainder, self.freedom = explanations, remainder, freedom
+        self.explanations, self.discrepancy, self.freedom = explanations, discrepancy, freedom
         self.nature = [one for one in weighed if not one.sizes.is_beyond_nature]
         self.beyond = [one for one in weighed if one.sizes.is_beyond_nature]
-        self.evidences = [CauseEvidence(one.null, explanations, freedom) for one in self.nature]
+        self.evidences = [EffectEvidence(one.null, explanations, freedom) for one in self.nature]
 
     @cached_property
     def _log_null(self) -> float:
@@ -165,7 +178,7 @@ class ModelSpace:
         return np.exp([one.log_weight - self._log_null for one in self.nature])
 
     @cached_property
-    def central(self) -> CauseEvidence:
+    def central(self) -> EffectEvidence:
         """The evidence at nature's most probable sizes, for what needs no average."""
         return self.evidences[int(self.share.argmax())]
 
@@ -223,10 +236,10 @@ class ModelSpace:
         The statistic is the score of such fields (Rao), summed over their lengths.
         """
         sizes = self.nature[int(self.share.argmax())].sizes
-        usual = self.remainder.covariance(self.remainder.usual(sizes))
-        null = self.central.null.with_remainder(usual)
+        usual = self.discrepancy.covariance(self.discrepancy.usual(sizes))
+        null = self.central.null.with_discrepancy(usual)
         score = np.zeros_like(usual)
-        for settings, parts in zip(self.remainder.settings, self.remainder.parts, strict=True):
+        for settings, parts in zip(self.discrepancy.settings, self.discrepancy.parts, strict=True):
             field = null.whiten(null.whiten(settings + parts).T)
             score += field / np.trace(field)
         found, *by_chance = (
@@ -249,27 +262,27 @@ class ModelSpace:
         causes += [self._log_weight(one, one.null.whiten(raw)) for one in self.beyond]
         return np.logaddexp.reduce(causes) - np.logaddexp.reduce(nulls)
 
-    def _log_weight(self, one: Weighed, deviations: np.ndarray) -> np.ndarray:
+    def _log_weight(self, one: WeightedNull, deviations: np.ndarray) -> np.ndarray:
         """(D,) what the weight of one choice of sizes would be for whitened deviations (P, D)."""
         here, there = one.null.deviation[:, np.newaxis], deviations
         change = one.null.log_evidence(there, self.freedom)
         return one.log_weight + change - one.null.log_evidence(here, self.freedom)
 
     @property
-    def figures(self) -> RemainderFigures:
+    def figures(self) -> DiscrepancyFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
         null = self.central.null
         size = self.nature[int(self.share.argmax())].sizes.footprint
-        footprint = self.remainder.footprint
+        footprint = self.discrepancy.footprint
         seen, of_peak = null.whiten(footprint.columns[size]), footprint.of_peak[size]
         mean = of_peak @ (seen.T @ null.deviation)
         spread = np.eye(seen.shape[1]) - seen.T @ seen
         sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
         found = [one.sizes for one in self.nature]
-        return RemainderFigures(
+        return DiscrepancyFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
-            float(self.share @ [self.remainder.lengths_m[one.length] for one in found]),
+            float(self.share @ [self.discrepancy.lengths_m[one.length] for one in found]),
             float(np.max(np.abs(mean), where=np.abs(mean) > SHOWS * sd, initial=0.0)),
             FootprintProfile(
                 footprint.radius_m,
@@ -280,15 +293,18 @@ class ModelSpace:
         )
 
 
-def probable_sizes(
-    plain: NullModel, remainder: Remainder, explanations: Sequence[Explanation], freedom: float
-) -> list[Sizes]:
+def probable_hyperparameters(
+    plain: NullModel,
+    discrepancy: ModelDiscrepancy,
+    explanations: Sequence[Explanation],
+    freedom: float,
+) -> list[DiscrepancyHyperparameters]:
     """The sizes that matter where nothing, or the law of any one effect, acts."""
     laws = [e.columns for e in explanations if e.law is not None]
     columns = np.hstack(laws) if laws else plain.columns[:, :0]
-    found: list[tuple[float, Sizes]] = []
-    for sizes in remainder.choices():
-        one = Weighed.of(plain, remainder, sizes, freedom)
+    found: list[tuple[float, DiscrepancyHyperparameters]] = []
+    for sizes in discrepancy.choices():
+        one = WeightedNull.of(plain, discrepancy, sizes, freedom)
         law = one.null.whiten(columns)
         score, square = law.T @ one.null.deviation, np.sum(law**2, axis=0)
         precision = 1.0 + np.multiply.outer(SIZES**2, square)
@@ -311,13 +327,13 @@ def probable_sizes(
     return kept
 
 
-def left_over(study: Study, fit: Fit) -> RemainderFigures:
+def discrepancy_of(study: Study, fit: Fit) -> DiscrepancyFigures:
     """What a fitted model leaves over where nothing is missing."""
-    plain, remainder = NullModel.around(fit, study.nuisance), Remainder.of(study, fit)
+    plain, discrepancy = NullModel.around(fit, study.nuisance), ModelDiscrepancy.of(study, fit)
     freedom = study.noise.degrees_of_freedom
-    sizes = probable_sizes(plain, remainder, [], freedom)
-    weighed = [Weighed.of(plain, remainder, size, freedom) for size in sizes]
-    return ModelSpace(weighed, [], remainder, freedom).figures
+    sizes = probable_hyperparameters(plain, discrepancy, [], freedom)
+    weighed = [WeightedNull.of(plain, discrepancy, size, freedom) for size in sizes]
+    return ModelSpace(weighed, [], discrepancy, freedom).figures
 
 
 def weight_of(log_evidence: float, log_prior: float) -> float:

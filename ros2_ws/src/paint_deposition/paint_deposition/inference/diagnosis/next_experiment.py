@@ -56,7 +56,7 @@ class _Pair:
 
 
 @dataclass(frozen=True)
-class _Tried:
+class ScoredExperiment:
     """A spray that was tried in the model."""
 
     experiment: Experiment
@@ -119,7 +119,7 @@ def _sprays(rivals: Rivals) -> list[Spray]:
     return [one.spray for one in _best(made)[:PROPOSED_SPRAYS]]
 
 
-def _best(tried: Sequence[_Tried | None]) -> list[_Tried]:
+def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
     """Those that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
@@ -134,7 +134,7 @@ def _parts_that_show_most(rivals: Rivals) -> list[Experiment]:
 
 def _tried(
     rivals: Rivals, experiment: Experiment, change: Change, now: float, spot: int | None = None
-) -> _Tried | None:
+) -> ScoredExperiment | None:
     """How well the readings would separate with this spray, None where it cannot be done.
 
     Args:
@@ -177,7 +177,9 @@ def _tried(
     )  # fmt: skip
     cost = change.cost + COST_OF_STANDING * (stand is not None)
     cost += COST_OF_SAG * bool(spray.film_words)
-    return _Tried(experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
+    return ScoredExperiment(
+        experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot
+    )
 
 
 def _in_words(

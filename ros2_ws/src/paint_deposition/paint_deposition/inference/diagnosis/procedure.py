@@ -1,7 +1,7 @@
 """Which physical effects are missing from the model, if any: the procedure.
 
 1. Fit the pattern; stop if the fit cannot be right.
-2. Test whether anything is missing at all, beside a remainder of nature of every size.
+2. Test whether anything is missing at all, beside a discrepancy of nature of every size.
 3. If so, refit with the effects that the evidence around the fit proposes, and take the one whose
    refitted model has the highest evidence; look beside it until nothing more is found. Test each
    effect by leaving it out.
@@ -16,24 +16,26 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.cross_validation import LeftOut
+from paint_deposition.inference.diagnosis.discrepancy import MOST_USUAL
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,
     UNKNOWN,
     WORTH_FOOTPRINT,
     Explanation,
-    of_any_form,
+    nonparametric_laws_of,
     of_corrections,
     of_footprint,
     of_places,
 )
-from paint_deposition.inference.diagnosis.learning import choose_laws
-from paint_deposition.inference.diagnosis.remainder import MOST_USUAL
-from paint_deposition.inference.diagnosis.run import Run
-from paint_deposition.inference.diagnosis.search import Group, Search, Stage
-from paint_deposition.inference.diagnosis.trial import Trial
-from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
+from paint_deposition.inference.diagnosis.learning import (
+    LeftOut,
+    NullModels,
+    choose_laws,
+    locate_unexplained,
+)
+from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
+from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
@@ -69,108 +71,110 @@ def diagnose(
         progress: called with a line for each step of the work.
         known: what an earlier job told of the start's parameters: the prior.
     """
-    run = Run(campaign, start, library, seed, progress, known)
-    if run.trouble:
-        return run.diagnosis(np.nan, 'fit_broken', run.trouble)
+    state = DiagnosisState(campaign, start, library, seed, progress, known)
+    if state.trouble:
+        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
     progress('computing the evidence of what may be missing')
-    search = Search(run)
+    search = Search(state)
     nothing = search.nothing.space
-    run.left_over = nothing.figures
+    state.figures = nothing.figures
     p_value = search.nothing.p_value
     if p_value >= ALPHA:
-        return _nothing_missing(run, search.nothing, p_value)
+        return _nothing_missing(state, search.nothing, p_value)
     progress('refitting with what may be missing')
-    stages, groups = [Stage(search.nothing, [])], {}
+    stages, groups = [SearchStage(search.nothing, [])], {}
     if search.nothing.p_value_of_causes < ALPHA:
         stages = search.stages()
     best, groups = search.groups(stages[-1].here)
-    run.fit = run.fitted_with([*best.effects.values()])
-    run.left_over, run.remainder = best.space.figures, best.best.null.remainder
-    stages = [*(s for s in stages if s.here.names < best.names), Stage(best, [])]
-    model = run.fit.model
+    state.fit = state.fitted_with([*best.effects.values()])
+    state.figures, state.discrepancy = best.space.figures, best.best.null.discrepancy
+    stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
+    model = state.fit.model
     options = [
-        *of_corrections(run.study, run.fit, best.names),
-        *of_any_form(run.study, model),
-        *of_places(run.study, model),
-        *of_footprint(run.study, run.fit, WORTH_FOOTPRINT),
+        *of_corrections(state.study, state.fit, best.names),
+        *nonparametric_laws_of(state.study, model),
+        *of_places(state.study, model),
+        *of_footprint(state.study, state.fit, WORTH_FOOTPRINT),
     ]
     left_out = LeftOut(stages, options)
-    _accept(run, groups, float(left_out.errors_um()[0]))
+    _accept(state, groups, float(left_out.errors_um()[0]))
     progress('learning what the laws leave unexplained')
-    _learn(run, best, left_out)
-    return _conclude(run, best, _others(run, search.beside(best)), p_value)
+    _learn(state, best, left_out)
+    return _conclude(state, best, _others(state, search.beside(best)), p_value)
 
 
-def _nothing_missing(run: Run, nothing: Trial, p_value: float) -> Diagnosis:
+def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) -> Diagnosis:
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
-    rmse_um, noise_um = run.history[0].rmse_um, run.study.noise_floor_um
-    _learn(run, nothing, LeftOut([Stage(nothing, [])], of_footprint(run.study, run.fit)))
-    beyond_um = float(np.sqrt(max(run.history[-1].rmse_um ** 2 - noise_um**2, 0.0)))
-    share = beyond_um / float(np.max(run.fit.predicted_um))
+    rmse_um, noise_um = state.history[0].rmse_um, state.study.noise_floor_um
+    _learn(
+        state, nothing, LeftOut([SearchStage(nothing, [])], of_footprint(state.study, state.fit))
+    )
+    beyond_um = float(np.sqrt(max(state.history[-1].rmse_um ** 2 - noise_um**2, 0.0)))
+    share = beyond_um / float(np.max(state.fit.predicted_um))
     beyond = (
         f'The model misses the readings by {beyond_um:.2f} µm beyond gauge and texture '
         f'({noise_um:.2f} µm), {100.0 * share:.1f} % of the thickest film'
     )
     if share > MOST_USUAL:
-        unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
+        unknown = locate_unexplained(state.study, state.history[0].fit, nothing, state.seed)
         reason = f'{beyond}: sprays of one setting differ by {100.0 * MOST_USUAL:.0f} % at most.'
-        return run.diagnosis(p_value, 'unknown_effect', f'{reason} {unknown}', (), unknown)
-    if run.accepted:
-        unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
+        return state.diagnosis(p_value, 'unknown_effect', f'{reason} {unknown}', (), unknown)
+    if state.accepted:
+        unknown = locate_unexplained(state.study, state.history[0].fit, nothing, state.seed)
         reason = 'The footprint differs from the two Gaussians of eq. (1); it was learned.'
-        return run.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
+        return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
     if rmse_um < BEYOND_NOISE * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
-        return run.diagnosis(p_value, 'none_missing', reason)
+        return state.diagnosis(p_value, 'none_missing', reason)
     reason = f'{beyond}: sprays of one setting usually differ by as much.'
-    return run.diagnosis(p_value, 'none_missing', reason)
+    return state.diagnosis(p_value, 'none_missing', reason)
 
 
-def _accept(run: Run, groups: dict[str, Group], holdout_um: float) -> None:
+def _accept(state: DiagnosisState, groups: dict[str, Group], holdout_um: float) -> None:
     """Accept the effects of the newest fit, strongest first, each as a step of the history."""
-    final = run.fit
-    effects = {effect.id: effect for effect in run.taken}
+    final = state.fit
+    effects = {effect.id: effect for effect in state.taken}
     left = list(effects)
     taken: list[Effect] = []
     while left:
-        trials = {name: run.fitted_with([*taken, effects[name]]) for name in left[1:] and left}
+        trials = {name: state.fitted_with([*taken, effects[name]]) for name in left[1:] and left}
         name = min(left, key=lambda n: trials[n].objective) if trials else left[0]
         left.remove(name)
         taken.append(effects[name])
-        before, fit = run.history[-1], trials[name] if left else final
+        before, fit = state.history[-1], trials[name] if left else final
         members, probability = groups[name]
         members = (name, *(m for m in members if m not in effects))
-        run.record(name, fit, None if left else holdout_um)
-        run.accepted.append(run.described(members, probability, before))
+        state.record(name, fit, None if left else holdout_um)
+        state.accepted.append(state.described(members, probability, before))
 
 
-def _learn(run: Run, best: Trial, left_out: LeftOut) -> None:
+def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> None:
     """Add as few laws of any form as improve the prediction of readings left out.
 
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
     """
     without: frozenset[str] = frozenset()
-    nulls = best.nulls(run.fit)
+    nulls = NullModels.around(best, state.fit)
     while True:
         left = [option for option in left_out.options if option.learns not in without]
-        laws = [(left[k], size) for k, size in choose_laws(nulls, left, run.freedom)]
+        laws = [(left[k], size) for k, size in choose_laws(nulls, left, state.freedom)]
         chosen = _predicting(laws, left_out, without)
         if not chosen:
             return
-        fit = run.learned(chosen)
+        fit = state.learned(chosen)
         parts = zip(
-            *(run.study.residuals_by_experiment(f.predicted_um) for f in (run.fit, fit)),
+            *(state.study.residuals_by_experiment(f.predicted_um) for f in (state.fit, fit)),
             strict=True,
         )
-        if fit.objective <= run.fit.objective and not any(is_worse(*part) for part in parts):
+        if fit.objective <= state.fit.objective and not any(is_worse(*part) for part in parts):
             break
         without |= {chosen[0][0].learns}
     learned = [
-        e.id for e in fit.model.effects if e.family == 'learned' and e not in run.start.effects
+        e.id for e in fit.model.effects if e.family == 'learned' and e not in state.start.effects
     ]
-    before, error_um = run.history[-1], left_out.errors_um(without)[len(chosen)]
-    run.record(' and '.join(learned), fit, float(error_um))
-    run.accepted += [run.described((law,), 1.0, before) for law in learned]
+    before, error_um = state.history[-1], left_out.errors_um(without)[len(chosen)]
+    state.record(' and '.join(learned), fit, float(error_um))
+    state.accepted += [state.described((law,), 1.0, before) for law in learned]
 
 
 def _predicting(
@@ -193,36 +197,38 @@ def _predicting(
     return laws[:kept]
 
 
-def _conclude(run: Run, best: Trial, others: tuple[EffectClass, ...], p_value: float) -> Diagnosis:
+def _conclude(
+    state: DiagnosisState, best: EffectSet, others: tuple[EffectClass, ...], p_value: float
+) -> Diagnosis:
     """The verdict on what was found."""
-    named = [c for c in run.accepted if not c.best.startswith('learned:')]
+    named = [c for c in state.accepted if not c.best.startswith('learned:')]
     if named:
         names = ', and '.join(_in_words(c) for c in named)
-        return run.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
+        return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
     if best.space.inclusion(UNKNOWN) > 0.5 or not others:
-        unknown = locate_unexplained(run.study, run.history[0].fit, best, run.seed)
+        unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
         reason = f'Something outside the library acts. {unknown}'
         if len(set(best.usual.setting_of)) == 1:
             reason += (
                 ' All parts were painted alike: it may belong to the part or to the spray. Spray '
                 'the same part another way.'
             )
-        return run.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
+        return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
         f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
     )
-    return run.diagnosis(p_value, 'undecided', reason, others)
+    return state.diagnosis(p_value, 'undecided', reason, others)
 
 
-def _others(run: Run, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:
+def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:
     """Effects that may act beside those that were accepted, as probable as this."""
-    known = {member for found in run.accepted for member in found.members}
+    known = {member for found in state.accepted for member in found.members}
     found = []
     for cause, probability in probabilities.items():
         if cause in known or probability < WORTH_LISTING:
             continue
-        fit = run.fitted_with([*run.taken, run.candidates[cause][0]])
-        found.append(run.described((cause,), probability, run.history[-1], fit))
+        fit = state.fitted_with([*state.taken, state.candidates[cause][0]])
+        found.append(state.described((cause,), probability, state.history[-1], fit))
     return tuple(found)
 
 

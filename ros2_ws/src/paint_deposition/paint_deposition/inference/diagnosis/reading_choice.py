@@ -9,7 +9,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.diagnosis.reading_exchange import Marks, exchanged
+from paint_deposition.inference.diagnosis.reading_exchange import CandidateDesign, exchanged
 from paint_deposition.inference.diagnosis.testability import power_along
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.fitting.least_squares import on_one_thread
@@ -206,12 +206,12 @@ def usable_places(surface: Surface, film_um: np.ndarray, foot_m: float = FOOT_M)
     return can_stand(surface, foot_m) & (film_um > PAINTED * (volume @ film_um) / volume.sum())
 
 
-def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> Marks:
+def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     """What readings at these vertices (C,) would show."""
     study = part.study(vertices)
     fit = part.fit(study)
     laws = part.sensitivities(study, fit)
-    return Marks(
+    return CandidateDesign(
         fit.jacobian @ fit.parameters.prior.factor,
         np.hstack([law.columns for law in laws]),
         np.array([law.id for law in laws for _ in law.names]),
@@ -256,7 +256,7 @@ def _walk(face_m: np.ndarray, row_m: float) -> np.ndarray:
     return np.lexsort((np.where(row % 2 == 0, face_m[:, 0], -face_m[:, 0]), row))
 
 
-def _speaks_for(marks: Marks, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:
+def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:
     """(P,) effects of which each point shows most."""
     design = marks.around(rows)
     # What the points together do not show, none of them speaks for.

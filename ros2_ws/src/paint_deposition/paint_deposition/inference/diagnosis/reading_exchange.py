@@ -25,7 +25,7 @@ STEP = 1e-3
 
 
 @dataclass(frozen=True)
-class Marks:
+class CandidateDesign:
     """What readings at C places would show, over their noise."""
 
     # (C, k) change with each parameter of the model, in standard deviations of its prior.
@@ -52,7 +52,7 @@ class Marks:
 class Design:
     """Some of the places, the model refitted to their readings."""
 
-    marks: Marks  # of all places
+    marks: CandidateDesign  # of all places
     covariance: np.ndarray  # (k, k) of the model's parameters
     slopes: np.ndarray  # (k, m) by which the parameters imitate each column
     information: np.ndarray  # (m, m) products of what they cannot imitate
@@ -118,7 +118,9 @@ def slope(noncentrality: np.ndarray, tests: int) -> np.ndarray:
     return (power(noncentrality + step, tests) - power(noncentrality, tests)) / step
 
 
-def exchanged(marks: Marks, positions_m: np.ndarray, count: int, apart_m: float) -> np.ndarray:
+def exchanged(
+    marks: CandidateDesign, positions_m: np.ndarray, count: int, apart_m: float
+) -> np.ndarray:
     """(n,) rows of the best places found, at least ``apart_m`` from each other [m].
 
     Args:

@@ -17,14 +17,12 @@ from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
     of_random,
 )
-from paint_deposition.inference.diagnosis.learning import Nulls, by_size
+from paint_deposition.inference.diagnosis.learning import NullModels, by_size, locate_unexplained
 from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of, weight_of
 from paint_deposition.inference.diagnosis.procedure import ALPHA
-from paint_deposition.inference.diagnosis.run import Run
-from paint_deposition.inference.diagnosis.search import Search
+from paint_deposition.inference.diagnosis.search import EffectSet, Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
-from paint_deposition.inference.diagnosis.trial import Trial
-from paint_deposition.inference.diagnosis.unexplained import locate_unexplained
+from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
@@ -58,64 +56,66 @@ def refit(
             f'{added.id} is in the model already; to fit it anew, add none, or take it out'
         )
     candidates = dict(library) | ({added.id: added} if added and not law else {})
-    run = Run(campaign, start, candidates, seed, progress, known)
-    if run.trouble:
-        return run.diagnosis(np.nan, 'fit_broken', run.trouble)
-    search = Search(run)
+    state = DiagnosisState(campaign, start, candidates, seed, progress, known)
+    if state.trouble:
+        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
+    search = Search(state)
     nothing = search.nothing
-    run.left_over, run.remainder = nothing.space.figures, nothing.best.null.remainder
+    state.figures, state.discrepancy = nothing.space.figures, nothing.best.null.discrepancy
     p_value = nothing.p_value
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'
         if not missing:
-            return run.diagnosis(p_value, 'none_missing', f'{reason}.')
-        unknown = locate_unexplained(run.study, run.fit, nothing, seed)
+            return state.diagnosis(p_value, 'none_missing', f'{reason}.')
+        unknown = locate_unexplained(state.study, state.fit, nothing, seed)
         reason += '; something is missing, which diagnose can tell.'
-        return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
+        return state.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
     if law is not None:
         progress(f'learning {law.id}')
-        return _with_learned(run, law, nothing, p_value)
+        return _with_learned(state, law, nothing, p_value)
     progress(f'fitting with {added.id}')
-    before, with_it = run.history[-1], search.with_effect(nothing, added.id)
+    before, with_it = state.history[-1], search.with_effect(nothing, added.id)
     probability = inclusion_of([weight_of(with_it.log_evidence, 0.0)], [nothing.log_weight])
-    run.left_over, run.remainder = with_it.space.figures, with_it.best.null.remainder
-    run.record(added.id, run.fitted_with([*with_it.effects.values()]))
-    run.accepted.append(run.described((added.id,), probability, before))
+    state.figures, state.discrepancy = with_it.space.figures, with_it.best.null.discrepancy
+    state.record(added.id, state.fitted_with([*with_it.effects.values()]))
+    state.accepted.append(state.described((added.id,), probability, before))
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
         f'{percent(probability)} against the model as it was.'
     )
     if probability > SURE:
-        return run.diagnosis(p_value, 'effect_missing', reason)
-    return run.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
+        return state.diagnosis(p_value, 'effect_missing', reason)
+    return state.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
 
 
-def _with_learned(run: Run, law: type[LearnedLaw], nothing: Trial, p_value: float) -> Diagnosis:
+def _with_learned(
+    state: DiagnosisState, law: type[LearnedLaw], nothing: EffectSet, p_value: float
+) -> Diagnosis:
     """The model with a law over the covariate, whatever its evidence beside what may vary."""
-    options, nulls = _options(run, law), nothing.nulls(run.fit)
-    weights = _log_bayes_factors(run, nulls, options)
+    options, nulls = _options(state, law), NullModels.around(nothing, state.fit)
+    weights = _log_bayes_factors(state, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
-    before = run.history[-1]
-    fit = run.learned([_best(options, weights)])
-    run.record(law.id, fit, _holdout_um(run, nulls, options))
-    run.accepted.append(run.described((law.id,), probability, before))
+    before = state.history[-1]
+    fit = state.learned([_best(options, weights)])
+    state.record(law.id, fit, _holdout_um(state, nulls, options))
+    state.accepted.append(state.described((law.id,), probability, before))
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
         f'probability of {percent(probability)} against the model as it was.'
     )
     if p_value >= ALPHA:
-        return run.diagnosis(p_value, 'none_missing', reason)
-    unknown = locate_unexplained(run.study, run.history[0].fit, nothing, run.seed)
-    return run.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
+        return state.diagnosis(p_value, 'none_missing', reason)
+    unknown = locate_unexplained(state.study, state.history[0].fit, nothing, state.seed)
+    return state.diagnosis(p_value, 'unknown_effect', reason, unknown=unknown)
 
 
-def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
+def _options(state: DiagnosisState, law: type[LearnedLaw]) -> list[Explanation]:
     """Laws over the covariate of every kind and length of correlation."""
     found = [
-        of_random(run.study, basis.random(unit, length))
+        of_random(state.study, basis.random(unit, length))
         for kind in law.kinds
-        for basis in bases_over(run.study, run.fit.model, law, kind)
+        for basis in bases_over(state.study, state.fit.model, law, kind)
         for length in LENGTHS.get(law.covariate, LENGTHS['covariate'])
         for unit in (FACTOR if kind == 'factor' else ADDITION_UM,)
     ]
@@ -127,9 +127,11 @@ def _options(run: Run, law: type[LearnedLaw]) -> list[Explanation]:
     return found
 
 
-def _log_bayes_factors(run: Run, nulls: Nulls, options: Sequence[Explanation]) -> np.ndarray:
+def _log_bayes_factors(
+    state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]
+) -> np.ndarray:
     """(n, S) log Bayes factor of each law at each size."""
-    return np.array([by_size(nulls.of(option), option, run.freedom) for option in options])
+    return np.array([by_size(nulls.of(option), option, state.freedom) for option in options])
 
 
 def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanation, float]:
@@ -138,15 +140,15 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
     return options[int(number)], float(SIZES[size])
 
 
-def _holdout_um(run: Run, nulls: Nulls, options: Sequence[Explanation]) -> float:
+def _holdout_um(state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]) -> float:
     """Error on points left out [um], the law's kind, length and size chosen without them."""
-    folds = run.study.folds()
+    folds = state.study.folds()
     predicted_um = np.empty(len(folds))
     for fold in np.unique(folds):
         out = folds == fold
         kept = [explanation.select(~out) for explanation in options]
-        weights = _log_bayes_factors(run, nulls.select(~out), kept)
+        weights = _log_bayes_factors(state, nulls.select(~out), kept)
         explanation, size = _best(options, weights)
         free = size * explanation.columns
-        predicted_um[out] = run.study.predicted_without_um(run.fit, out, free)[out]
-    return root_mean_square(run.study.measured_um - predicted_um)
+        predicted_um[out] = state.study.predicted_without_um(state.fit, out, free)[out]
+    return root_mean_square(state.study.measured_um - predicted_um)

@@ -8,15 +8,16 @@ from scipy.linalg import cholesky, solve_triangular
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.evidence import NullModel
+from paint_deposition.inference.diagnosis.discrepancy import FOOTPRINT_LENGTHS
 from paint_deposition.inference.diagnosis.explanations import (
     FACTOR,
     FOOTPRINT,
     LAW_LENGTH,
     UNKNOWN,
+    neutral_shapes,
+    sensitivity,
 )
-from paint_deposition.inference.diagnosis.remainder import FOOTPRINT_LENGTHS
-from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes, sensitivity
+from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.separation import Predicted
 from paint_deposition.inference.diagnosis.smooth_laws import RADII, footprint_along
 from paint_deposition.inference.diagnosis.verdict import Diagnosis

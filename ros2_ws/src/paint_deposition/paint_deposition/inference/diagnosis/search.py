@@ -2,51 +2,199 @@
 
 The evidence of what may be missing beside a model is linear around its fit, which is quick and
 good enough to propose. What is accepted is decided between models that were refitted, each with
-the remainder of nature at all its sizes, and with or without something unknown beside it.
+the discrepancy of nature at all its sizes, and with or without something unknown beside it.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import softmax
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.diagnosis.discrepancy import (
+    DiscrepancyHyperparameters,
+    ModelDiscrepancy,
+)
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_errors, of_effects
+from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
+    PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
+    SIZES,
     SURE,
+    ModelSpace,
+    WeightedNull,
     inclusion_of,
+    log_odds,
+    probable_hyperparameters,
+    weight_of,
 )
-from paint_deposition.inference.diagnosis.run import STARTS, Run
+from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
 from paint_deposition.inference.diagnosis.testability import testability
-from paint_deposition.inference.diagnosis.trial import Trial
+from paint_deposition.inference.fitting.least_squares import Fit
+
+# So many proposals are refitted each time.
+TRIALS = 5
+# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
+# times as far, and the prior share of each.
+LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
+
+
+@dataclass(frozen=True)
+class EffectSet:
+    """A set of effects with the model refitted to them."""
+
+    state: DiagnosisState
+    names: frozenset[str]  # of the effects
+    fit: Fit  # of the model with them, the discrepancy being allowed for
+    usual: ModelDiscrepancy  # around the one fit that all compared sets share
+    sizes: Sequence[DiscrepancyHyperparameters]  # of the discrepancy that matter
+
+    @staticmethod
+    def around(state: DiagnosisState, names: frozenset[str], fit: Fit) -> 'EffectSet':
+        """A set, and the discrepancy around its own fit, at the sizes that matter."""
+        usual = ModelDiscrepancy.of(state.study, fit)
+        laws = [*of_effects(state.study, fit, state.candidates)]
+        sizes = probable_hyperparameters(state.plain(fit), usual, laws, state.freedom)
+        return EffectSet(state, names, fit, usual, sizes)
+
+    @property
+    def effects(self) -> dict[str, Effect]:
+        """Those of the set, as fitted."""
+        return {effect.id: effect for effect in self.state.candidates_in(self.fit)}
+
+    @cached_property
+    def discrepancy(self) -> ModelDiscrepancy:
+        """The discrepancy beside the model."""
+        return self.usual.around(self.state.study, self.fit)
+
+    @cached_property
+    def weighed(self) -> list[WeightedNull]:
+        """The model as the null hypothesis, its laws being off, with each size of discrepancy."""
+        study, freedom = self.state.study, self.state.freedom
+        errors = law_errors(study, self.fit, self.names, self.usual.model)
+        found = []
+        for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
+            null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
+            found += [
+                WeightedNull.of(null, self.discrepancy, sizes, freedom, share)
+                for sizes in self.sizes
+            ]
+        return found
+
+    @cached_property
+    def best(self) -> WeightedNull:
+        """That with nature's most probable discrepancy."""
+        nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
+        return max(nature, key=lambda one: one.log_weight)
+
+    @cached_property
+    def p_value_of_causes(self) -> float:
+        """Probability of at least this much evidence for any cause if none acted beside it."""
+        return min(1.0, 2.0 * self.space.p_value(self.state.seed))
+
+    @property
+    def p_value(self) -> float:
+        """The same, or of fields over the parts larger than those of usual sprays.
+
+        Two tests were made, so that each counts twice (Bonferroni).
+        """
+        of_size = min(1.0, 2.0 * self.space.p_value_of_size(self.state.seed))
+        return min(self.p_value_of_causes, of_size)
+
+    @cached_property
+    def log_weight(self) -> float:
+        """Logarithm of the posterior weight of this set, nothing unknown acting."""
+        return weight_of(self.log_evidence, self.log_prior)
+
+    @cached_property
+    def log_weight_unknown(self) -> float:
+        """The same if something unknown acts beside it."""
+        unknown = self.of_unknown.alone[UNKNOWN] - log_odds(PRIOR_UNKNOWN)
+        prior = self.log_prior + log_odds(PRIOR_UNKNOWN)
+        return weight_of(self.log_evidence + unknown, prior)
+
+    @cached_property
+    def of_unknown(self) -> ModelSpace:
+        """What is outside the library and may be missing beside it."""
+        state = self.state
+        return ModelSpace(self.weighed, state.nonparametric_laws, self.discrepancy, state.freedom)
+
+    @cached_property
+    def log_evidence(self) -> float:
+        """Its evidence, nothing unknown acting, the amplitudes being of any of the sizes.
+
+        The fit takes each as normal with its typical size as the standard deviation.
+        """
+        nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
+        return float(np.logaddexp.reduce(nature)) + self._of_sizes
+
+    @property
+    def _of_sizes(self) -> float:
+        """What the mixture of sizes changes of the log evidence."""
+        entries, found = self.fit.parameters.of_effects, 0.0
+        amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
+        for name in self.names:
+            own = [amount for amount, entry in zip(amounts, entries, strict=True)
+                   if entry.effect == name and not entry.is_shape]  # fmt: skip
+            by_size = 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
+            found += float(np.logaddexp.reduce(by_size)) - np.log(len(SIZES))
+        return found
+
+    @property
+    def log_prior(self) -> float:
+        """Logarithm of the prior odds of this set."""
+        return log_odds(PRIOR_EFFECT) * len(self.names)
+
+    @cached_property
+    def space(self) -> ModelSpace:
+        """What may be missing beside it."""
+        state = self.state
+        effects = of_effects(state.study, self.fit, state.candidates)
+        found = [*effects, *state.nonparametric_laws]
+        return ModelSpace(self.weighed, found, self.discrepancy, state.freedom)
+
+    @cached_property
+    def proposed(self) -> tuple[str, ...]:
+        """Effects that may be missing beside it, the most probable first."""
+        return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
+
+    def log_weight_of(self, rows: np.ndarray) -> float:
+        """The same weight with some of the readings (P,), at the best size of the discrepancy."""
+        some = self.best.null.select(rows)
+        evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
+        return weight_of(evidence + self.best.sizes.log_prior + self._of_sizes, self.log_prior)
+
 
 # So many effects are added at most.
 MOST_EFFECTS = 4
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
-MISLEADS = 12.0
+MIN_LOG_EVIDENCE_GAIN = 12.0
 # Effects that could stand in one place, most probable first, and the probability of one of them.
 Group = tuple[tuple[str, ...], float]
 
 
 @dataclass(frozen=True)
-class Stage:
+class SearchStage:
     """One step of the search: a set of effects, and larger ones that were tried.
 
     The search goes on as if nothing unknown could act: that follows several effects together more
     closely than the law of the first of them.
     """
 
-    here: Trial
-    tried: Sequence[Trial]
+    here: EffectSet
+    tried: Sequence[EffectSet]
 
-    def chosen(self, rows: np.ndarray | None = None) -> Trial:
+    def chosen(self, rows: np.ndarray | None = None) -> EffectSet:
         """The set that the readings, or some (P,), call for: one that was tried, or this."""
 
-        def weight(trial: Trial) -> float:
+        def weight(trial: EffectSet) -> float:
             return trial.log_weight if rows is None else trial.log_weight_of(rows)
 
         weights = [weight(trial) for trial in self.tried]
@@ -58,15 +206,15 @@ class Stage:
 class Search:
     """Sets of effects that were refitted so far."""
 
-    def __init__(self, run: Run) -> None:
-        self.run = run
-        self._trials: dict[frozenset[str], Trial] = {}
+    def __init__(self, state: DiagnosisState) -> None:
+        self.state = state
+        self._trials: dict[frozenset[str], EffectSet] = {}
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
-        self.nothing = self._refitted({}, Trial.around(run, frozenset(), run.fit))
-        run.testable = testability(self.nothing.space.central, run.seed)
+        self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
+        state.testable = testability(self.nothing.space.central, state.seed)
 
-    def with_effect(self, parent: Trial, name: str) -> Trial:
+    def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
         names = parent.names | {name}
         if names not in self._tried:
@@ -75,7 +223,7 @@ class Search:
             self._refitted(effects, parent, self._patterns)
         return self._trials[names]
 
-    def without(self, trial: Trial, *names: str) -> Trial:
+    def without(self, trial: EffectSet, *names: str) -> EffectSet:
         """A set with some effects less, refitted from where the larger one has its pattern.
 
         A pattern has several shapes that fit about as well: what only led to a better one is no
@@ -85,12 +233,12 @@ class Search:
         return self._refitted(fewer, trial)
 
     def _refitted(
-        self, effects: dict[str, Effect], start: Trial, others: Sequence[DepositionModel] = ()
-    ) -> Trial:
-        """A set fitted beside the remainder of another one, from its pattern or one of others."""
-        model, remainder = start.fit.model, start.best.null.remainder
-        fit = self.run.fitted_with(
-            [*effects.values()], model=model, remainder=remainder, others=others
+        self, effects: dict[str, Effect], start: EffectSet, others: Sequence[DepositionModel] = ()
+    ) -> EffectSet:
+        """A set fitted beside the discrepancy of another, from its pattern or one of others."""
+        model, discrepancy = start.fit.model, start.best.null.discrepancy
+        fit = self.state.fitted_with(
+            [*effects.values()], model=model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
@@ -98,13 +246,15 @@ class Search:
             self._trials[trial.names] = trial
         return self._trials[trial.names]
 
-    def stages(self) -> list[Stage]:
+    def stages(self) -> list[SearchStage]:
         """From nothing to the best set, each with one effect more than the one before."""
-        found: list[Stage] = []
-        here = self._around_the_best()
+        found: list[SearchStage] = []
+        here = self._near_best()
         while True:
             room = len(here.names) < MOST_EFFECTS
-            stage = Stage(here, [self.with_effect(here, name) for name in here.proposed if room])
+            stage = SearchStage(
+                here, [self.with_effect(here, name) for name in here.proposed if room]
+            )
             again = self._in_another_pattern(stage)
             if again is not here:
                 here = again
@@ -115,8 +265,8 @@ class Search:
             found.append(stage)
             here = best
 
-    def _around_the_best(self) -> Trial:
-        """Nothing missing, with what nature leaves over around the best fit with one effect.
+    def _near_best(self) -> EffectSet:
+        """Nothing missing, with the discrepancy around the best fit with one effect.
 
         The pattern that was fitted without a strong effect may be far from the true one, and the
         deviations of its footprint with it. All sets that are compared have the same.
@@ -124,12 +274,12 @@ class Search:
         nothing = self.nothing
         tried = [self.with_effect(nothing, name) for name in nothing.proposed]
         best = max(tried, key=lambda one: one.log_weight, default=nothing)
-        if best.log_evidence <= nothing.log_evidence + MISLEADS:
+        if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
-        others = self.run.fitted_with(
-            [*best.effects.values()], model=self.run.start, starts=STARTS
+        others = self.state.fitted_with(
+            [*best.effects.values()], model=self.state.start, starts=STARTS
         )
-        anew = [Trial.around(self.run, best.names, fit) for fit in (best.fit, others)]
+        anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
         self._patterns = (nothing.fit.model,)
@@ -137,7 +287,7 @@ class Search:
             self.nothing = self._refitted({}, start)
         return self.nothing
 
-    def _in_another_pattern(self, stage: Stage) -> Trial:
+    def _in_another_pattern(self, stage: SearchStage) -> EffectSet:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""
         here = stage.here
         for trial in sorted(stage.tried, key=lambda one: -one.log_weight):
@@ -148,7 +298,7 @@ class Search:
                 return again
         return here
 
-    def beside(self, trial: Trial) -> dict[str, float]:
+    def beside(self, trial: EffectSet) -> dict[str, float]:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
         for name in trial.proposed:
             self.with_effect(trial, name)
@@ -163,7 +313,7 @@ class Search:
         found = dict(zip(weights, shares.tolist(), strict=True))
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
-    def groups(self, trial: Trial) -> tuple[Trial, dict[str, Group]]:
+    def groups(self, trial: EffectSet) -> tuple[EffectSet, dict[str, Group]]:
         """The set without effects that do not stand, and what could stand in place of each.
 
         Here something unknown may have done it, too.
@@ -179,7 +329,7 @@ class Search:
                 return trial, found
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
 
-    def group(self, trial: Trial, name: str) -> Group:
+    def group(self, trial: EffectSet, name: str) -> Group:
         """The effects that could stand in place of one, and how probable one of them is.
 
         None could whose model is less probable than the one without any.

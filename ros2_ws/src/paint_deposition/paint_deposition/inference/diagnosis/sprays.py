@@ -175,8 +175,8 @@ def _passes_turned(experiment: Experiment) -> Experiment | None:
         position_m=position, rotation=quarter @ path.rotation, velocity_m_per_s=velocity
     )
     # Passes that are longer or shorter now take as much more or less time.
-    run = np.abs(path.velocity_m_per_s @ frame)[spraying].sum(axis=0)[:2]
-    return replace(experiment, path=_speed(1.0 / share[np.argmax(run)])(changed))
+    state = np.abs(path.velocity_m_per_s @ frame)[spraying].sum(axis=0)[:2]
+    return replace(experiment, path=_speed(1.0 / share[np.argmax(state)])(changed))
 
 
 def _upside_down(experiment: Experiment) -> Experiment:

@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paint_deposition.inference.diagnosis.model_space import CauseEvidence
-from paint_deposition.inference.diagnosis.sensitivities import Sensitivity
+from paint_deposition.inference.diagnosis.explanations import Sensitivity
+from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 
 # Smallest signal-to-noise ratio, at the largest amplitude that is physical and with the pattern
 # refitted, at which an effect counts as testable.
@@ -23,7 +23,7 @@ FOLLOWING = 6
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
 
 
-def testability(space: CauseEvidence, seed: int) -> Testability:
+def testability(space: EffectEvidence, seed: int) -> Testability:
     """Ids of effects that do not show, and detectable amplitudes of the others by parameter."""
     shapes: dict[str, list[Sensitivity]] = {}
     for explanation in space.explanations:
@@ -44,7 +44,7 @@ def testability(space: CauseEvidence, seed: int) -> Testability:
 
 
 def _detectable(
-    space: CauseEvidence, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
+    space: EffectEvidence, shapes: list[Sensitivity], null: np.ndarray, draws: np.ndarray
 ) -> dict[str, float]:
     """Smallest detectable amplitudes, for the shape that shows best, where physically possible."""
     info = type(shapes[0].effect).parameters()
@@ -65,7 +65,7 @@ def _detectable(
 
 
 def _ratio(
-    space: CauseEvidence, direction: np.ndarray, null: np.ndarray, draws: np.ndarray
+    space: EffectEvidence, direction: np.ndarray, null: np.ndarray, draws: np.ndarray
 ) -> float:
     """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried."""
     power = power_along(space, direction, RATIOS, null, draws)
@@ -75,7 +75,7 @@ def _ratio(
 
 
 def power_along(
-    space: CauseEvidence,
+    space: EffectEvidence,
     direction: np.ndarray,
     ratios: np.ndarray,
     null: np.ndarray,
@@ -94,7 +94,7 @@ def power_along(
     return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
 
 
-def _following(space: CauseEvidence, direction: np.ndarray) -> Sequence[int]:
+def _following(space: EffectEvidence, direction: np.ndarray) -> Sequence[int]:
     """Numbers of the explanations that take up most of a direction."""
     taken = [
         float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))

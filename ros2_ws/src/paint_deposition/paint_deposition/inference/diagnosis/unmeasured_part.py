@@ -9,15 +9,16 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.inference.diagnosis.evidence import NullModel
-from paint_deposition.inference.diagnosis.explanations import of_any_form, of_effects
-from paint_deposition.inference.diagnosis.model_space import CauseEvidence
-from paint_deposition.inference.diagnosis.remainder import Remainder
-from paint_deposition.inference.diagnosis.sensitivities import (
+from paint_deposition.inference.diagnosis.discrepancy import ModelDiscrepancy
+from paint_deposition.inference.diagnosis.explanations import (
     Sensitivity,
     neutral_shapes,
+    nonparametric_laws_of,
+    of_effects,
     sensitivity,
 )
+from paint_deposition.inference.diagnosis.gaussian import NullModel
+from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
@@ -89,16 +90,19 @@ class UnmeasuredPart:
             for shape in shapes
         ]
 
-    def space(self, study: Study, freedom: float) -> CauseEvidence:
+    def space(self, study: Study, freedom: float) -> EffectEvidence:
         """What the diagnosis would search.
 
         Args:
             freedom: degrees of freedom of the noise estimate.
         """
         fit = self.fit(study)
-        remainder = Remainder.of(study, fit)
-        nature = [sizes for sizes in remainder.choices() if not sizes.is_beyond_nature]
+        discrepancy = ModelDiscrepancy.of(study, fit)
+        nature = [sizes for sizes in discrepancy.choices() if not sizes.is_beyond_nature]
         usual = max(nature, key=lambda sizes: sizes.log_prior)
-        null = NullModel.around(fit, study.nuisance, remainder=remainder.covariance(usual))
-        found = [*of_effects(study, fit, self.candidates), *of_any_form(study, fit.model)]
-        return CauseEvidence(null, found, freedom)
+        null = NullModel.around(fit, study.nuisance, discrepancy=discrepancy.covariance(usual))
+        found = [
+            *of_effects(study, fit, self.candidates),
+            *nonparametric_laws_of(study, fit.model),
+        ]
+        return EffectEvidence(null, found, freedom)

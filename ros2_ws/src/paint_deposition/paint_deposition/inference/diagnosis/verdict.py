@@ -15,13 +15,12 @@ from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
-from paint_deposition.inference.diagnosis.pattern_shift import PatternShift
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
+from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.posterior import PatternShift, posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.residuals import is_worse, root_mean_square
 
@@ -130,7 +129,7 @@ class Diagnosis:
         detectable: smallest amplitude of each testable effect that would have been seen.
         library: the effects that were looked for, by id.
         remarks: on what was known before, a sentence each.
-        remainder: what nature leaves over; None where the fit is broken.
+        discrepancy: the discrepancy; None where the fit is broken.
         proposals: places to measure and sprays that would settle the diagnosis, best first; see
             ``next_experiment.with_proposals``.
     """
@@ -147,7 +146,7 @@ class Diagnosis:
     detectable: dict[str, dict[str, float]] = field(default_factory=dict)
     library: Mapping[str, type[Effect]] = field(default_factory=dict)
     remarks: tuple[str, ...] = ()
-    remainder: RemainderFigures | None = None
+    discrepancy: DiscrepancyFigures | None = None
     proposals: tuple[Sequence[Place], Sequence[Spray]] = ((), ())
 
     def __repr__(self) -> str:
@@ -158,12 +157,12 @@ class Diagnosis:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user, warnings first."""
-        return (*self.warnings, *self.left_over, *self.study.notes)
+        return (*self.warnings, *self.discrepancy_note, *self.study.notes)
 
     @property
-    def left_over(self) -> tuple[str, ...]:
-        """What nature leaves over, in a sentence; nothing where the fit is broken."""
-        return (str(self.remainder),) if self.remainder else ()
+    def discrepancy_note(self) -> tuple[str, ...]:
+        """The discrepancy, in a sentence; nothing where the fit is broken."""
+        return (str(self.discrepancy),) if self.discrepancy else ()
 
     @property
     def warnings(self) -> tuple[str, ...]:
@@ -272,8 +271,8 @@ class Diagnosis:
             'pattern_shift': self.pattern_shift and self.pattern_shift.to_dict(),
             'random_effects': [asdict(amount) for amount in self.random_effects],
             'noise': self.study.noise_figures,
-            'remainder': self.remainder and self.remainder.to_dict(),
-            'footprint': self.remainder and self.remainder.footprint,
+            'discrepancy': self.discrepancy and self.discrepancy.to_dict(),
+            'footprint': self.discrepancy and self.discrepancy.footprint,
             'left_out': [slip.to_dict() for slip in self.study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
             'notes': list(self.notes),

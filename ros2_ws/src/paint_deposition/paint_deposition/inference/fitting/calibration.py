@@ -15,6 +15,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.paint_used import impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
 from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
@@ -33,7 +34,6 @@ from paint_deposition.inference.fitting.panel_fit import (
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.panel import Panel
@@ -85,7 +85,7 @@ class Calibration:
         correlations: of pairs, strongest first.
         panels: one-dimensional fit of each experiment, None where it is no flat panel.
         warnings: a sentence each.
-        remainder: what no pattern explains; None until it is estimated.
+        discrepancy: what no pattern explains; None until it is estimated.
         shifts: (n, k) of the fit's vector without the readings at the ends of panels that do not
             reach the pattern's edges; they widen the uncertainties.
     """
@@ -98,7 +98,7 @@ class Calibration:
     panels: tuple[PanelFit | None, ...]
     warnings: tuple[str, ...]
     shifts: np.ndarray
-    remainder: RemainderFigures | None = None
+    discrepancy: DiscrepancyFigures | None = None
 
     def __repr__(self) -> str:
         known = sum(value.determined for value in self.parameters)
@@ -139,7 +139,7 @@ class Calibration:
             'noise': study.noise_figures,
             'left_out': [outlier.to_dict() for outlier in study.outliers],
             'geometry': {name: found.to_dict() for name, found in self.geometry.items()},
-            'footprint': self.remainder and self.remainder.footprint,
+            'footprint': self.discrepancy and self.discrepancy.footprint,
             'warnings': list(self.warnings),
         }
 

@@ -50,20 +50,20 @@ class Fit:
     # (P, n) nuisance directions that the fit allowed for, over the standard deviation; their
     # amplitudes are independent and standard normal.
     nuisance: np.ndarray
-    # (P, P) covariance of what nature leaves over, which the fit allowed for, or None if it did
+    # (P, P) covariance of the discrepancy, which the fit allowed for, or None if it did
     # not.
-    remainder: np.ndarray | None = None
+    discrepancy: np.ndarray | None = None
 
     @cached_property
     def marginal(self) -> 'Fit':
-        """The same fit with residual and Jacobian whitened by nuisance and remainder, too."""
-        factor = covariance_factor(self.nuisance, self.remainder)
+        """The same fit with residual and Jacobian whitened by nuisance and discrepancy, too."""
+        factor = covariance_factor(self.nuisance, self.discrepancy)
         return replace(
             self,
             residual=solve_triangular(factor, self.residual, lower=True),
             jacobian=solve_triangular(factor, self.jacobian, lower=True),
             nuisance=self.nuisance[:, :0],
-            remainder=None,
+            discrepancy=None,
         )
 
     @cached_property
@@ -99,7 +99,7 @@ def fit_readings(
     starts: int = 1,
     seed: int = 0,
     nuisance: np.ndarray | None = None,
-    remainder: np.ndarray | None = None,
+    discrepancy: np.ndarray | None = None,
     others: Sequence[DepositionModel] = (),
 ) -> Fit:
     """Find the most probable values (maximum a posteriori).
@@ -111,12 +111,12 @@ def fit_readings(
             first, drawn with the given seed.
         nuisance: (P, n) nuisance directions, over the standard deviation, along which the
             readings may deviate further with unit variance; default: none.
-        remainder: (P, P) covariance of what nature leaves over; default: nothing is.
+        discrepancy: (P, P) covariance of the discrepancy; default: nothing is.
         others: models whose patterns are starts, too, of which the best is taken to the end.
     """
     if nuisance is None:
         nuisance = np.empty((len(measured_um), 0))
-    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance, remainder)
+    problem = _Problem(forward, measured_um, sigma_um, parameters, nuisance, discrepancy)
     first = problem.scaled_to_mean(parameters.encode(parameters.start))
     candidates = [first]
     if starts > 1:
@@ -135,7 +135,7 @@ def fit_readings(
     jacobian = derivatives(forward, parameters, best.x, sigma_um)
     converged = bool(best.status > 0)
     return Fit(
-        parameters, best.x, model, predicted, residual, jacobian, converged, nuisance, remainder
+        parameters, best.x, model, predicted, residual, jacobian, converged, nuisance, discrepancy
     )
 
 
@@ -205,13 +205,13 @@ class _Problem:
 
     def __init__(
         self, forward: Forward, measured_um: np.ndarray, sigma_um: np.ndarray,
-        parameters: FreeParameters, nuisance: np.ndarray, remainder: np.ndarray | None,
+        parameters: FreeParameters, nuisance: np.ndarray, discrepancy: np.ndarray | None,
     ) -> None:  # fmt: skip
         self.forward, self.measured, self.sigma = forward, measured_um, sigma_um
         self.parameters = parameters
         # None spares a solve in every step where readings deviate by noise alone.
-        noise_alone = remainder is None and not nuisance.size
-        self.lower = None if noise_alone else covariance_factor(nuisance, remainder)
+        noise_alone = discrepancy is None and not nuisance.size
+        self.lower = None if noise_alone else covariance_factor(nuisance, discrepancy)
         self.prior = parameters.prior
         self.low, self.high = parameters.bounds
         self._last: tuple[bytes, Terms] | None = None

@@ -127,12 +127,12 @@ class Study:
 
     def fit(
         self, parameters: FreeParameters, starts: int = 1, seed: int = 0,
-        nuisance: np.ndarray | None = None, remainder: np.ndarray | None = None,
+        nuisance: np.ndarray | None = None, discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
     ) -> Fit:  # fmt: skip
         """Fit these parameters to the points; see ``fit_readings``."""
         data = self.forward, self.measured_um, self.sigma_um
-        return fit_readings(*data, parameters, starts, seed, nuisance, remainder, others)
+        return fit_readings(*data, parameters, starts, seed, nuisance, discrepancy, others)
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].

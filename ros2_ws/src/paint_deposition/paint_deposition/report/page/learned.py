@@ -113,7 +113,7 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
 
 def profile_figure(data: ReportData) -> dict[str, Any] | None:
     """The footprint from its middle outward, by eq. (1) and as the readings have it."""
-    left_over = data.diagnosis and data.diagnosis.remainder
+    left_over = data.diagnosis and data.diagnosis.discrepancy
     if not left_over:
         return None
     profile = left_over.profile

@@ -30,26 +30,26 @@ class NullModel:
     columns: np.ndarray
     # (P,) deviations over the noise from the base model at the centre of its priors.
     raw: np.ndarray
-    # (P, P) covariance of what nature leaves over, or None if nothing is.
-    remainder: np.ndarray | None
+    # (P, P) covariance of the discrepancy, or None if nothing is.
+    discrepancy: np.ndarray | None
     lower: np.ndarray  # (P, P) Cholesky factor of the deviations' covariance
     deviation: np.ndarray  # (P,) whitened deviations; standard normal if nothing is missing
 
     @staticmethod
     def of(
-        columns: np.ndarray, raw: np.ndarray, remainder: np.ndarray | None = None
+        columns: np.ndarray, raw: np.ndarray, discrepancy: np.ndarray | None = None
     ) -> 'NullModel':
         """From directions (P, m), deviations (P,) and what is left over."""
-        lower = covariance_factor(columns, remainder)
+        lower = covariance_factor(columns, discrepancy)
         deviation = solve_triangular(lower, raw, lower=True, check_finite=False)
-        return NullModel(columns, raw, remainder, lower, deviation)
+        return NullModel(columns, raw, discrepancy, lower, deviation)
 
     @staticmethod
     def around(
         fit: Fit,
         nuisance: np.ndarray,
         apart: frozenset[str] = frozenset(),
-        remainder: np.ndarray | None = None,
+        discrepancy: np.ndarray | None = None,
     ) -> 'NullModel':
         """Linear around a fit, with nuisance directions (P, n) over the noise.
 
@@ -58,7 +58,7 @@ class NullModel:
             nuisance: directions that carry no meaning.
             apart: ids of effects in it that the null hypothesis does not have: what they
                 contribute to the film counts as deviation.
-            remainder: (P, P) covariance of what nature leaves over.
+            discrepancy: (P, P) covariance of the discrepancy.
         """
         prior, entries = fit.parameters.prior, fit.parameters.of_effects
         pattern = len(fit.vector) - len(entries)
@@ -72,17 +72,17 @@ class NullModel:
         kept &= free
         raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
         directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
-        return NullModel.of(np.hstack([directions, nuisance]), raw, remainder)
+        return NullModel.of(np.hstack([directions, nuisance]), raw, discrepancy)
 
     def beside(self, more: np.ndarray) -> 'NullModel':
         """The same where some more directions (P, n), if any, may vary."""
         if not more.size:
             return self
-        return NullModel.of(np.hstack([self.columns, more]), self.raw, self.remainder)
+        return NullModel.of(np.hstack([self.columns, more]), self.raw, self.discrepancy)
 
-    def with_remainder(self, remainder: np.ndarray) -> 'NullModel':
-        """The same with another covariance (P, P) of what nature leaves over."""
-        return NullModel.of(self.columns, self.raw, remainder)
+    def with_discrepancy(self, discrepancy: np.ndarray) -> 'NullModel':
+        """The same with another covariance (P, P) of the discrepancy."""
+        return NullModel.of(self.columns, self.raw, discrepancy)
 
     def log_evidence(self, deviations: np.ndarray, freedom: float) -> np.ndarray:
         """(D,) log likelihood of whitened deviations (P, D), the noise's scale integrated out.
@@ -102,12 +102,12 @@ class NullModel:
 
     def select(self, rows: np.ndarray) -> 'NullModel':
         """The same for some of the readings."""
-        kept = None if self.remainder is None else self.remainder[np.ix_(rows, rows)]
+        kept = None if self.discrepancy is None else self.discrepancy[np.ix_(rows, rows)]
         return NullModel.of(self.columns[rows], self.raw[rows], kept)
 
 
 @dataclass(frozen=True)
-class Principal:
+class OrthogonalDirections:
     """Whitened directions of one explanation, turned to be orthogonal to each other."""
 
     columns: np.ndarray  # (P, m) the directions
@@ -116,7 +116,7 @@ class Principal:
     sides: np.ndarray  # (q,) +1 or -1
 
     @staticmethod
-    def of(columns: np.ndarray, sides: np.ndarray) -> 'Principal':
+    def of(columns: np.ndarray, sides: np.ndarray) -> 'OrthogonalDirections':
         """Turn whitened directions (P, n), with sides (n,) that are 0 where no sign is known.
 
         Where none is known, directions that do not show are left out: a map of hundreds of knots
@@ -125,7 +125,7 @@ class Principal:
         known = sides != 0.0
         if known.any():
             _, axes = np.linalg.eigh(columns.T @ columns)
-            return Principal(columns @ axes, axes, axes[known], sides[known])
+            return OrthogonalDirections(columns @ axes, axes, axes[known], sides[known])
         wide = columns.shape[1] > len(columns)
         squares, turned = np.linalg.eigh(columns @ columns.T if wide else columns.T @ columns)
         shown = squares > UNSEEN
@@ -134,7 +134,7 @@ class Principal:
             turned, axes = turned * lengths, columns.T @ (turned / lengths)
         else:
             turned, axes = columns @ turned, turned
-        return Principal(turned, axes, axes[known], sides[known])
+        return OrthogonalDirections(turned, axes, axes[known], sides[known])
 
     @cached_property
     def squares(self) -> np.ndarray:

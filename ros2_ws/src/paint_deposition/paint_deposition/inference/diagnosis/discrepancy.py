@@ -1,4 +1,4 @@
-"""What nature leaves over: smooth errors of every part that no law explains and no gauge made.
+"""The discrepancy: smooth errors of every part that no law explains and no gauge made.
 
 Sprays of one setting differ from each other, alike in neighbouring places, and their shape changes
 with the setting in more ways than any law says. Each part therefore has a smooth error of its own,
@@ -62,7 +62,7 @@ SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 
 @dataclass(frozen=True)
-class Sizes:
+class DiscrepancyHyperparameters:
     """One choice of the hyperparameters."""
 
     # Shares of the thickest film; the latter 0 where no parts were painted alike.
@@ -133,8 +133,8 @@ class Footprints:
 
 
 @dataclass(frozen=True)
-class Remainder:
-    """What nature leaves over at P points, over the noise."""
+class ModelDiscrepancy:
+    """The discrepancy at P points, over the noise."""
 
     model: DepositionModel  # around which it is taken
     footprint: Footprints  # deviations that all parts share
@@ -149,7 +149,7 @@ class Remainder:
     setting_of: np.ndarray  # (P,) number of the setting of each point, see ``painted_alike``
 
     @staticmethod
-    def of(study: Study, fit: Fit) -> 'Remainder':
+    def of(study: Study, fit: Fit) -> 'ModelDiscrepancy':
         """Around a fit."""
         model, campaign = fit.model, study.campaign
         owner = campaign.experiment_of
@@ -164,7 +164,7 @@ class Remainder:
             places = np.column_stack([campaign.positions_m, FAR_M * of])
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
-        return Remainder(
+        return ModelDiscrepancy(
             model,
             Footprints.of(study, fit),
             _shapes(study, fit, setting_of),
@@ -175,15 +175,15 @@ class Remainder:
             setting_of,
         )
 
-    def around(self, study: Study, fit: Fit) -> 'Remainder':
+    def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':
         """The same where pattern and place of a spray vary as around another fit."""
         return replace(self, shapes=_shapes(study, fit, self.setting_of))
 
-    def choices(self) -> list[Sizes]:
+    def choices(self) -> list[DiscrepancyHyperparameters]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
         parts = PARTS if self.is_repeated else (0.0,)
         found = [
-            Sizes(
+            DiscrepancyHyperparameters(
                 setting, part, length, footprint,
                 (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
                 + (_log_prior(part, *USUAL_PART) if part else 0.0),
@@ -202,21 +202,21 @@ class Remainder:
             replace(s, log_prior=s.log_prior - float(total[s.is_beyond_nature])) for s in found
         ]
 
-    def usual(self, sizes: Sizes) -> Sizes:
+    def usual(self, sizes: DiscrepancyHyperparameters) -> DiscrepancyHyperparameters:
         """The same with settings and parts that differ no more than those of usual sprays."""
         return replace(
             sizes, setting=min(sizes.setting, MOST_USUAL), part=min(sizes.part, MOST_USUAL)
         )
 
-    def covariance(self, sizes: Sizes) -> np.ndarray:
+    def covariance(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
         return self.of_footprint(sizes) + self.of_parts(sizes)
 
-    def of_footprint(self, sizes: Sizes) -> np.ndarray:
+    def of_footprint(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) that of the footprint, which all parts share."""
         return self.footprint.covariances[sizes.footprint]
 
-    def of_parts(self, sizes: Sizes) -> np.ndarray:
+    def of_parts(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) that of settings and of parts."""
         k = sizes.length
         of_settings = self.shapes + sizes.setting**2 * self.settings[k]

@@ -14,13 +14,13 @@ from scipy.special import fdtr
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.inference.diagnosis.evidence import NullModel
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
-    of_any_form,
+    neutral_shapes,
+    nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.sensitivities import neutral_shapes
+from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
@@ -30,13 +30,13 @@ from paint_deposition.inference.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
+from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.left_over import RemainderFigures
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
@@ -55,7 +55,7 @@ PAINTED, TAIL = 3.0, 0.2
 TOO_GOOD = 1e-4
 
 
-class Run:
+class DiagnosisState:
     """A fitted model, what has been added to it, and what may still be added.
 
     Attributes:
@@ -65,7 +65,7 @@ class Run:
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
         candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
-        left_over, remainder: what nature leaves over, and its covariance (P, P) over the noise, by
+        figures, discrepancy: of the discrepancy, and its covariance (P, P) over the noise, by
             which intervals are wider; None while it is not known.
         trouble: why the fit cannot be right, '' if it can.
     """
@@ -94,8 +94,8 @@ class Run:
         self.history = [Step.of(self.study, '', self.fit)]
         self.accepted: list[EffectClass] = []
         self.testable: Testability | None = None
-        self.left_over: RemainderFigures | None = None
-        self.remainder: np.ndarray | None = None
+        self.figures: DiscrepancyFigures | None = None
+        self.discrepancy: np.ndarray | None = None
         self.trouble = trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
@@ -103,10 +103,10 @@ class Run:
         return FreeParameters.of(start, *start.effects, known=self.known)
 
     @cached_property
-    def any_form(self) -> list[Explanation]:
+    def nonparametric_laws(self) -> list[Explanation]:
         """Laws of any form, for what is outside the library: over a condition, or on a part."""
         model = self.history[0].model
-        found = [of_any_form(self.study, model), of_places(self.study, model, each=True)]
+        found = [nonparametric_laws_of(self.study, model), of_places(self.study, model, each=True)]
         return [replace(e, share=0.5 * e.share) for laws in found for e in laws]
 
     @property
@@ -132,7 +132,7 @@ class Run:
         effects: Sequence[Effect],
         free: np.ndarray | None = None,
         model: DepositionModel | None = None,
-        remainder: np.ndarray | None = None,
+        discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
         starts: int = 1,
     ) -> Fit:
@@ -142,7 +142,7 @@ class Run:
             effects: with their first values.
             free: (P, n) directions over the noise that are left free beside them.
             model: to start from; default the newest.
-            remainder: (P, P) covariance of what nature leaves over, if that is allowed for.
+            discrepancy: (P, P) covariance of the discrepancy, if that is allowed for.
             others: models whose patterns are starts, too.
             starts: how many, as in the first fit.
         """
@@ -152,7 +152,7 @@ class Run:
         nuisance = self.study.nuisance
         if free is not None:
             nuisance = np.hstack([nuisance, free])
-        return self.study.fit(self._free(start), starts, self.seed, nuisance, remainder, others)
+        return self.study.fit(self._free(start), starts, self.seed, nuisance, discrepancy, others)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""
@@ -221,7 +221,7 @@ class Run:
             members,
             min(probability, 1.0),
             members[0],
-            intervals(replace(after.fit, remainder=self.remainder), members[0]),
+            intervals(replace(after.fit, discrepancy=self.discrepancy), members[0]),
             {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um},
         )
 
@@ -248,7 +248,7 @@ class Run:
             tuple(name for name in not_testable if name not in listed),
             detectable,
             remarks=self.remarks,
-            remainder=self.left_over,
+            discrepancy=self.figures,
         )
 
 

@@ -1,4 +1,4 @@
-"""What nature leaves over in a campaign, in figures for people."""
+"""How far a model is from the readings beyond all laws and noise, in figures for people."""
 
 from dataclasses import dataclass, fields
 from typing import Any
@@ -22,8 +22,8 @@ class FootprintProfile:
 
 
 @dataclass(frozen=True)
-class RemainderFigures:
-    """What nature leaves over in a campaign, as far as its readings show it."""
+class DiscrepancyFigures:
+    """The discrepancy in a campaign, as far as its readings show it."""
 
     # By how much the film of a setting differs from any law, and parts of one setting from each
     # other, as shares of the thickest film.
