@@ -21,7 +21,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import film_statistics
-from paint_deposition.inference.diagnosis.explanations import mark_um
+from paint_deposition.inference.diagnosis.explanations import sensitivity_um
 from paint_deposition.inference.fitting.least_squares import derivatives
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
@@ -123,7 +123,7 @@ def _measured(experiment: Experiment, model: DepositionModel) -> Iterator[dict[s
     predicted_um = study.forward.predict_um(model)
     effects = {e.id: model.effect(e.id) or e() for e in EFFECTS.values()}
     by_effect = np.column_stack([
-        mark_um(study.forward, model, effects[effect], name, predicted_um)
+        sensitivity_um(study.forward, model, effects[effect], name, predicted_um)
         for effect, name in amplitudes()
     ])  # fmt: skip
     campaign = study.campaign

@@ -297,10 +297,14 @@ def _laws_off(
             else:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None
-        others = [name for name in covariates if name not in own] if anywhere else []
-        for name in others:
+        elsewhere = [name for name in covariates if name not in own] if anywhere else []
+        for name in elsewhere:
             root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
-            yield effect, OTHER_ERROR / np.sqrt(len(others)) * change[:, np.newaxis] * root, None
+            yield (
+                effect,
+                OTHER_ERROR / np.sqrt(len(elsewhere)) * change[:, np.newaxis] * root,
+                None,
+            )
 
 
 def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:

@@ -11,6 +11,7 @@
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -37,7 +38,7 @@ from paint_deposition.inference.diagnosis.learning import (
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
-from paint_deposition.inference.fitting.least_squares import on_one_thread
+from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.residuals import is_worse
@@ -71,84 +72,86 @@ def diagnose(
         progress: called with a line for each step of the work.
         known: what an earlier job told of the start's parameters: the prior.
     """
-    state = DiagnosisState(campaign, start, library, seed, progress, known)
+    progress('fitting the model')
+    state = DiagnosisState.begin(campaign, start, library, seed, known)
     if state.trouble:
         return state.diagnosis(np.nan, 'fit_broken', state.trouble)
     progress('computing the evidence of what may be missing')
     search = Search(state)
-    nothing = search.nothing.space
-    state.figures = nothing.figures
-    p_value = search.nothing.p_value
+    nothing = search.nothing
+    state = replace(state, testable=search.testability, figures=nothing.space.figures)
+    p_value = nothing.p_value
     if p_value >= ALPHA:
-        return _nothing_missing(state, search.nothing, p_value)
+        return _nothing_missing(state, nothing, p_value)
     progress('refitting with what may be missing')
-    stages, groups = [SearchStage(search.nothing, [])], {}
-    if search.nothing.p_value_of_causes < ALPHA:
-        stages = search.stages()
+    sought = nothing.p_value_of_causes < ALPHA
+    stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
-    state.fit = state.fitted_with([*best.effects.values()])
-    state.figures, state.discrepancy = best.space.figures, best.best.null.discrepancy
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
-    model = state.fit.model
+    fit = state.fitted_with([*best.effects.values()], state.fit.model)
     options = [
-        *of_corrections(state.study, state.fit, best.names),
-        *nonparametric_laws_of(state.study, model),
-        *of_places(state.study, model),
-        *of_footprint(state.study, state.fit, WORTH_FOOTPRINT),
+        *of_corrections(state.study, fit, best.names),
+        *nonparametric_laws_of(state.study, fit.model),
+        *of_places(state.study, fit.model),
+        *of_footprint(state.study, fit, WORTH_FOOTPRINT),
     ]
     left_out = LeftOut(stages, options)
-    _accept(state, groups, float(left_out.errors_um()[0]))
+    state = replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
+    state = _accept(state, fit, groups, float(left_out.errors_um()[0]))
     progress('learning what the laws leave unexplained')
-    _learn(state, best, left_out)
+    state = _learn(state, best, left_out)
     return _conclude(state, best, _others(state, search.beside(best)), p_value)
 
 
 def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) -> Diagnosis:
     """The verdict where the test finds nothing; a footprint may still differ from eq. (1)."""
-    rmse_um, noise_um = state.history[0].rmse_um, state.study.noise_floor_um
-    _learn(
-        state, nothing, LeftOut([SearchStage(nothing, [])], of_footprint(state.study, state.fit))
-    )
+    first, noise_um = state.history[0], state.study.noise_floor_um
+    options = of_footprint(state.study, state.fit)
+    state = _learn(state, nothing, LeftOut([SearchStage(nothing, [])], options))
     beyond_um = float(np.sqrt(max(state.history[-1].rmse_um ** 2 - noise_um**2, 0.0)))
     share = beyond_um / float(np.max(state.fit.predicted_um))
     beyond = (
         f'The model misses the readings by {beyond_um:.2f} µm beyond gauge and texture '
         f'({noise_um:.2f} µm), {100.0 * share:.1f} % of the thickest film'
     )
-    if share > MOST_USUAL:
-        unknown = locate_unexplained(state.study, state.history[0].fit, nothing, state.seed)
-        reason = f'{beyond}: sprays of one setting differ by {100.0 * MOST_USUAL:.0f} % at most.'
-        return state.diagnosis(p_value, 'unknown_effect', f'{reason} {unknown}', (), unknown)
-    if state.accepted:
-        unknown = locate_unexplained(state.study, state.history[0].fit, nothing, state.seed)
+    if share > MOST_USUAL or state.accepted:
+        unknown = locate_unexplained(state.study, first.fit, nothing, state.seed)
         reason = 'The footprint differs from the two Gaussians of eq. (1); it was learned.'
+        if share > MOST_USUAL:
+            most = f'sprays of one setting differ by {100.0 * MOST_USUAL:.0f} % at most'
+            reason = f'{beyond}: {most}. {unknown}'
         return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
-    if rmse_um < BEYOND_NOISE * noise_um:
-        reason = 'The readings agree with the model to within the noise of the gauge.'
-        return state.diagnosis(p_value, 'none_missing', reason)
     reason = f'{beyond}: sprays of one setting usually differ by as much.'
+    if first.rmse_um < BEYOND_NOISE * noise_um:
+        reason = 'The readings agree with the model to within the noise of the gauge.'
     return state.diagnosis(p_value, 'none_missing', reason)
 
 
-def _accept(state: DiagnosisState, groups: dict[str, Group], holdout_um: float) -> None:
-    """Accept the effects of the newest fit, strongest first, each as a step of the history."""
-    final = state.fit
-    effects = {effect.id: effect for effect in state.taken}
+def _accept(
+    state: DiagnosisState, final: Fit, groups: dict[str, Group], holdout_um: float
+) -> DiagnosisState:
+    """Accept the effects of a fit, strongest first, each as a step of the history."""
+    effects = {effect.id: effect for effect in state.candidates_in(final)}
     left = list(effects)
-    taken: list[Effect] = []
+    accepted: list[Effect] = []
     while left:
-        trials = {name: state.fitted_with([*taken, effects[name]]) for name in left[1:] and left}
-        name = min(left, key=lambda n: trials[n].objective) if trials else left[0]
+        trials = {
+            name: state.fitted_with([*accepted, effects[name]], final.model)
+            for name in left
+            if len(left) > 1
+        }
+        name = min(trials, key=lambda n: trials[n].objective) if trials else left[0]
         left.remove(name)
-        taken.append(effects[name])
-        before, fit = state.history[-1], trials[name] if left else final
+        accepted.append(effects[name])
+        before = state.history[-1]
         members, probability = groups[name]
         members = (name, *(m for m in members if m not in effects))
-        state.record(name, fit, None if left else holdout_um)
-        state.accepted.append(state.described(members, probability, before))
+        state = state.with_step(name, trials.get(name, final), None if left else holdout_um)
+        state = state.accepting(members, probability, before)
+    return state
 
 
-def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> None:
+def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> DiagnosisState:
     """Add as few laws of any form as improve the prediction of readings left out.
 
     A law that the model cannot be fitted with, or that makes a part worse, is not tried again.
@@ -160,7 +163,7 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> None:
         laws = [(left[k], size) for k, size in choose_laws(nulls, left, state.freedom)]
         chosen = _predicting(laws, left_out, without)
         if not chosen:
-            return
+            return state
         fit = state.learned(chosen)
         parts = zip(
             *(state.study.residuals_by_experiment(f.predicted_um) for f in (state.fit, fit)),
@@ -173,8 +176,10 @@ def _learn(state: DiagnosisState, best: EffectSet, left_out: LeftOut) -> None:
         e.id for e in fit.model.effects if e.family == 'learned' and e not in state.start.effects
     ]
     before, error_um = state.history[-1], left_out.errors_um(without)[len(chosen)]
-    state.record(' and '.join(learned), fit, float(error_um))
-    state.accepted += [state.described((law,), 1.0, before) for law in learned]
+    state = state.with_step(' and '.join(learned), fit, float(error_um))
+    for law in learned:
+        state = state.accepting((law,), 1.0, before)
+    return state
 
 
 def _predicting(
@@ -227,7 +232,8 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
     for cause, probability in probabilities.items():
         if cause in known or probability < WORTH_LISTING:
             continue
-        fit = state.fitted_with([*state.taken, state.candidates[cause][0]])
+        effects = [*state.accepted_effects, state.candidates[cause][0]]
+        fit = state.fitted_with(effects, state.fit.model)
         found.append(state.described((cause,), probability, state.history[-1], fit))
     return tuple(found)
 

@@ -1,6 +1,7 @@
 """Add an effect or a learned law that the user chose and fit the model with it."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -56,12 +57,13 @@ def refit(
             f'{added.id} is in the model already; to fit it anew, add none, or take it out'
         )
     candidates = dict(library) | ({added.id: added} if added and not law else {})
-    state = DiagnosisState(campaign, start, candidates, seed, progress, known)
+    progress('fitting the model')
+    state = DiagnosisState.begin(campaign, start, candidates, seed, known)
     if state.trouble:
         return state.diagnosis(np.nan, 'fit_broken', state.trouble)
     search = Search(state)
     nothing = search.nothing
-    state.figures, state.discrepancy = nothing.space.figures, nothing.best.null.discrepancy
+    state = _beside(state, nothing)
     p_value = nothing.p_value
     missing = p_value < ALPHA
     if added is None:
@@ -77,9 +79,9 @@ def refit(
     progress(f'fitting with {added.id}')
     before, with_it = state.history[-1], search.with_effect(nothing, added.id)
     probability = inclusion_of([weight_of(with_it.log_evidence, 0.0)], [nothing.log_weight])
-    state.figures, state.discrepancy = with_it.space.figures, with_it.best.null.discrepancy
-    state.record(added.id, state.fitted_with([*with_it.effects.values()]))
-    state.accepted.append(state.described((added.id,), probability, before))
+    fit = state.fitted_with([*with_it.effects.values()], state.fit.model)
+    state = _beside(state, with_it).with_step(added.id, fit)
+    state = state.accepting((added.id,), probability, before)
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
         f'{percent(probability)} against the model as it was.'
@@ -87,6 +89,11 @@ def refit(
     if probability > SURE:
         return state.diagnosis(p_value, 'effect_missing', reason)
     return state.diagnosis(p_value, 'undecided' if missing else 'none_missing', reason)
+
+
+def _beside(state: DiagnosisState, best: EffectSet) -> DiagnosisState:
+    """The state with the discrepancy beside a set of effects."""
+    return replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
 
 
 def _with_learned(
@@ -98,8 +105,8 @@ def _with_learned(
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
     before = state.history[-1]
     fit = state.learned([_best(options, weights)])
-    state.record(law.id, fit, _holdout_um(state, nulls, options))
-    state.accepted.append(state.described((law.id,), probability, before))
+    state = state.with_step(law.id, fit, _holdout_um(state, nulls, options))
+    state = state.accepting((law.id,), probability, before)
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
         f'probability of {percent(probability)} against the model as it was.'

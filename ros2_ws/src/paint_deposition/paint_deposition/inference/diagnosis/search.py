@@ -34,7 +34,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     weight_of,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
-from paint_deposition.inference.diagnosis.testability import testability
+from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many proposals are refitted each time.
@@ -212,7 +212,11 @@ class Search:
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
         self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
-        state.testable = testability(self.nothing.space.central, state.seed)
+
+    @cached_property
+    def testability(self) -> Testability:
+        """What the readings can show beside the model as it is."""
+        return testability(self.nothing.space.central, self.state.seed)
 
     def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
@@ -238,7 +242,7 @@ class Search:
         """A set fitted beside the discrepancy of another, from its pattern or one of others."""
         model, discrepancy = start.fit.model, start.best.null.discrepancy
         fit = self.state.fitted_with(
-            [*effects.values()], model=model, discrepancy=discrepancy, others=others
+            [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
         known = self._trials.get(trial.names)
@@ -276,9 +280,7 @@ class Search:
         best = max(tried, key=lambda one: one.log_weight, default=nothing)
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
-        others = self.state.fitted_with(
-            [*best.effects.values()], model=self.state.start, starts=STARTS
-        )
+        others = self.state.fitted_with([*best.effects.values()], self.state.start, starts=STARTS)
         anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()

@@ -4,8 +4,8 @@ What is added is the caller's choice: ``diagnose`` adds what is most probable, `
 user asks for.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -55,48 +55,64 @@ PAINTED, TAIL = 3.0, 0.2
 TOO_GOOD = 1e-4
 
 
+@dataclass(frozen=True)
 class DiagnosisState:
     """A fitted model, what has been added to it, and what may still be added.
 
+    What is found is passed on in a new state.
+
     Attributes:
         study: the readings.
-        start: the model that the run started from.
+        start: the model that was started from.
+        known: what is known of its parameters: the prior. None if nothing is.
+        remarks: why something that is known is not used, a sentence each.
+        candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
+        seed: of starts and simulated deviations.
         fit: of the newest model.
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
-        candidates: effects that may be missing, at neutral amplitude and in a few shapes, by id.
+        testable: what the readings can show; None while it is not known.
         figures, discrepancy: of the discrepancy, and its covariance (P, P) over the noise, by
-            which intervals are wider; None while it is not known.
-        trouble: why the fit cannot be right, '' if it can.
+            which intervals are wider; None while they are not known.
     """
 
-    def __init__(
-        self,
+    study: Study
+    start: DepositionModel
+    known: Posterior | None
+    remarks: tuple[str, ...]
+    candidates: Mapping[str, list[Effect]]
+    seed: int
+    fit: Fit
+    history: tuple[Step, ...]
+    accepted: tuple[EffectClass, ...] = ()
+    testable: Testability | None = None
+    figures: DiscrepancyFigures | None = None
+    discrepancy: np.ndarray | None = None
+
+    @staticmethod
+    def begin(
         campaign: Campaign,
         start: DepositionModel,
         library: Mapping[str, type[Effect]],
         seed: int,
-        progress: Callable[[str], None],
         known: Posterior | None = None,
-    ) -> None:
-        self.candidates = {
+    ) -> 'DiagnosisState':
+        """Fit a model to a campaign; effects of a library may be added to it."""
+        candidates = {
             key: neutral_shapes(effect)
             for key, effect in library.items()
             if start.effect(key) is None
         }
-        neutral = (shapes[0] for shapes in self.candidates.values())
-        self.seed = seed
-        progress('fitting the model')
-        self.start = start
-        self.known, self.remarks = usable(known, campaign)
-        effects = (*start.effects, *neutral)
-        self.study, self.fit = clean_and_fit(campaign, start, effects, STARTS, seed, self.known)
-        self.history = [Step.of(self.study, '', self.fit)]
-        self.accepted: list[EffectClass] = []
-        self.testable: Testability | None = None
-        self.figures: DiscrepancyFigures | None = None
-        self.discrepancy: np.ndarray | None = None
-        self.trouble = trouble_with(self.study, self.fit)
+        prior, remarks = usable(known, campaign)
+        effects = (*start.effects, *(shapes[0] for shapes in candidates.values()))
+        study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior)
+        first = (Step.of(study, '', fit),)
+        return DiagnosisState(study, start, prior, remarks, candidates, seed, fit, first)
+
+    @cached_property
+    def trouble(self) -> str:
+        """Why the fit cannot be right, '' if it can."""
+        return trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
@@ -119,7 +135,7 @@ class DiagnosisState:
         return NullModel.around(fit, self.study.nuisance)
 
     @property
-    def taken(self) -> list[Effect]:
+    def accepted_effects(self) -> list[Effect]:
         """The candidates that the newest model has."""
         return self.candidates_in(self.fit)
 
@@ -130,8 +146,8 @@ class DiagnosisState:
     def fitted_with(
         self,
         effects: Sequence[Effect],
+        model: DepositionModel,
         free: np.ndarray | None = None,
-        model: DepositionModel | None = None,
         discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
         starts: int = 1,
@@ -140,13 +156,12 @@ class DiagnosisState:
 
         Args:
             effects: with their first values.
+            model: to start from.
             free: (P, n) directions over the noise that are left free beside them.
-            model: to start from; default the newest.
             discrepancy: (P, P) covariance of the discrepancy, if that is allowed for.
             others: models whose patterns are starts, too.
             starts: how many, as in the first fit.
         """
-        model = model or self.fit.model
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
         start = model.model_copy(update={'effects': (*kept, *effects)})
         nuisance = self.study.nuisance
@@ -169,7 +184,7 @@ class DiagnosisState:
                 for random, (_, size) in zip(randoms, chosen, strict=True)
             ]
             columns, before = np.hstack(parts), fit.objective
-            fit = self.fitted_with(self.candidates_in(fit), columns, fit.model)
+            fit = self.fitted_with(self.candidates_in(fit), fit.model, columns)
             covariance = np.eye(len(self.study)) + fit.nuisance @ fit.nuisance.T
             amounts = columns.T @ np.linalg.solve(covariance, fit.residual)
             known = fit.amplitudes[1][-len(amounts) :, -len(amounts) :]
@@ -186,8 +201,8 @@ class DiagnosisState:
         start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
         return self.study.fit(self._free(start), nuisance=self.study.nuisance)
 
-    def record(self, added: str, fit: Fit, holdout_um: float | None = None) -> None:
-        """Take a fit as the newest model.
+    def with_step(self, added: str, fit: Fit, holdout_um: float | None = None) -> 'DiagnosisState':
+        """The state with a newer model.
 
         Args:
             added: what it has more than the one before.
@@ -195,11 +210,17 @@ class DiagnosisState:
             holdout_um: its error on points left out when the choice was made without them, too
                 [um]; default: when the model was refitted without them.
         """
-        self.fit = fit
         step = Step.of(self.study, added, fit)
-        self.history.append(
-            step if holdout_um is None else replace(step, holdout_rmse_um=holdout_um)
-        )
+        if holdout_um is not None:
+            step = replace(step, holdout_rmse_um=holdout_um)
+        return replace(self, fit=fit, history=(*self.history, step))
+
+    def accepting(
+        self, members: tuple[str, ...], probability: float, before: Step
+    ) -> 'DiagnosisState':
+        """The state with a class accepted, see ``described``."""
+        found = self.described(members, probability, before)
+        return replace(self, accepted=(*self.accepted, found))
 
     def described(
         self,
@@ -243,7 +264,7 @@ class DiagnosisState:
             p_value,
             tuple(c.best for c in self.accepted),
             (*self.accepted, *others),
-            tuple(self.history),
+            self.history,
             unknown,
             tuple(name for name in not_testable if name not in listed),
             detectable,

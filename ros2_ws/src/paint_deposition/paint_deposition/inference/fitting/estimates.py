@@ -114,7 +114,7 @@ def _around_phase(values: np.ndarray, centre: np.ndarray, pattern: PatternVector
     """The phases, which run in a circle, at most half a turn from their centres."""
     away = values - centre
     phases = slice(PHASE, len(pattern.names), len(PATTERN_NAMES))
-    away[..., phases] = np.discrepancy(away[..., phases] + np.pi, 2.0 * np.pi) - np.pi
+    away[..., phases] = np.remainder(away[..., phases] + np.pi, 2.0 * np.pi) - np.pi
     return away
 
 
