@@ -40,8 +40,8 @@ FOOTPRINTS, SIDES = (0.02, 0.06, 0.2), 0.02
 # the film is a twentieth.
 SETTINGS, USUAL_SETTING = (0.006, 0.02, 0.06), (0.02, 2.0)
 PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
-# Most by which usual sprays differ.
-MOST_USUAL = 0.03
+# Most by which the film of usual sprays differs, as a standard deviation.
+MOST_USUAL = 0.02
 # A setting that differs by this share of its thickest film: no nature does, something unknown.
 BEYOND_NATURE = 0.15
 # Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the

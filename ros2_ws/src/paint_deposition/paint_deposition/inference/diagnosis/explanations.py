@@ -132,7 +132,8 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
-OTHER_ERROR = 0.3
+# The same over all other conditions, and of a law of another form over its own covariates.
+OTHER_ERROR, OTHER_LAW = 0.3, 1.5
 # The size of an effect is what it changes at this share of the points at the most.
 LARGEST = 0.95
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
@@ -267,24 +268,56 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
-    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model, True)]
+    off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
+    off += list(_off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False))
     return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
 
 
-def _laws_off(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel, anywhere: bool = False
-) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
-    """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
-    covariates = {
+def other_laws(study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel) -> np.ndarray:
+    """(P, n) directions over the noise of laws of another form, acting where these act."""
+    off = _off_anywhere(study, fit, kept, model, OTHER_LAW, own=True)
+    return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
+
+
+def _off_anywhere(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel, size: float, own: bool
+) -> Iterator[np.ndarray]:
+    """(P, n) what laws may be off by, relative to their change of the film [um].
+
+    Over the covariates that are the effect's own, or over all others.
+    """
+    covariates = _standardised(study, model)
+    for effect, change in _changes(study, fit, kept):
+        over = [name for name in covariates if (name in effect.covariates) == own]
+        for name in over:
+            root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
+            yield size / np.sqrt(len(over)) * change[:, np.newaxis] * root
+
+
+def _standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
+    """(P,) covariates that vary, in their standard deviations from the mean."""
+    return {
         c.name: (c.values - c.values.mean()) / c.values.std()
         for c in study.covariates(model)
         if c.varies
     }
+
+
+def _changes(study: Study, fit: Fit, kept: frozenset[str]) -> Iterator[tuple[Effect, np.ndarray]]:
+    """Effects whose law may be off, with the change of the readings (P,) by each [um]."""
     film = study.forward.predict_um(fit.model)
     for effect in (e for e in fit.model.effects if e.id in kept and not e.exact):
         others = tuple(e for e in fit.model.effects if e.id != effect.id)
         without = fit.model.model_copy(update={'effects': others})
-        change = film - study.forward.predict_um(without)
+        yield effect, film - study.forward.predict_um(without)
+
+
+def _laws_off(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
+    """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
+    covariates, film = _standardised(study, model), study.forward.predict_um(fit.model)
+    for effect, change in _changes(study, fit, kept):
         own = [name for name in effect.covariates if name in covariates]
         scale = LAW_ERROR / np.sqrt(max(len(own), 1))
         for name in own:
@@ -297,14 +330,6 @@ def _laws_off(
             else:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None
-        elsewhere = [name for name in covariates if name not in own] if anywhere else []
-        for name in elsewhere:
-            root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
-            yield (
-                effect,
-                OTHER_ERROR / np.sqrt(len(elsewhere)) * change[:, np.newaxis] * root,
-                None,
-            )
 
 
 def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:

@@ -18,7 +18,12 @@ from paint_deposition.inference.diagnosis.discrepancy import (
     DiscrepancyHyperparameters,
     ModelDiscrepancy,
 )
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, law_errors, of_effects
+from paint_deposition.inference.diagnosis.explanations import (
+    UNKNOWN,
+    law_errors,
+    of_effects,
+    other_laws,
+)
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
@@ -40,8 +45,8 @@ from paint_deposition.inference.fitting.least_squares import Fit
 # So many proposals are refitted each time.
 TRIALS = 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
-# times as far, and the prior share of each.
-LAWS_OFF = ((1.0, 0.7), (3.0, 0.3))
+# times as far, and the prior share of each; and the share of a law of another form.
+LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 
 
 @dataclass(frozen=True)
@@ -76,10 +81,15 @@ class EffectSet:
     def weighed(self) -> list[WeightedNull]:
         """The model as the null hypothesis, its laws being off, with each size of discrepancy."""
         study, freedom = self.state.study, self.state.freedom
-        errors = law_errors(study, self.fit, self.names, self.usual.model)
+        laws = study, self.fit, self.names, self.usual.model
+        errors = law_errors(*laws)
+        variants = [(errors, 1.0)]
+        if errors.any():
+            variants = [(times * errors, share) for times, share in LAWS_OFF]
+            variants.append((other_laws(*laws), ANOTHER_FORM))
         found = []
-        for times, share in LAWS_OFF if errors.any() else ((1.0, 1.0),):
-            null = NullModel.around(self.fit, np.hstack([study.nuisance, times * errors]))
+        for columns, share in variants:
+            null = NullModel.around(self.fit, np.hstack([study.nuisance, columns]))
             found += [
                 WeightedNull.of(null, self.discrepancy, sizes, freedom, share)
                 for sizes in self.sizes
