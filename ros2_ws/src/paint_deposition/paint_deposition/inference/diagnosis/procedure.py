@@ -47,7 +47,7 @@ ALPHA = 0.05
 WORTH_LISTING, NAMED = 0.05, 3
 # Errors this many times as large as the noise of gauge and texture need a word.
 BEYOND_NOISE = 1.3
-# The model is not good enough where it misses the readings, beyond gauge and texture, by this share
+# The model is not good enough where it misses the readings, beyond gauge and texture, by this part
 # of the thickest film: measured sprays of one setting differ by 0.5 to 2 %.
 MOST_BEYOND = 0.03
 # Share by which a learned curve must lower the error on readings left out.
