@@ -1,0 +1,295 @@
+"""Data that are simply wrong: of the other hand, of another spray, in another unit.
+
+Each way in which readings may have been meant is fitted like the readings as given, and the two
+likelihoods are compared, as they are for typing errors. Both allow for what the model may lack:
+smooth fields of every size, see ``outliers``. The readings as given may also be displaced by any
+effect of the library, as a draught is no mirrored part. What is symmetric cannot tell.
+"""
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+from scipy.special import logsumexp
+
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ReadingsError
+from paint_deposition.inference.fitting.forward import LAWS
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.outliers import FittedPoints
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.part.orientation import across_axis, downhill_axis
+from paint_deposition.part.points import box_centre_m
+
+# Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind,
+# and the logarithm of the odds from which on there is one.
+PRIOR_PROBABILITY, SURE = 0.01, 5.0
+# Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
+WORTH_WEIGHING = 6.0
+# Film [um] and K1 [cm3/s] of the trade: medians, and standard deviations of the logarithms, where
+# a target or a model was given as well. Further off than so many of these a fit has gone astray.
+FILM_UM, FILM_SPREAD, TARGET_SPREAD = 35.0, 0.7, 0.35
+# 50 to 800 ml/min, 15 to 60 % of it solids, of which 60 to 90 % arrive.
+K1_CM3_PER_S, K1_SPREAD, GIVEN_SPREAD, ASTRAY = 1.0, 0.65, 0.5, 5.0
+# Readings over what was meant, in words, and what to do.
+FACTORS = {
+    10.0: ('ten times too large', 'divide them by 10'),
+    0.1: ('ten times too small', 'multiply them by 10'),
+    25.4: ('like µm that were taken for mils', 'say unit: {thickness: um} in the campaign'),
+    1.0 / 25.4: ('like mils taken for µm', 'say unit: {thickness: mil} in the campaign'),
+    1000.0: ('like µm that were taken for mm', 'say unit: {thickness: um} in the campaign'),
+    1e-3: ('like mm taken for µm', 'say unit: {thickness: mm} in the campaign'),
+}
+# One part is in another unit than the others if the model is off on it by this factor.
+FAR_OFF = 2.5
+# What mirrors across and down make of a part.
+MIRRORED = {
+    'mirrored left to right': (1, 0),
+    'mirrored top to bottom': (0, 1),
+    'turned by half a turn': (1, 1),
+}
+# Families of effects that displace the film.
+DISPLACING = ('lateral shift', 'order', 'time')
+
+
+@dataclass(frozen=True)
+class Mistake:
+    """Data that are wrong beyond doubt."""
+
+    sentence: str  # with the remedy
+    stops: bool  # whether nothing can be concluded from the data
+
+
+@dataclass(frozen=True)
+class Meant:
+    """A way in which the readings of a campaign may have been meant."""
+
+    kind: str
+    finding: str  # what is wrong with those given
+    remedy: str
+    campaign: Campaign
+    log_scale: float = 0.0  # sum over the points of the logarithm of given over meant film
+    of_this_gun: bool = True  # whether the given model is
+
+
+@dataclass(frozen=True)
+class Weighed:
+    """Readings as given or as meant, with the model fitted to them."""
+
+    study: Study
+    fit: Fit
+    given: DepositionModel | None  # the model of this gun, None where none is known
+    log_scale: float = 0.0  # as ``Meant``
+
+    def meant(self, way: Meant) -> 'Weighed':
+        """The readings as meant, fitted from the model at hand."""
+        fit, like = self.fit, self.study
+        study = replace(Study.of(way.campaign, like.forward.effects), texture=like.texture)
+        if like.facet_um is not None:
+            study = study.with_facets(fit.model)
+        known = fit.parameters.known if way.of_this_gun else None
+        free = FreeParameters.of(fit.model, *fit.model.effects, known=known)
+        given = self.given if way.of_this_gun else None
+        log_scale = self.log_scale + way.log_scale
+        return Weighed(study, study.fit(free, nuisance=study.nuisance), given, log_scale)
+
+    @property
+    def displaced(self) -> 'Weighed':
+        """The same readings, fitted with all effects that displace the film."""
+        fit, own = self.fit, self.fit.model.effects
+        effects = (
+            effect()
+            for key, effect in EFFECTS.items()
+            if effect.family in DISPLACING and not effect.acts(*LAWS) and not fit.model.effect(key)
+        )
+        free = FreeParameters.of(fit.model, *own, *effects, known=fit.parameters.known)
+        return replace(self, fit=self.study.fit(free, nuisance=self.study.nuisance))
+
+    @property
+    def log_weight(self) -> float:
+        """Logarithm of the likelihood, whatever smooth field the model lacks."""
+        fit = self.fit
+        # The model is linear around the fit, and its prior is not centred there.
+        off = fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
+        misfit = replace(fitted_points(self.study, fit), residual_um=off * self.study.sigma_um)
+        weights = misfit.leave_one_out.log_weight
+        return float(logsumexp(weights)) - self.log_scale + self.log_size()
+
+    @property
+    def rough_log_weight(self) -> float:
+        """The same if the model lacks nothing, up to a constant."""
+        spread = float(np.log(self.study.sigma_um).sum())
+        return -0.5 * self.fit.objective - spread - self.log_scale + self.log_size()
+
+    def log_size(self, factor: float = 1.0) -> float:
+        """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
+        target_um, given = self.study.campaign.target_um, self.given
+        usual, spread = (target_um, TARGET_SPREAD) if target_um else (FILM_UM, FILM_SPREAD)
+        film = abs(np.log(self.study.measured_um.mean() / factor / usual)) / spread
+        usual, spread = (_k1(given), GIVEN_SPREAD) if given else (K1_CM3_PER_S, K1_SPREAD)
+        k1 = min(abs(np.log(_k1(self.fit.model) / factor / usual)) / spread, ASTRAY)
+        return -0.5 * (film**2 + k1**2) - float(np.log(spread))
+
+
+def _k1(model: DepositionModel) -> float:
+    """Geometric mean of the K1 of all brushes [cm3/s]."""
+    return float(np.exp(np.mean([np.log(p.K1_cm3_per_s) for p in model.patterns])))
+
+
+def fitted_points(study: Study, fit: Fit) -> FittedPoints:
+    """The points of a study beside a fit; pattern and nuisance are free around it."""
+    free = np.hstack([fit.jacobian @ fit.parameters.prior.factor, study.nuisance])
+    return FittedPoints(
+        fit.residual * study.sigma_um, fit.predicted_um, study.gauge_um,
+        free * study.sigma_um[:, np.newaxis], study.campaign.experiment_of,
+        study.campaign.positions_m, tuple(study.covariates(fit.model)),
+    )  # fmt: skip
+
+
+def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mistake, ...]:
+    """What is simply wrong with the data, the most certain first.
+
+    Args:
+        fit: of the start's parameters to the readings as given.
+        start: the model as given, or that of the 50 mm bell.
+    """
+    is_given = any(pattern != PlanarPattern() for pattern in start.patterns)
+    as_given = Weighed(study, fit, start if is_given else None)
+    found: list[Mistake] = []
+    while len(found) <= len(study.campaign.experiments):
+        ways = list(_ways_meant(as_given))
+        count = Counter(way.kind for way in ways)
+        rough = as_given.rough_log_weight + WORTH_WEIGHING
+        worth = [
+            (np.log(PRIOR_PROBABILITY / count[way.kind]) + meant.log_weight, way, meant)
+            for way, meant in ((way, as_given.meant(way)) for way in ways)
+            if meant.rough_log_weight > rough
+        ]
+        if not worth:
+            break
+        log_weight, way, meant = max(worth, key=lambda one: one[0])
+        least = log_weight - SURE
+        if as_given.log_weight > least:
+            break
+        displaces = way.kind in ('mirrored', 'exchanged')
+        if displaces and as_given.displaced.log_weight > least:
+            break
+        found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
+        as_given = meant
+    return tuple(found)
+
+
+def _sentence(way: Meant, given: Weighed, meant: Weighed) -> str:
+    if way.kind in ('mirrored', 'exchanged'):
+        off = (one.study.residuals(one.fit.predicted_um).rmse_um for one in (given, meant))
+        why = 'a model is off them by {:.3g} µm, and by {:.3g} µm if it is so'.format(*off)
+    elif way.of_this_gun:
+        film = (f'{one.study.measured_um.mean():.3g} µm' for one in (given, meant))
+        k1 = (f'{_k1(one.fit.model):.3g} cm³/s' for one in (given, meant))
+        why = 'they mean a film of {} and K1 = {}, else {} and {}'.format(
+            *(each for pair in zip(film, k1, strict=True) for each in pair)
+        )
+    else:
+        ratio = _k1(given.fit.model) / _k1(given.given or given.fit.model)
+        why = f'the readings say {ratio:.2g} times its K1'
+    return f'{way.finding}: {why}; {way.remedy}'
+
+
+def _ways_meant(given: Weighed) -> Iterator[Meant]:
+    """All ways that the geometry of the parts and the size of the film allow."""
+    campaign = given.study.campaign
+    parts = campaign.experiments
+    every = tuple(range(len(parts)))
+    for some in {every, *((k,) for k in every)}:
+        yield from _mirrored(campaign, some)
+        yield from _in_another_unit(given, some)
+    for one, other in combinations(parts, 2):
+        with suppress(ReadingsError):
+            changed = {
+                one.name: one.with_readings(other.readings),
+                other.name: other.with_readings(one.readings),
+            }
+            yield Meant(
+                'exchanged',
+                f'the readings of {one.name} and {other.name} look exchanged',
+                f'pair them the other way round in the campaign ({other.readings.source} with '
+                f'{one.name})',
+                _with_parts(campaign, changed),
+            )
+    if given.given:
+        yield Meant(
+            'gun',
+            "the model looks like another gun's, or like one for another flow",
+            'give the model of this gun, or calibrate it',
+            campaign,
+            of_this_gun=False,
+        )
+
+
+def _with_parts(campaign: Campaign, changed: Mapping[str, Experiment]) -> Campaign:
+    parts = tuple(changed.get(part.name, part) for part in campaign.experiments)
+    return replace(campaign, experiments=parts)
+
+
+def _named(campaign: Campaign, some: Sequence[int]) -> str:
+    every = len(some) == len(campaign.experiments)
+    return 'the readings' if every else f'the readings of {campaign.experiments[some[0]].name}'
+
+
+def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
+    """The readings of some parts mirrored about the middle of each, if they lie on it then."""
+    for finding, (across, down) in MIRRORED.items():
+        changed: dict[str, Experiment] = {}
+        for part in (campaign.experiments[k] for k in some):
+            surface = part.surface
+            axes = across * [across_axis(surface.outward, surface.down)]
+            axes += down * [downhill_axis(surface.outward, surface.down)]
+            mirror = np.eye(3) - 2.0 * sum(np.outer(axis, axis) for axis in axes)
+            centre_m = box_centre_m(surface.vertices_m)
+            places_m = centre_m + (part.readings.positions_m - centre_m) @ mirror
+            readings = replace(part.readings, positions_m=places_m, normals=None)
+            with suppress(ReadingsError):
+                changed[part.name] = part.with_readings(readings)
+        if len(changed) == len(some):
+            named = f'{_named(campaign, some)} look {finding}'
+            remedy = (
+                'take the positions or the mesh of the hand that was measured: these fit the '
+                f'other one, about the middle of the part at {_place(centre_m)}'
+            )
+            yield Meant('mirrored', named, remedy, _with_parts(campaign, changed))
+
+
+def _place(place_m: np.ndarray) -> str:
+    return '({:.3f}, {:.3f}, {:.3f}) m'.format(*(place_m + 0.0))
+
+
+def _in_another_unit(given: Weighed, some: Sequence[int]) -> Iterator[Meant]:
+    """The readings of some parts in other units, as far as they are odd as they are."""
+    study, campaign = given.study, given.study.campaign
+    own = np.isin(campaign.experiment_of, some)
+    over = np.sum(study.measured_um[own]) / np.sum(given.fit.predicted_um[own])
+    if not own.all() and abs(np.log(over)) < np.log(FAR_OFF):
+        return
+    for factor, (words, remedy) in FACTORS.items():
+        if own.all() and given.log_size(factor) - given.log_size() < WORTH_WEIGHING:
+            continue
+        changed: dict[str, Experiment] = {}
+        for part in (campaign.experiments[k] for k in some):
+            film = part.readings
+            scaled = replace(film, thickness_um=film.thickness_um / factor,
+                             sigma_um=film.sigma_um / factor)  # fmt: skip
+            changed[part.name] = part.with_readings(scaled)
+        yield Meant(
+            'unit',
+            f'{_named(campaign, some)} look {words}',
+            remedy,
+            _with_parts(campaign, changed),
+            float(np.log(factor)) * np.count_nonzero(own),
+        )
