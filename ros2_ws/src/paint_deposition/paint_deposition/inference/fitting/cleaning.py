@@ -5,8 +5,6 @@ Comparison, diagnosis and calibration all take their readings from here.
 
 from dataclasses import replace
 
-import numpy as np
-
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.condensing import MANY, condensed, thinned
@@ -52,8 +50,18 @@ def clean_and_fit(
         campaign, start, starts = condensed(campaign, rough.model), rough.model, 1
     study = Study.of(campaign, effects)
     fit = _fitted(study, start, starts, seed, known)
-    if len(study) < FEWEST_POINTS or not fit.predicted_um.any():
+    if not fit.predicted_um.any():
         return study, fit
+    if len(study) >= FEWEST_POINTS:
+        study, fit = _cleaned(study, fit, start, starts, seed, known)
+    return replace(study, mistakes=find_mistakes(study, fit, start)), fit
+
+
+def _cleaned(
+    study: Study, fit: Fit, start: DepositionModel, starts: int, seed: int,
+    known: Posterior | None,
+) -> tuple[Study, Fit]:  # fmt: skip
+    """The same without outliers, with the film's texture and what facets cost."""
     misfit = fitted_points(study, fit)
     if found := _outliers(study, fit, misfit):
         study = study.without(found)

@@ -22,22 +22,23 @@ from paint_deposition.inference.fitting.forward import LAWS
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.outliers import FittedPoints
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.fitting.study import Mistake, Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.plausibility import check_unit
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import box_centre_m
 
 # Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind,
-# and the logarithm of the odds from which on there is one.
-PRIOR_PROBABILITY, SURE = 0.01, 5.0
+# the logarithm of the odds from which on there is one, and of odds that are no difference.
+PRIOR_PROBABILITY, SURE, ALIKE = 0.01, 3.0, 2.0
 # Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
 WORTH_WEIGHING = 6.0
 # Film [um] and K1 [cm3/s] of the trade: medians, and standard deviations of the logarithms, where
 # a target or a model was given as well. Further off than so many of these a fit has gone astray.
 FILM_UM, FILM_SPREAD, TARGET_SPREAD = 35.0, 0.7, 0.35
 # 50 to 800 ml/min, 15 to 60 % of it solids, of which 60 to 90 % arrive.
-K1_CM3_PER_S, K1_SPREAD, GIVEN_SPREAD, ASTRAY = 1.0, 0.65, 0.5, 5.0
+K1_CM3_PER_S, K1_SPREAD, GIVEN_SPREAD, ASTRAY = 1.0, 0.65, 0.4, 5.0
 # Readings over what was meant, in words, and what to do.
 FACTORS = {
     10.0: ('ten times too large', 'divide them by 10'),
@@ -47,7 +48,7 @@ FACTORS = {
     1000.0: ('like µm that were taken for mm', 'say unit: {thickness: um} in the campaign'),
     1e-3: ('like mm taken for µm', 'say unit: {thickness: mm} in the campaign'),
 }
-# One part is in another unit than the others if the model is off on it by this factor.
+# One part is in another unit than the others only if the model is off on them by such factors.
 FAR_OFF = 2.5
 # What mirrors across and down make of a part.
 MIRRORED = {
@@ -57,14 +58,6 @@ MIRRORED = {
 }
 # Families of effects that displace the film.
 DISPLACING = ('lateral shift', 'order', 'time')
-
-
-@dataclass(frozen=True)
-class Mistake:
-    """Data that are wrong beyond doubt."""
-
-    sentence: str  # with the remedy
-    stops: bool  # whether nothing can be concluded from the data
 
 
 @dataclass(frozen=True)
@@ -166,20 +159,24 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
     while len(found) <= len(study.campaign.experiments):
         ways = list(_ways_meant(as_given))
         count = Counter(way.kind for way in ways)
-        rough = as_given.rough_log_weight + WORTH_WEIGHING
+        # Where the model is off anyway, a rough likelihood is worth so much less.
+        fit = as_given.fit
+        least = WORTH_WEIGHING * max(fit.objective / len(fit.residual), 1.0)
+        least += as_given.rough_log_weight
         worth = [
             (np.log(PRIOR_PROBABILITY / count[way.kind]) + meant.log_weight, way, meant)
             for way, meant in ((way, as_given.meant(way)) for way in ways)
-            if meant.rough_log_weight > rough
+            if meant.rough_log_weight > least
         ]
         if not worth:
             break
-        log_weight, way, meant = max(worth, key=lambda one: one[0])
-        least = log_weight - SURE
-        if as_given.log_weight > least:
+        best = max(log_weight for log_weight, *_ in worth)
+        # Of those that are alike, as on a part that is symmetric one way, the simplest.
+        _, way, meant = next(one for one in worth if one[0] > best - ALIKE)
+        if as_given.log_weight > best - SURE:
             break
         displaces = way.kind in ('mirrored', 'exchanged')
-        if displaces and as_given.displaced.log_weight > least:
+        if displaces and as_given.displaced.log_weight > best - SURE:
             break
         found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
         as_given = meant
@@ -207,7 +204,7 @@ def _ways_meant(given: Weighed) -> Iterator[Meant]:
     campaign = given.study.campaign
     parts = campaign.experiments
     every = tuple(range(len(parts)))
-    for some in {every, *((k,) for k in every)}:
+    for some in dict.fromkeys([every, *((k,) for k in every)]):
         yield from _mirrored(campaign, some)
         yield from _in_another_unit(given, some)
     for one, other in combinations(parts, 2):
@@ -274,8 +271,9 @@ def _in_another_unit(given: Weighed, some: Sequence[int]) -> Iterator[Meant]:
     """The readings of some parts in other units, as far as they are odd as they are."""
     study, campaign = given.study, given.study.campaign
     own = np.isin(campaign.experiment_of, some)
-    over = np.sum(study.measured_um[own]) / np.sum(given.fit.predicted_um[own])
-    if not own.all() and abs(np.log(over)) < np.log(FAR_OFF):
+    weights = np.bincount(campaign.experiment_of, study.measured_um)
+    over = weights / np.bincount(campaign.experiment_of, given.fit.predicted_um)
+    if not own.all() and np.ptp(np.log(over)) < np.log(FAR_OFF):
         return
     for factor, (words, remedy) in FACTORS.items():
         if own.all() and given.log_size(factor) - given.log_size() < WORTH_WEIGHING:
@@ -285,11 +283,10 @@ def _in_another_unit(given: Weighed, some: Sequence[int]) -> Iterator[Meant]:
             film = part.readings
             scaled = replace(film, thickness_um=film.thickness_um / factor,
                              sigma_um=film.sigma_um / factor)  # fmt: skip
-            changed[part.name] = part.with_readings(scaled)
-        yield Meant(
-            'unit',
-            f'{_named(campaign, some)} look {words}',
-            remedy,
-            _with_parts(campaign, changed),
-            float(np.log(factor)) * np.count_nonzero(own),
-        )
+            with suppress(ReadingsError):
+                check_unit(scaled)
+                changed[part.name] = part.with_readings(scaled)
+        if len(changed) == len(some):
+            log_scale = float(np.log(factor)) * np.count_nonzero(own)
+            named = f'{_named(campaign, some)} look {words}'
+            yield Meant('unit', named, remedy, _with_parts(campaign, changed), log_scale)

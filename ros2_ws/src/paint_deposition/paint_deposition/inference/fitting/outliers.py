@@ -238,11 +238,11 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expecte
         wild = np.where(single[kept], prior + wild, -np.inf)
         log_odds = wild - leave_one_out.log_density
         worst = int(np.argmax(log_odds))
-        out: dict[int, Expected] = {}
-        if pair := _swapped(left, wild, log_odds):
-            other = left.with_swapped(*pair).leave_one_out
-            out = {a: (*other.predicted(a), int(kept[b])) for a, b in (pair, pair[::-1])}
-        elif expit(log_odds[worst]) >= LEAST_PROBABILITY:
+        out: dict[int, Expected] = {
+            row: (*expected, int(kept[other]))
+            for row, (expected, other) in _swapped(left, wild, log_odds).items()
+        }
+        if not out and expit(log_odds[worst]) >= LEAST_PROBABILITY:
             out = {worst: (*leave_one_out.predicted(worst), None)}
         if not out:
             return found
@@ -255,26 +255,34 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expecte
 
 def _swapped(
     misfit: FittedPoints, wild: np.ndarray, log_odds: np.ndarray
-) -> tuple[int, int] | None:
-    """The rows of two readings of a part that more probably stand in each other's place.
+) -> dict[int, tuple[tuple[float, float], int]]:
+    """Two rows of a part whose readings more probably stand in each other's place, or none.
 
     Args:
         wild: (P,) logarithm of prior and density of each as an outlier.
         log_odds: (P,) that each is one.
+
+    Returns:
+        Of each what the others predict, as ``LeaveOneOut.predicted``, and the other row.
     """
     gain, i, j = _best_swap(misfit)
     if gain < WORTH_SWAPPING:
-        return None
+        return {}
+    swapped = misfit.with_swapped(i, j)
+    after = swapped.leave_one_out
+    found = {i: (after.predicted(i), j), j: (after.predicted(j), i)}
+    for row, ((mean, sigma), _) in found.items():
+        if abs(swapped.residual_um[row] - mean) > GUESS_SIGMAS * sigma:
+            return {}
     pairs = 0.5 * len(wild) * (len(wild) - 1)
     likelihood = logsumexp(misfit.leave_one_out.log_weight)
-    swapped = logsumexp(misfit.with_swapped(i, j).leave_one_out.log_weight) - likelihood
     others = misfit.select(np.delete(np.arange(len(wild)), [i, j])).leave_one_out.log_weight
     both_out = wild[i] + wild[j] + np.log(2.0 * np.pi) + logsumexp(others) - likelihood
-    as_swapped = np.log(PRIOR_SWAP / pairs) + swapped
+    as_swapped = np.log(PRIOR_SWAP / pairs) + logsumexp(after.log_weight) - likelihood
     slips = log_odds[i], log_odds[j], both_out
     # Whatever is wrong with the two, both are left out; what is most probable is said.
     sure = expit(logsumexp([as_swapped, *slips])) >= LEAST_PROBABILITY
-    return (i, j) if sure and as_swapped > max(slips) else None
+    return found if sure and as_swapped > max(slips) else {}
 
 
 def _best_swap(misfit: FittedPoints) -> tuple[float, int, int]:
