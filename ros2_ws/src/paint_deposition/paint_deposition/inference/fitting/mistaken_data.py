@@ -29,9 +29,13 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import box_centre_m
 
-# Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind,
-# the logarithm of the odds from which on there is one, and of odds that are no difference.
-PRIOR_PROBABILITY, SURE, ALIKE = 0.01, 3.0, 2.0
+# Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind.
+PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}
+# Logarithm of the odds from which on there is one, and of odds that are no difference.
+SURE, ALIKE = 4.0, 2.0
+# Readings in the right place leave no more than this share of what was off beyond the noise: an
+# effect that is missing is not put right by chance as far as that.
+LEFT = 0.25
 # Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
 WORTH_WEIGHING = 6.0
 # Film [um] and K1 [cm3/s] of the trade: medians, and standard deviations of the logarithms, where
@@ -56,6 +60,8 @@ MIRRORED = {
     'mirrored top to bottom': (0, 1),
     'turned by half a turn': (1, 1),
 }
+# Kinds of mistakes by which readings are taken for those of other places.
+PLACES = ('mirrored', 'exchanged')
 # Families of effects that displace the film.
 DISPLACING = ('lateral shift', 'order', 'time')
 
@@ -121,6 +127,11 @@ class Weighed:
         spread = float(np.log(self.study.sigma_um).sum())
         return -0.5 * self.fit.objective - spread - self.log_scale + self.log_size()
 
+    @property
+    def excess(self) -> float:
+        """Mean square of what is off beyond the noise, over that of the noise."""
+        return self.fit.objective / len(self.study) - 1.0
+
     def log_size(self, factor: float = 1.0) -> float:
         """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
         target_um, given = self.study.campaign.target_um, self.given
@@ -160,13 +171,13 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
         ways = list(_ways_meant(as_given))
         count = Counter(way.kind for way in ways)
         # Where the model is off anyway, a rough likelihood is worth so much less.
-        fit = as_given.fit
-        least = WORTH_WEIGHING * max(fit.objective / len(fit.residual), 1.0)
+        least = WORTH_WEIGHING * max(1.0 + as_given.excess, 1.0)
         least += as_given.rough_log_weight
         worth = [
-            (np.log(PRIOR_PROBABILITY / count[way.kind]) + meant.log_weight, way, meant)
+            (np.log(PRIOR_PROBABILITY[way.kind] / count[way.kind]) + meant.log_weight, way, meant)
             for way, meant in ((way, as_given.meant(way)) for way in ways)
             if meant.rough_log_weight > least
+            and (way.kind not in PLACES or meant.excess < LEFT * as_given.excess)
         ]
         if not worth:
             break
@@ -175,8 +186,7 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
         _, way, meant = next(one for one in worth if one[0] > best - ALIKE)
         if as_given.log_weight > best - SURE:
             break
-        displaces = way.kind in ('mirrored', 'exchanged')
-        if displaces and as_given.displaced.log_weight > best - SURE:
+        if way.kind in PLACES and as_given.displaced.log_weight > best - SURE:
             break
         found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
         as_given = meant
@@ -184,7 +194,7 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
 
 
 def _sentence(way: Meant, given: Weighed, meant: Weighed) -> str:
-    if way.kind in ('mirrored', 'exchanged'):
+    if way.kind in PLACES:
         off = (one.study.residuals(one.fit.predicted_um).rmse_um for one in (given, meant))
         why = 'a model is off them by {:.3g} µm, and by {:.3g} µm if it is so'.format(*off)
     elif way.of_this_gun:
