@@ -1,17 +1,22 @@
 """Data that are simply wrong are told from effects that the model lacks."""
 
+import json
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 
-from inference.fitting.panels import gauged
+from cli.command import paint
+from inference.fitting.panels import OUTLINE_M, gauged, passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
+from worlds.record import Part
 
 MODEL = DepositionModel()
 GIVEN = MODEL.with_patterns([MODEL.planar.model_copy(update={'K1_cm3_per_s': 1.8})])
@@ -39,6 +44,33 @@ def mirrored(part: Experiment, axis: int, about_m: float) -> Readings:
 
 def scaled(part: Experiment, factor: float) -> Readings:
     return replace(part.readings, thickness_um=factor * part.readings.thickness_um)
+
+
+def swapped(part: Experiment) -> tuple[Readings, set[str]]:
+    """The thinnest and the thickest point in each other's place, and their labels."""
+    film = part.readings.thickness_um.copy()
+    ends = int(np.argmin(part.means.mean_um)), int(np.argmax(part.means.mean_um))
+    low, high = (part.means.owner == k for k in ends)
+    film[low], film[high] = film[high], film[low]
+    return replace(part.readings, thickness_um=film), {f'P{k}' for k in ends}
+
+
+def written(campaign: Campaign, folder: Path, **more: object) -> Path:
+    """The panels as files."""
+    entries = []
+    none = np.empty((0, 3))
+    for part, heights_m in zip(campaign.experiments, ORDERS, strict=True):
+        motion, own = passes(heights_m, samples=80), part.readings
+        name = part.name.replace(' ', '_')
+        faces = np.array([[0, 2, 1], [0, 3, 2]])
+        entries.append(Part(
+            name, OUTLINE_M, faces, motion.stamps_ns, motion.positions_m,
+            motion.quaternions_xyzw, motion.trigger_stamps_ns, motion.trigger_flow > 0.0,
+            own.positions_m, own.point, own.thickness_um, None, none, none[:, 0], none[:, 0],
+        ).write(folder))  # fmt: skip
+    file = folder / 'campaign.yaml'
+    file.write_text(yaml.safe_dump({'experiments': entries} | more))
+    return file
 
 
 @pytest.fixture(scope='module')
@@ -120,14 +152,52 @@ def test_a_model_of_another_gun_is_named_and_does_not_stop(panels):
 
 
 def test_swapped_readings_are_named_once_and_left_out(panels):
-    part, _ = panels.experiments
-    film = part.readings.thickness_um.copy()
-    low, high = int(np.argmin(part.means.mean_um)), int(np.argmax(part.means.mean_um))
-    rows = [part.means.owner == k for k in (low, high)]
-    film[rows[0]], film[rows[1]] = film[rows[1]], film[rows[0]]
-    bad = with_readings(panels, replace(part.readings, thickness_um=film))
-    study, _ = clean_and_fit(bad, MODEL, starts=1)
-    assert {one.point for one in study.outliers} == {f'panel 1: P{k}' for k in (low, high)}
+    bad, labels = swapped(panels.experiments[0])
+    study, _ = clean_and_fit(with_readings(panels, bad), MODEL, starts=1)
+    assert {one.point for one in study.outliers} == {f'panel 1: {label}' for label in labels}
     (line,) = study.left_out
     assert 'look swapped' in line
-    assert f"'panel 1: P{min(low, high)}' and 'panel 1: P{max(low, high)}'" in line
+    assert all(f"'panel 1: {label}'" in line for label in labels)
+
+
+def test_compare_warns_of_mirrored_and_names_swapped_readings(panels, tmp_path):
+    first, second = panels.experiments
+    bad, labels = swapped(first)
+    file = written(with_readings(panels, bad, mirrored(second, 2, 1.0)), tmp_path)
+    done = paint('compare', file, '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    assert '\nwarning: the readings of panel_2 look mirrored top to bottom: ' in done.stderr
+    found = json.loads((tmp_path / 'out/comparison.json').read_text())
+    assert {one['swapped_with'] for one in found['left_out']} == {f'panel_1: {p}' for p in labels}
+
+
+def test_diagnose_stops_at_exchanged_readings(panels, tmp_path):
+    first, second = (part.readings for part in panels.experiments)
+    file = written(with_readings(panels, second, first), tmp_path)
+    done = paint('diagnose', file, '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    found = json.loads((tmp_path / 'out/diagnosis.json').read_text())
+    assert found['verdict'] == 'fit_broken'
+    assert 'panel_1 and panel_2 look exchanged' in found['reason']
+    assert 'panel_2.csv with panel_1' in found['reason']
+    assert found['accepted'] == []
+
+
+def test_calibrate_warns_of_the_unit_and_of_targets_far_away(panels, tmp_path):
+    thick = panels.without(panels.readings.thickness_um < 3.0)
+    tenfold = with_readings(thick, *(scaled(part, 10.0) for part in thick.experiments))
+    zones = [
+        {'name': 'rim', 'target_um': 20, 'tolerance_um': 5, 'box': [[0.1, -1, 0], [0.3, 1, 2]]},
+        {'name': 'rest', 'target_um': 1, 'tolerance_um': 0.5, 'box': [[-1, -1, 0.5], [1, 1, 1]]},
+    ]
+    (tmp_path / 'zones.yaml').write_text(yaml.safe_dump({'zones': zones}))
+    file = written(tenfold, tmp_path, zones='zones.yaml')
+    done = paint('calibrate', file, '-o', tmp_path / 'out')
+    assert done.returncode == 0, done.stderr
+    first, second, *_ = done.stderr.partition('warning: the readings look ')[2].splitlines()
+    assert first.startswith('ten times too large: they mean a film of ')
+    assert first.endswith('; divide them by 10')
+    # Then all else that readings and targets are warned of.
+    assert second.startswith('warning: panel_1: no reading is ')
+    assert "panel_1: no reading is in zone 'rim' (20 µm), the nearest is 0.05" in done.stderr
+    assert "panel_1: no reading is near the 1 µm of zone 'rest'" in done.stderr

@@ -35,7 +35,7 @@ PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0
 SURE, ALIKE = 4.0, 2.0
 # Readings in the right place leave no more than this share of what was off beyond the noise: an
 # effect that is missing is not put right by chance as far as that.
-LEFT = 0.25
+LEFT, LARGE = 0.25, 10.0
 # Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
 WORTH_WEIGHING = 6.0
 # Film [um] and K1 [cm3/s] of the trade: medians, and standard deviations of the logarithms, where
@@ -84,7 +84,8 @@ class Weighed:
 
     study: Study
     fit: Fit
-    given: DepositionModel | None  # the model of this gun, None where none is known
+    start: DepositionModel  # of all fits
+    of_this_gun: bool  # whether the start is more than a first guess
     log_scale: float = 0.0  # as ``Meant``
 
     def meant(self, way: Meant) -> 'Weighed':
@@ -95,9 +96,10 @@ class Weighed:
             study = study.with_facets(fit.model)
         known = fit.parameters.known if way.of_this_gun else None
         free = FreeParameters.of(fit.model, *fit.model.effects, known=known)
-        given = self.given if way.of_this_gun else None
-        log_scale = self.log_scale + way.log_scale
-        return Weighed(study, study.fit(free, nuisance=study.nuisance), given, log_scale)
+        # From wrong readings a fit may have gone far astray.
+        fit = study.fit(free, nuisance=study.nuisance, others=[self.start])
+        of_this_gun = self.of_this_gun and way.of_this_gun
+        return Weighed(study, fit, self.start, of_this_gun, self.log_scale + way.log_scale)
 
     @property
     def displaced(self) -> 'Weighed':
@@ -129,15 +131,18 @@ class Weighed:
 
     @property
     def excess(self) -> float:
-        """Mean square of what is off beyond the noise, over that of the noise."""
-        return self.fit.objective / len(self.study) - 1.0
+        """Mean square over the noise of what is off beyond it, each reading by LARGE at most."""
+        found = self.study.residuals(self.fit.predicted_um)
+        return float(np.mean(np.minimum((found.residual_um / found.sigma_um) ** 2, LARGE**2))) - 1
 
     def log_size(self, factor: float = 1.0) -> float:
         """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
-        target_um, given = self.study.campaign.target_um, self.given
+        target_um = self.study.campaign.target_um
         usual, spread = (target_um, TARGET_SPREAD) if target_um else (FILM_UM, FILM_SPREAD)
         film = abs(np.log(self.study.measured_um.mean() / factor / usual)) / spread
-        usual, spread = (_k1(given), GIVEN_SPREAD) if given else (K1_CM3_PER_S, K1_SPREAD)
+        usual, spread = K1_CM3_PER_S, K1_SPREAD
+        if self.of_this_gun:
+            usual, spread = _k1(self.start), GIVEN_SPREAD
         k1 = min(abs(np.log(_k1(self.fit.model) / factor / usual)) / spread, ASTRAY)
         return -0.5 * (film**2 + k1**2) - float(np.log(spread))
 
@@ -165,7 +170,7 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
         start: the model as given, or that of the 50 mm bell.
     """
     is_given = any(pattern != PlanarPattern() for pattern in start.patterns)
-    as_given = Weighed(study, fit, start if is_given else None)
+    as_given = Weighed(study, fit, start, is_given)
     found: list[Mistake] = []
     while len(found) <= len(study.campaign.experiments):
         ways = list(_ways_meant(as_given))
@@ -204,7 +209,7 @@ def _sentence(way: Meant, given: Weighed, meant: Weighed) -> str:
             *(each for pair in zip(film, k1, strict=True) for each in pair)
         )
     else:
-        ratio = _k1(given.fit.model) / _k1(given.given or given.fit.model)
+        ratio = _k1(given.fit.model) / _k1(given.start)
         why = f'the readings say {ratio:.2g} times its K1'
     return f'{way.finding}: {why}; {way.remedy}'
 
@@ -230,7 +235,7 @@ def _ways_meant(given: Weighed) -> Iterator[Meant]:
                 f'{one.name})',
                 _with_parts(campaign, changed),
             )
-    if given.given:
+    if given.of_this_gun:
         yield Meant(
             'gun',
             "the model looks like another gun's, or like one for another flow",
