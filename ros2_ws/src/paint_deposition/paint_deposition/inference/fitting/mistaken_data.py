@@ -33,8 +33,9 @@ from paint_deposition.part.points import box_centre_m
 PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}
 # Logarithm of the odds from which on there is one, and of odds that are no difference.
 SURE, ALIKE = 4.0, 2.0
-# Readings in the right place leave no more than this share of what was off beyond the noise: an
-# effect that is missing is not put right by chance as far as that.
+# Readings in the right place leave no more than this share of what was off beyond the noise, each
+# counted as off by so many standard deviations at most: by chance no missing effect is put right
+# as far as that.
 LEFT, LARGE = 0.25, 10.0
 # Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
 WORTH_WEIGHING = 6.0
@@ -203,11 +204,11 @@ def _sentence(way: Meant, given: Weighed, meant: Weighed) -> str:
         off = (one.study.residuals(one.fit.predicted_um).rmse_um for one in (given, meant))
         why = 'a model is off them by {:.3g} µm, and by {:.3g} µm if it is so'.format(*off)
     elif way.of_this_gun:
-        film = (f'{one.study.measured_um.mean():.3g} µm' for one in (given, meant))
-        k1 = (f'{_k1(one.fit.model):.3g} cm³/s' for one in (given, meant))
-        why = 'they mean a film of {} and K1 = {}, else {} and {}'.format(
-            *(each for pair in zip(film, k1, strict=True) for each in pair)
+        sizes = (
+            f'{one.study.measured_um.mean():.3g} µm and K1 = {_k1(one.fit.model):.3g} cm³/s'
+            for one in (given, meant)
         )
+        why = 'they mean a film of {}, else of {}'.format(*sizes)
     else:
         ratio = _k1(given.fit.model) / _k1(given.start)
         why = f'the readings say {ratio:.2g} times its K1'
@@ -271,15 +272,12 @@ def _mirrored(campaign: Campaign, some: Sequence[int]) -> Iterator[Meant]:
                 changed[part.name] = part.with_readings(readings)
         if len(changed) == len(some):
             named = f'{_named(campaign, some)} look {finding}'
+            x, y, z = centre_m + 0.0
             remedy = (
                 'take the positions or the mesh of the hand that was measured: these fit the '
-                f'other one, about the middle of the part at {_place(centre_m)}'
+                f'other one, about the middle of the part at ({x:.3f}, {y:.3f}, {z:.3f}) m'
             )
             yield Meant('mirrored', named, remedy, _with_parts(campaign, changed))
-
-
-def _place(place_m: np.ndarray) -> str:
-    return '({:.3f}, {:.3f}, {:.3f}) m'.format(*(place_m + 0.0))
 
 
 def _in_another_unit(given: Weighed, some: Sequence[int]) -> Iterator[Meant]:
