@@ -54,7 +54,7 @@ def calibrate(
     model = model or _model_of(campaign)
     doubts = require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
     found = calibrated(campaign, model, seed, progress)
-    found = replace(found, warnings=(*doubts, *found.warnings))
+    found = replace(found, warnings=(*found.study.warnings, *doubts, *found.warnings))
     return replace(found, discrepancy=discrepancy_of(found.study, found.fit))
 
 
@@ -77,11 +77,12 @@ def compare(
     if model is not None:
         study, _ = clean_and_fit(campaign, model, model.effects)
         progress('comparing')
-        return replace(compared(study, model), warnings=doubts)
+        return replace(compared(study, model), warnings=(*study.warnings, *doubts))
     study, fit = clean_and_fit(campaign, bell, starts=STARTS)
     progress('comparing')
     reaches = short_reaches(study.campaign, fit.model)
-    return replace(compared(study, fit.model), warnings=(*doubts, *map(str, reaches)))
+    warnings = (*study.warnings, *doubts, *map(str, reaches))
+    return replace(compared(study, fit.model), warnings=warnings)
 
 
 def compare_models(
@@ -111,7 +112,7 @@ def compare_models(
     found = {}
     for name, model in models.items():
         progress(f'comparing {name}')
-        found[name] = replace(compared(study, model), warnings=doubts)
+        found[name] = replace(compared(study, model), warnings=(*study.warnings, *doubts))
     return SideBySide(found)
 
 
@@ -140,7 +141,7 @@ def diagnose(
     start, known, doubts = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)
     reaches = () if known else short_reaches(found.study.campaign, found.model)
-    found = replace(found, remarks=(*doubts, *found.remarks, *map(str, reaches)))
+    found = replace(found, remarks=(*_about(found), *doubts, *found.remarks, *map(str, reaches)))
     progress('looking for what to measure and spray next')
     return with_proposals(found, library)
 
@@ -168,7 +169,12 @@ def refit(
         added = effect_class(added)
     start, known, doubts = _start(campaign, model, posterior)
     found = refitted(campaign, start, added, EFFECTS, seed, progress, known)
-    return replace(found, remarks=(*doubts, *found.remarks))
+    return replace(found, remarks=(*_about(found), *doubts, *found.remarks))
+
+
+def _about(found: Diagnosis) -> tuple[str, ...]:
+    """What is simply wrong with the data and does not stop the diagnosis, which would say it."""
+    return tuple(mistake.sentence for mistake in found.study.mistakes if not mistake.stops)
 
 
 def _start(

@@ -65,9 +65,9 @@ def _run(
     if isinstance(result, pd.SideBySide):
         options.print_all('warning', next(iter(result.by_name.values())).warnings)
     else:
+        options.print_all('warning', result.warnings)
         for name, found in result.geometry.items():
             options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
-        options.print_all('warning', result.warnings)
     model_line = f'{fitted or FITTED} a 50 mm bell'
     if start is not None:
         model_line = f'{fitted} {model_words(chosen, start)}'.strip()

@@ -285,6 +285,8 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 def trouble_with(study: Study, fit: Fit) -> str:
     """Why the fit cannot be right, or nothing."""
+    if wrong := [mistake.sentence for mistake in study.mistakes if mistake.stops]:
+        return '; '.join(wrong)
     mean = float(np.mean(study.measured_um))
     painted = (fit.residual > PAINTED) & (study.measured_um > TAIL * mean)
     bare = float(np.mean(painted & (fit.predicted_um < REACHED * mean)))

@@ -5,12 +5,11 @@ Comparison, diagnosis and calibration all take their readings from here.
 
 from dataclasses import replace
 
-import numpy as np
-
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.condensing import MANY, condensed, thinned
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
+from paint_deposition.inference.fitting.mistaken_data import find_mistakes, fitted_points
 from paint_deposition.inference.fitting.outliers import (
     FEWEST_POINTS,
     FittedPoints,
@@ -51,13 +50,23 @@ def clean_and_fit(
         campaign, start, starts = condensed(campaign, rough.model), rough.model, 1
     study = Study.of(campaign, effects)
     fit = _fitted(study, start, starts, seed, known)
-    if len(study) < FEWEST_POINTS or not fit.predicted_um.any():
+    if not fit.predicted_um.any():
         return study, fit
-    misfit = _misfit(study, fit)
+    if len(study) >= FEWEST_POINTS:
+        study, fit = _cleaned(study, fit, start, starts, seed, known)
+    return replace(study, mistakes=find_mistakes(study, fit, start)), fit
+
+
+def _cleaned(
+    study: Study, fit: Fit, start: DepositionModel, starts: int, seed: int,
+    known: Posterior | None,
+) -> tuple[Study, Fit]:  # fmt: skip
+    """The same without outliers, with the film's texture and what facets cost."""
+    misfit = fitted_points(study, fit)
     if found := _outliers(study, fit, misfit):
         study = study.without(found)
         fit = _fitted(study, start, starts, seed, known)
-        misfit = _misfit(study, fit)
+        misfit = fitted_points(study, fit)
     texture = _texture(study, misfit)
     if texture != study.texture:
         study = replace(study, texture=texture)
@@ -77,11 +86,15 @@ def _fitted(
 
 def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier]:
     means = study.campaign.means
-    labels = study.campaign.readings.point[means.first]
+    label = study.campaign.readings.point[means.first]
+    film = study.measured_um
     return {
-        row: Outlier(str(labels[row]), float(study.measured_um[row]),
-                     float(fit.predicted_um[row] + residual_um), sigma_um)
-        for row, (residual_um, sigma_um) in find_outliers(misfit, means.repeats == 1).items()
+        row: Outlier(
+            str(label[row]), float(film[row]), float(fit.predicted_um[row] + residual_um),
+            sigma_um, *(() if other is None else (str(label[other]), float(film[other]))),
+        )
+        for row, (residual_um, sigma_um, other) in
+        find_outliers(misfit, means.repeats == 1).items()
     }  # fmt: skip
 
 
@@ -95,12 +108,3 @@ def _texture(study: Study, misfit: FittedPoints) -> Texture:
         return study.texture
     share = misfit.leave_one_out.texture_share
     return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
-
-
-def _misfit(study: Study, fit: Fit) -> FittedPoints:
-    free = np.hstack([fit.jacobian @ fit.parameters.prior.factor, study.nuisance])
-    return FittedPoints(
-        fit.residual * study.sigma_um, fit.predicted_um, study.gauge_um,
-        free * study.sigma_um[:, np.newaxis], study.campaign.experiment_of,
-        study.campaign.positions_m, tuple(study.covariates(fit.model)),
-    )  # fmt: skip

@@ -55,6 +55,13 @@ class FittedPoints:
         """Leave-one-out predictions of the readings by all models."""
         return LeaveOneOut.of(self)
 
+    def with_swapped(self, i: int, j: int) -> 'FittedPoints':
+        """The same with two readings in each other's place."""
+        residual = self.residual_um.copy()
+        more = self.predicted_um[j] + residual[j] - self.predicted_um[i] - residual[i]
+        residual[[i, j]] += more, -more
+        return replace(self, residual_um=residual)
+
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
         names = [one.name for one in fields(self) if one.name != 'covariates']
@@ -119,14 +126,19 @@ def _leave_one_out(
     residual: np.ndarray, variance: np.ndarray, directions: np.ndarray
 ) -> tuple[float, np.ndarray, np.ndarray]:
     """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
-    over = directions / variance[:, np.newaxis]
-    factor = cholesky(np.eye(directions.shape[1]) + directions.T @ over, lower=True)
-    solved = solve_triangular(factor, over.T, lower=True)
+    solved, log_det = _solved(variance, directions)
     weighted = residual / variance - solved.T @ (solved @ residual)
     diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
-    log_det = np.log(variance).sum() + 2.0 * np.log(np.diag(factor)).sum()
     likelihood = -0.5 * (residual @ weighted + log_det)
     return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
+
+
+def _solved(variance: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
+    """What their product (P, P) takes off the inverse variances, (n, P), and the determinant."""
+    over = directions / variance[:, np.newaxis]
+    factor = cholesky(np.eye(directions.shape[1]) + directions.T @ over, lower=True)
+    log_det = np.log(variance).sum() + 2.0 * np.log(np.diag(factor)).sum()
+    return solve_triangular(factor, over.T, lower=True), float(log_det)
 
 
 def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
@@ -151,6 +163,9 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
 PRIOR_PROBABILITY, LEAST_PROBABILITY = 0.01, 0.9
 # A greater share of outliers than this means that the model is at fault.
 LARGEST_SHARE = 0.05
+# Prior probability that two readings of a campaign are swapped, and what the logarithm of the
+# likelihood must gain for a pair to be looked at.
+PRIOR_SWAP, WORTH_SWAPPING = 0.02, 8.0
 # Fewer points predict each other too poorly.
 FEWEST_POINTS = 20
 # A corrected value is proposed if it is within this many standard deviations of the expected one.
@@ -166,29 +181,42 @@ class Outlier:
     # What the model and the other readings predict there.
     expected_um: float
     sigma_um: float
+    # Label and reading of the point that it looks swapped with, if it does.
+    swapped_with: str | None = None
+    swapped_um: float | None = None
 
     @property
     def guess_um(self) -> float | None:
-        """What was probably read: a decimal point or two digits are in the wrong place."""
+        """What was probably read: another point's, or a decimal point or two digits are wrong."""
+        if self.swapped_um is not None:
+            return self.swapped_um
         guess = min(_miswritten(self.thickness_um), key=lambda v: abs(v - self.expected_um))
         return guess if abs(guess - self.expected_um) < GUESS_SIGMAS * self.sigma_um else None
 
     def __str__(self) -> str:
         meant = '' if self.guess_um is None else f' ({self.guess_um:.4g}?)'
+        which, remedy = f"point '{self.point}'", 'measure there again'
+        if self.swapped_with is not None:
+            which = f"points '{self.point}' and '{self.swapped_with}' look swapped"
+            remedy = 'exchange them, or measure there again'
         return (
-            f"point '{self.point}': {self.thickness_um:.4g} µm where model and neighbours say "
+            f'{which}: {self.thickness_um:.4g} µm where model and neighbours say '
             f'{self.expected_um:.4g} ± {self.sigma_um:.2g} µm{meant}; left out of the fit, '
-            'measure there again'
+            f'{remedy}'
         )
 
     def to_dict(self) -> dict[str, Any]:
         """As results name it."""
-        names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um')
+        names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um', 'swapped_with')
         return {name: getattr(self, name) for name in names}
 
 
-def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[float, float]]:
-    """Outliers by their row, with the residual that the others predict and its error [um].
+Expected = tuple[float, float, int | None]
+
+
+def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expected]:
+    """Outliers by their row: the residual that the others predict, its error [um], and the row of
+    the point whose reading stands there, if two look swapped.
 
     The most certain one is taken out first, since outliers hide each other and widen what is
     expected of sound readings.
@@ -198,25 +226,87 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, tuple[f
     """
     count = len(single)
     kept = np.arange(count)
-    found: dict[int, tuple[float, float]] = {}
+    found: dict[int, Expected] = {}
     if count < FEWEST_POINTS:
         return {}
     film, left = np.mean(misfit.predicted_um), misfit
+    prior = np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY))
     while True:
         leave_one_out = left.leave_one_out
         # Nothing is known of an outlier but that it is a number of the size of the film.
         wild = -np.log(np.pi * film * (1.0 + (left.residual_um / film) ** 2))  # Cauchy's.
-        prior = np.log(PRIOR_PROBABILITY / (1.0 - PRIOR_PROBABILITY))
-        log_odds = prior + wild - leave_one_out.log_density
-        log_odds[~single[kept]] = -np.inf
+        wild = np.where(single[kept], prior + wild, -np.inf)
+        log_odds = wild - leave_one_out.log_density
         worst = int(np.argmax(log_odds))
-        if expit(log_odds[worst]) < LEAST_PROBABILITY:
+        out: dict[int, Expected] = {
+            row: (*expected, int(kept[other]))
+            for row, (expected, other) in _swapped(left, wild, log_odds).items()
+        }
+        if not out and expit(log_odds[worst]) >= LEAST_PROBABILITY:
+            out = {worst: (*leave_one_out.predicted(worst), None)}
+        if not out:
             return found
-        if len(found) + 1 > max(LARGEST_SHARE * count, 1.0):
+        if len(found) + len(out) > max(LARGEST_SHARE * count, len(out)):
             return {}
-        found[int(kept[worst])] = leave_one_out.predicted(worst)
-        kept = np.delete(kept, worst)
+        found |= {int(kept[row]): expected for row, expected in out.items()}
+        kept = np.delete(kept, list(out))
         left = misfit.select(kept)
+
+
+def _swapped(
+    misfit: FittedPoints, wild: np.ndarray, log_odds: np.ndarray
+) -> dict[int, tuple[tuple[float, float], int]]:
+    """Two rows of a part whose readings more probably stand in each other's place, or none.
+
+    Args:
+        wild: (P,) logarithm of prior and density of each as an outlier.
+        log_odds: (P,) that each is one.
+
+    Returns:
+        Of each what the others predict, as ``LeaveOneOut.predicted``, and the other row.
+    """
+    gain, i, j = _best_swap(misfit)
+    if gain < WORTH_SWAPPING:
+        return {}
+    swapped = misfit.with_swapped(i, j)
+    after = swapped.leave_one_out
+    found = {i: (after.predicted(i), j), j: (after.predicted(j), i)}
+    for row, ((mean, sigma), _) in found.items():
+        if abs(swapped.residual_um[row] - mean) > GUESS_SIGMAS * sigma:
+            return {}
+    pairs = 0.5 * len(wild) * (len(wild) - 1)
+    likelihood = logsumexp(misfit.leave_one_out.log_weight)
+    others = misfit.select(np.delete(np.arange(len(wild)), [i, j])).leave_one_out.log_weight
+    both_out = wild[i] + wild[j] + np.log(2.0 * np.pi) + logsumexp(others) - likelihood
+    as_swapped = np.log(PRIOR_SWAP / pairs) + logsumexp(after.log_weight) - likelihood
+    slips = log_odds[i], log_odds[j], both_out
+    # Whatever is wrong with the two, both are left out; what is most probable is said.
+    sure = expit(logsumexp([as_swapped, *slips])) >= LEAST_PROBABILITY
+    return found if sure and as_swapped > max(slips) else {}
+
+
+def _best_swap(misfit: FittedPoints) -> tuple[float, int, int]:
+    """By how much the logarithm of the likelihood gains most if two readings swap, and which.
+
+    The texture is the usual one; the field may be another one after the swap than before.
+    """
+    film, residual = misfit.predicted_um + misfit.residual_um, misfit.residual_um
+    variance = misfit.gauge_um**2 + (USUAL_TEXTURE * misfit.predicted_um) ** 2
+    more = film - film[:, np.newaxis]  # what each row would gain from each column
+    same_part = misfit.experiment_of == misfit.experiment_of[:, np.newaxis]
+    before, best = -np.inf, (-np.inf, 0, 0)
+    for field, log_share in _fields(misfit):
+        solved, log_det = _solved(variance, np.hstack([misfit.free_um, field]))
+        weighted = residual / variance - solved.T @ (solved @ residual)
+        precision = np.diag(1.0 / variance) - solved.T @ solved
+        own = np.diag(precision)
+        apart = own[:, np.newaxis] + own - 2.0 * precision
+        gain = -more * (weighted[:, np.newaxis] - weighted) - 0.5 * more**2 * apart
+        i, j = np.unravel_index(np.argmax(np.where(same_part, gain, -np.inf)), gain.shape)
+        likelihood = log_share - 0.5 * (residual @ weighted + log_det)
+        before = max(before, likelihood)
+        best = max(best, (float(likelihood + gain[i, j]), int(i), int(j)))
+    return best[0] - float(before), *best[1:]
 
 
 def _miswritten(value: float) -> list[float]:

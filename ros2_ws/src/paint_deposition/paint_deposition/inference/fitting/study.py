@@ -52,6 +52,14 @@ class Texture:
 
 
 @dataclass(frozen=True)
+class Mistake:
+    """Data that are simply wrong, see ``mistaken_data``."""
+
+    sentence: str  # with the remedy
+    stops: bool  # whether nothing can be concluded from the data
+
+
+@dataclass(frozen=True)
 class Study:
     """A campaign with everything that inference needs of it."""
 
@@ -60,6 +68,7 @@ class Study:
     noise: GaugeNoise  # of single readings
     texture: Texture = Texture()  # of the film
     outliers: tuple[Outlier, ...] = ()  # single readings that were left out, see ``clean_and_fit``
+    mistakes: tuple[Mistake, ...] = ()  # what is simply wrong with the data, found there, too
     # (P,) film that the facets of curved meshes cost, see ``with_facets`` [um].
     facet_um: np.ndarray | None = None
     _rays: dict = field(default_factory=dict, repr=False)
@@ -114,7 +123,9 @@ class Study:
         forward = Forward(campaign, self.forward.effects)
         facet_um = None if self.facet_um is None else self.facet_um[kept]
         noise = self.noise.select(~left_out)
-        return Study(campaign, forward, noise, self.texture, self.outliers, facet_um)
+        return replace(
+            self, campaign=campaign, forward=forward, noise=noise, facet_um=facet_um, _rays={}
+        )
 
     @property
     def gauge_um(self) -> np.ndarray:
@@ -168,9 +179,22 @@ class Study:
         return (*notes, *self._facet_notes, *self.left_out)
 
     @property
+    def warnings(self) -> tuple[str, ...]:
+        """What is simply wrong with the data, a line each."""
+        return tuple(mistake.sentence for mistake in self.mistakes)
+
+    @property
     def left_out(self) -> tuple[str, ...]:
         """A line for each point at which readings were left out."""
-        return (*self.campaign.notes, *map(str, self.outliers))
+        # Two points that look swapped follow each other, and share a line.
+        before = (None, *(one.point for one in self.outliers))
+        slips = [
+            one for one, last in zip(self.outliers, before, strict=False)
+            if last is None or one.swapped_with != last
+        ]  # fmt: skip
+        labels = tuple(one.point.replace(': ', ": point '", 1) + "'" for one in self.outliers)
+        notes = [note for note in self.campaign.notes if not note.startswith(labels)]
+        return (*notes, *map(str, slips))
 
     @property
     def noise_figures(self) -> dict[str, Any]:

@@ -1,17 +1,21 @@
 """Plausibility of readings and of the paint below them, checked before anything is fitted."""
 
+from collections.abc import Iterator
+
 import numpy as np
+from scipy.spatial import cKDTree
 from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError, some
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
-from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import NONE
 
 # The pattern has seven parameters, and a fit needs a few points more.
 FEWEST_POINTS = 10
@@ -28,6 +32,8 @@ NO_STRUCTURE_P = 1e-3
 # A point lies beside a pass from this share of the panel's scale on.
 BESIDE = 0.05
 MOST_NAMED = 6
+# A film is near a target if the logarithm of their ratio is no larger.
+NEAR = np.log(1.5)
 
 
 def check_enough(points: int) -> None:
@@ -186,6 +192,33 @@ def readings_in_doubt(
     return (*readings.doubts, *filter(None, found))
 
 
+def targets_in_doubt(experiment: Experiment, target_um: float) -> Iterator[str]:
+    """Warnings of targets that no reading is near, in place or in film.
+
+    Args:
+        target_um: of the film outside of zones; 0 is none.
+    """
+    film, found = experiment.means.mean_um, experiment.zones_of_points
+    number = np.full(len(film), NONE) if found is None else found.number
+    wanted = [('the target', target_um, NONE)] if target_um else []
+    zones = found.zones.zones if found else ()
+    wanted += [(f"zone '{one.name}'", one.target_um, k) for k, one in enumerate(zones)]
+    for name, wanted_um, zone in wanted:
+        own = film[number == zone]
+        if len(own) and np.all(np.abs(np.log(np.maximum(own, NO_PAINT_UM) / wanted_um)) > NEAR):
+            yield (
+                f'no reading is near the {wanted_um:g} µm of {name}: {own.min():.4g} to '
+                f'{own.max():.4g} µm were read; check the target and the unit of the readings'
+            )
+        if not len(own) and experiment.zones is not None and zone != NONE:
+            vertices_m = experiment.surface.vertices_m[experiment.zones.number == zone]
+            near_m = cKDTree(vertices_m).query(experiment.measured_points.positions_m)[0].min()
+            yield (
+                f'no reading is in {name} ({wanted_um:g} µm), the nearest is {near_m:.3f} m off: '
+                'measure there, or check where the zone lies'
+            )
+
+
 def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]:
     """Refuse an experiment in which no paint lands at any measured point.
 
@@ -193,7 +226,8 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         model: its pattern and projection count, its effects do not.
 
     Returns:
-        Warnings of readings that say otherwise, see ``readings_in_doubt``.
+        Warnings of targets, positions and zeros that do not suit the readings. What is wrong
+        with films is known once a model is fitted.
     """
     doubts = []
     plain = model.model_copy(update={'effects': ()})
@@ -206,8 +240,14 @@ def require_paint(campaign: Campaign, model: DepositionModel) -> tuple[str, ...]
         painted.add(one.path)
         if painted.raw_um.max() >= NO_PAINT_UM:
             expected_um = painted.raw_um[one.means.owner]
-            odd = readings_in_doubt(one.surface, one.readings, expected_um)
-            doubts += [f'{one.name}: {doubt}' for doubt in odd]
+            target_um, _ = campaign.target_of(one)
+            odd = [
+                *targets_in_doubt(one, target_um),
+                *one.readings.doubts,
+                unit_in_doubt(one.surface, one.readings),
+                zeros_in_doubt(one.readings, expected_um),
+            ]
+            doubts += [f'{one.name}: {doubt}' for doubt in odd if doubt]
             continue
         cause = 'the gun never sprays'
         if np.any(one.path.flow > 0.0):
