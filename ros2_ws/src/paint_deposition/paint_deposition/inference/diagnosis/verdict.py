@@ -90,8 +90,8 @@ class Step:
 
     added: str  # effect id, '' for the model that the run started from
     fit: Fit  # of the model to the readings
-    # On the fitted points and on points left out [um], both beside the estimated levels of the
-    # parts, see ``Study.residuals``.
+    # On the fitted points [um], beside the estimated levels of the parts, see ``Study.residuals``;
+    # and on points left out, the model being refitted without them and their level not known.
     rmse_um: float
     holdout_rmse_um: float
 
@@ -99,6 +99,10 @@ class Step:
     def model(self) -> DepositionModel:
         """The fitted model."""
         return self.fit.model
+
+    def beyond_noise_um(self, noise_um: float) -> float:
+        """Error on what was left out, beyond gauge and texture [um]."""
+        return float(np.sqrt(max(self.holdout_rmse_um**2 - noise_um**2, 0.0)))
 
     @staticmethod
     def of(study: Study, added: str, fit: Fit) -> Step:
@@ -247,6 +251,8 @@ class Diagnosis:
                 'after': after.rmse_um,
                 'holdout_before': before.holdout_rmse_um,
                 'holdout_after': after.holdout_rmse_um,
+                'beyond_noise_before': before.beyond_noise_um(self.noise_floor_um),
+                'beyond_noise_after': after.beyond_noise_um(self.noise_floor_um),
                 'noise_floor': self.noise_floor_um,
                 'left_out': 'experiments' if self.left_out == 'parts' else 'points',
             },

@@ -24,6 +24,25 @@ CHECKS = {
 }
 
 
+def good_enough(diagnosis: Diagnosis) -> str:
+    """Whether the model predicts what it has not seen, before and with what was found."""
+    first, last = diagnosis.history[0], diagnosis.history[-1]
+    noise_um, um = diagnosis.noise_floor_um, words.micrometres
+    after = (
+        f'{um(last.holdout_rmse_um)} RMS, {um(last.beyond_noise_um(noise_um))} beyond gauge and '
+        f'texture ({um(noise_um)})'
+    )
+    where = f'on {diagnosis.left_out} left out of the fit'
+    if diagnosis.verdict == 'none_missing':
+        return f'Yes. {words.capital(where)} the model is off by {after}.'
+    if first is last:
+        return f'No. {words.capital(where)} the model is off by {after}.'
+    return (
+        f'Not as it was: {where} it was off by {um(first.holdout_rmse_um)} RMS. With what was '
+        f'found it is off by {after}.'
+    )
+
+
 def effect_meanings(rows: list[dict]) -> str:
     return ' '.join(f'{words.capital(row["name"])}: {row["meaning"]}' for row in rows)
 
@@ -110,11 +129,14 @@ def changes(data: ReportData, diagnosis: Diagnosis) -> str:
 
 def _errors(diagnosis: Diagnosis, before: Step, after: Step) -> str:
     worse = f' Worse than before: {"; ".join(diagnosis.worse)}.' if diagnosis.worse else ''
-    errors = before.holdout_rmse_um, after.holdout_rmse_um, diagnosis.noise_floor_um
-    first, last, floor = map(words.micrometres, errors)
+    first, last, noise, noise_left = map(words.micrometres, (
+        before.holdout_rmse_um, after.holdout_rmse_um,
+        before.beyond_noise_um(diagnosis.noise_floor_um),
+        after.beyond_noise_um(diagnosis.noise_floor_um),
+    ))  # fmt: skip
     return (
-        f'At {diagnosis.left_out} left out of the fit the error goes from {first} to {last}; '
-        f'gauge and texture of the film scatter by {floor}.{worse}'
+        f'The error on {diagnosis.left_out} left out of the fit: {first} → {last}; beyond gauge '
+        f'and texture: {noise} → {noise_left}.{worse}'
     )
 
 

@@ -57,12 +57,13 @@ def _missing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     rows = facts.accepted_rows(data)
     named = [row for row in rows if not words.is_learned(row['id'])]
     answers = (
+        ('Is it good enough', facts.good_enough(diagnosis)),
         ('What is missing', facts.effect_meanings(named)),
-        ('What it costs', facts.cost_of_missing(data, diagnosis)),
-        ('What to do', facts.to_use(data, named)),
         ('How sure', f'{facts.accepted_words(rows)} {facts.p_value_sentence(diagnosis)}'),
+        ('How much better', facts.changes(data, diagnosis)),
+        ('What to do', facts.to_use(data, named)),
+        ('What it costs', facts.cost_of_missing(data, diagnosis)),
         ('What is learned', facts.learned(data, diagnosis, 'What their laws leave over')),
-        ('What changes', facts.changes(data, diagnosis)),
         ('What is left out', facts.left_out(data)),
     )
     names = words.joined([facts.with_confounded(row) for row in named])
@@ -95,10 +96,11 @@ def _asked_for(data: ReportData, diagnosis: Diagnosis, probability: float) -> He
 
 def _nothing(data: ReportData, diagnosis: Diagnosis) -> Headline:
     answers = (
+        ('Is it good enough', f'{facts.good_enough(diagnosis)} {diagnosis.reason}'),
         ('What is missing', 'Nothing that these readings can show.'),
-        ('What to do', 'Simulate and plan with model.yaml of this folder.'),
         ('How sure', f'{facts.p_value_sentence(diagnosis)} {facts.not_testable(diagnosis)}'),
         ('What changes', facts.changes(data, diagnosis)),
+        ('What to do', 'Simulate and plan with model.yaml of this folder.'),
         ('What is left out', facts.left_out(data)),
     )
     return Headline('good', 'Nothing is missing', 'The model agrees with the readings', answers)
@@ -112,14 +114,15 @@ def _undecided(data: ReportData, diagnosis: Diagnosis) -> Headline:
     named = [name for name in diagnosis.accepted if not words.is_learned(name)]
     more = 'more ' if named else ''
     answers = (
+        ('Is it good enough', facts.good_enough(diagnosis)),
         ('What is missing', f'Something {more}is, most likely {words.joined(causes, "or")}.'),
         (
             'How sure',
             f'{facts.p_value_sentence(diagnosis)} No single cause is probable enough to be added.',
         ),
-        ('What is learned', facts.learned(data, diagnosis, 'What is missing')),
-        ('What changes', facts.changes(data, diagnosis)),
+        ('How much better', facts.changes(data, diagnosis)),
         ('What to do', facts.next_steps(data)),
+        ('What is learned', facts.learned(data, diagnosis, 'What is missing')),
         ('What is left out', facts.left_out(data)),
     )
     title = f'Something {more}is missing; the readings do not say which'
@@ -147,12 +150,13 @@ def _unknown(data: ReportData, diagnosis: Diagnosis) -> Headline:
             'predicts as the error says, within the range of the readings.'
         )
     answers = (
+        ('Is it good enough', facts.good_enough(diagnosis)),
         ('What is missing', reason),
         ('Where it shows', where),
         ('How sure', facts.p_value_sentence(diagnosis)),
-        ('What is learned', facts.learned(data, diagnosis, 'It')),
-        ('What changes', facts.changes(data, diagnosis)),
+        ('How much better', facts.changes(data, diagnosis)),
         ('What to do', remedy),
+        ('What is learned', facts.learned(data, diagnosis, 'It')),
         ('What is left out', facts.left_out(data)),
     )
     return Headline('open', 'Unexplained', title, answers)
@@ -202,7 +206,7 @@ def _side_by_side(data: ReportData) -> Headline:
     floor = words.micrometres(data.study.noise_floor_um)
     remedy = 'unless it was fitted to these very readings and the others were not.'
     answers = (
-        ('How far off', f'RMSE of {words.joined(each)}; the gauge alone gives {floor}.'),
+        ('How far off', f'RMSE at the points of {words.joined(each)}; the gauge alone: {floor}.'),
         ('What to do', f'Take {best}, {remedy}'),
     )
     return Headline('open', 'Side by side', f'{best} has the smallest error', answers)
@@ -215,17 +219,20 @@ def key_figures(data: ReportData) -> list[tuple[str, str, str, str]]:
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
     if data.names:
         models = zip(data.names, data.comparisons, strict=True)
-        return [(f'RMSE, {n}', '', f'{c.points.rmse_um:.2f}', 'µm') for n, c in models] + [floor]
+        errors = [(f'Error, {n}', '', f'{c.points.rmse_um:.2f}', 'µm RMS at the points')
+                  for n, c in models]  # fmt: skip
+        return [*errors, floor]
     if diagnosis is None:
         rmse_um = data.comparisons[-1].points.rmse_um
-        return [('RMSE', '', f'{rmse_um:.2f}', 'µm on all points'), floor]
+        return [('Error', '', f'{rmse_um:.2f}', 'µm RMS at the points'), floor]
     first, last = diagnosis.history[0], diagnosis.history[-1]
     found = []
     for label, name in (
-        ('fitted points', 'rmse_um'), (f'{diagnosis.left_out} left out', 'holdout_rmse_um')
-    ):  # fmt: skip
+        (f'Error on {diagnosis.left_out} left out', 'holdout_rmse_um'),
+        ('Error at fitted points', 'rmse_um'),
+    ):
         before = f'{getattr(first, name):.2f}' if first is not last else ''
-        found.append((f'RMSE, {label}', before, f'{getattr(last, name):.2f}', 'µm'))
+        found.append((label, before, f'{getattr(last, name):.2f}', 'µm RMS'))
     found.append(floor)
     open_too = diagnosis.verdict == 'undecided'
     named = [
