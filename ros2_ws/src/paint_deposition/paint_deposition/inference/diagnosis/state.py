@@ -202,17 +202,8 @@ class DiagnosisState:
         return self.study.fit(self._free(start), nuisance=self.study.nuisance)
 
     def with_step(self, added: str, fit: Fit, holdout_um: float | None = None) -> 'DiagnosisState':
-        """The state with a newer model.
-
-        Args:
-            added: what it has more than the one before.
-            fit: of the model.
-            holdout_um: its error on points left out when the choice was made without them, too
-                [um]; default: when the model was refitted without them.
-        """
-        step = Step.of(self.study, added, fit)
-        if holdout_um is not None:
-            step = replace(step, holdout_rmse_um=holdout_um)
+        """The state with a newer model; see ``Step.of``."""
+        step = Step.of(self.study, added, fit, holdout_um)
         return replace(self, fit=fit, history=(*self.history, step))
 
     def accepting(

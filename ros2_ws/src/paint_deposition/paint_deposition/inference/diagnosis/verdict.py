@@ -105,15 +105,20 @@ class Step:
         return float(np.sqrt(max(self.holdout_rmse_um**2 - noise_um**2, 0.0)))
 
     @staticmethod
-    def of(study: Study, added: str, fit: Fit) -> Step:
-        """Compute the errors of a fit, those on points left out too."""
-        predicted_um, folds = np.empty(len(study)), study.folds()
-        for fold in np.unique(folds):
-            out = folds == fold
-            predicted_um[out] = study.predicted_without_um(fit, out)[out]
-        fitted = study.residuals(fit.predicted_um)
-        left_out_um = root_mean_square(study.measured_um - predicted_um)
-        return Step(added, fit, fitted.rmse_um, left_out_um)
+    def of(study: Study, added: str, fit: Fit, holdout_um: float | None = None) -> Step:
+        """Compute the errors of a fit.
+
+        Args:
+            holdout_um: that on points left out, where it is known: if the choice of the model was
+                made without them, too [um]; default: if the model was refitted without them.
+        """
+        if holdout_um is None:
+            predicted_um, folds = np.empty(len(study)), study.folds()
+            for fold in np.unique(folds):
+                out = folds == fold
+                predicted_um[out] = study.predicted_without_um(fit, out)[out]
+            holdout_um = root_mean_square(study.measured_um - predicted_um)
+        return Step(added, fit, study.residuals(fit.predicted_um).rmse_um, holdout_um)
 
 
 @dataclass(frozen=True)

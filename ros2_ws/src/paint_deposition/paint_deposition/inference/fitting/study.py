@@ -28,8 +28,7 @@ FOLDS = 6
 TEXTURE_SHARE = 0.01
 # What facets cost the film is left out below this share of the noise, and reported from this.
 LEAST_FACETS, WORTH_REPORTING = 0.1, 1.0
-# Starts of a fit to some of the readings, and the standard deviation of one that is not used [um].
-STARTS_WITHOUT = 4
+# Standard deviation of a reading that a fit does not use [um].
 NOT_USED_UM = 1e9
 
 
@@ -239,8 +238,8 @@ class Study:
         count, kept = own.shape[1], (~out)[:, np.newaxis]
         found = fit_readings(
             self.forward, self.measured_um, np.where(out, NOT_USED_UM, self.sigma_um),
-            replace(fit.parameters, start=fit.model), STARTS_WITHOUT,
-            nuisance=kept * np.hstack([own, nuisance]),
+            replace(fit.parameters, start=fit.model), nuisance=kept * np.hstack([own, nuisance]),
+            others=(fit.parameters.start,),
         )  # fmt: skip
         amounts = found.amplitudes[0][:count]
         return found.predicted_um + self.sigma_um * (own @ amounts)
