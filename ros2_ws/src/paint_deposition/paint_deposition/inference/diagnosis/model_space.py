@@ -38,9 +38,8 @@ PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 SIZES = np.array([0.5, 1.0, 2.0, 4.0])
 # An effect acts for certain from this posterior probability of its group on.
 SURE = 0.7
-# Differences of log weight between refitted models count as so many times smaller (a coarsened
-# posterior, Miller and Dunson 2019): laws are true to their form no better than that, and each
-# fit is linear around one of several patterns. No effect is surer than the library is complete.
+# Between rivals, whose laws are true to their form no better than that, differences of log weight
+# count as so many times smaller (a coarsened posterior, Miller and Dunson 2019).
 COARSENED = 2.0
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
@@ -334,11 +333,6 @@ def discrepancy_of(study: Study, fit: Fit) -> DiscrepancyFigures:
     sizes = probable_hyperparameters(plain, discrepancy, [], freedom)
     weighed = [WeightedNull.of(plain, discrepancy, size, freedom) for size in sizes]
     return ModelSpace(weighed, [], discrepancy, freedom).figures
-
-
-def weight_of(log_evidence: float, log_prior: float) -> float:
-    """Logarithm of the posterior weight of a refitted model."""
-    return log_evidence / COARSENED + log_prior
 
 
 def inclusion_of(log_weights: Sequence[float], others: Sequence[float]) -> float:

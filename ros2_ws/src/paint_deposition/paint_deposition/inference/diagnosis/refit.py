@@ -19,7 +19,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     of_random,
 )
 from paint_deposition.inference.diagnosis.learning import NullModels, by_size, locate_unexplained
-from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of, weight_of
+from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclusion_of
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.search import EffectSet, Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
@@ -78,7 +78,7 @@ def refit(
         return _with_learned(state, law, nothing, p_value)
     progress(f'fitting with {added.id}')
     before, with_it = state.history[-1], search.with_effect(nothing, added.id)
-    probability = inclusion_of([weight_of(with_it.log_evidence, 0.0)], [nothing.log_weight])
+    probability = inclusion_of([with_it.log_evidence], [nothing.log_evidence])
     fit = state.fitted_with([*with_it.effects.values()], state.fit.model)
     state = _beside(state, with_it).with_step(added.id, fit)
     state = state.accepting((added.id,), probability, before)

@@ -26,9 +26,9 @@ from paint_deposition.inference.diagnosis.explanations import (
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
+    COARSENED,
     CREDIBLE,
     PRIOR_EFFECT,
-    PRIOR_UNKNOWN,
     SIZES,
     SURE,
     ModelSpace,
@@ -36,7 +36,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     inclusion_of,
     log_odds,
     probable_hyperparameters,
-    weight_of,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
 from paint_deposition.inference.diagnosis.testability import Testability, testability
@@ -119,14 +118,12 @@ class EffectSet:
     @cached_property
     def log_weight(self) -> float:
         """Logarithm of the posterior weight of this set, nothing unknown acting."""
-        return weight_of(self.log_evidence, self.log_prior)
+        return self.log_evidence + self.log_prior
 
     @cached_property
     def log_weight_unknown(self) -> float:
         """The same if something unknown acts beside it."""
-        unknown = self.of_unknown.alone[UNKNOWN] - log_odds(PRIOR_UNKNOWN)
-        prior = self.log_prior + log_odds(PRIOR_UNKNOWN)
-        return weight_of(self.log_evidence + unknown, prior)
+        return self.log_weight + self.of_unknown.alone[UNKNOWN]
 
     @cached_property
     def of_unknown(self) -> ModelSpace:
@@ -177,7 +174,7 @@ class EffectSet:
         """The same weight with some of the readings (P,), at the best size of the discrepancy."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
-        return weight_of(evidence + self.best.sizes.log_prior + self._of_sizes, self.log_prior)
+        return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
 
 
 # So many effects are added at most.
@@ -351,7 +348,7 @@ class Search:
         weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
         found = sorted(weights, key=lambda cause: -weights[cause])
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
-        shares = np.cumsum(softmax([weights[cause] for cause in found]))
+        shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
         without = others.log_weight, others.log_weight_unknown
         return tuple(members), inclusion_of([*weights.values()], without)
