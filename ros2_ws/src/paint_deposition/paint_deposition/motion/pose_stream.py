@@ -44,10 +44,15 @@ class PoseBatch:
         chosen = rows if isinstance(rows, slice) else np.asarray(rows, dtype=np.int64)
         return PoseBatch(*(column[chosen] for column in vars(self).values()))
 
+    @property
+    def finite(self) -> np.ndarray:
+        """(N,) whether the numbers of a pose are, and no further away than any part."""
+        turned = (np.abs(self.quaternions_xyzw) <= FARTHEST_M).all(axis=1)
+        return turned & (np.abs(self.positions_m) <= FARTHEST_M).all(axis=1)
+
     def finite_axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (M, 3) [m] and tool z (M, 3) of the poses that are finite."""
-        finite = np.isfinite(self.quaternions_xyzw).all(axis=1)
-        finite &= np.isfinite(self.positions_m).all(axis=1)
+        finite = self.finite
         x, y, z, w = self.quaternions_xyzw[finite].T
         axes = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
         return self.positions_m[finite], np.stack(axes, axis=1)
@@ -196,9 +201,8 @@ class PoseScreen:
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw
-        placed = (np.abs(poses.positions_m) <= FARTHEST_M).all(axis=1)
-        finite = placed & np.isfinite(quaternions).all(axis=1)
-        norms = np.sqrt((quaternions**2).sum(axis=1))
+        finite = poses.finite
+        norms = np.sqrt((np.where(finite[:, np.newaxis], quaternions, 0.0) ** 2).sum(axis=1))
         unit = np.abs(norms - 1.0) <= QUATERNION_TOLERANCE
         self.counts.received += len(poses)
         self.counts.not_finite += int(np.count_nonzero(~finite))

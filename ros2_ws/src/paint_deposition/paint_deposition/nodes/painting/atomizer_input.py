@@ -10,12 +10,12 @@ import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 
-from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
-from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
+from paint_deposition.motion.trigger import SPRAYS_NOTHING
 from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
@@ -188,16 +188,19 @@ class AtomizerInput:
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._poses.clear()
         self.newest_ns = int(stamps[-1])
-        self.intervals.add(stamps)
-        self.speed.add(stamps, positions)
+        batch = PoseBatch(stamps, positions, quaternions)
+        moved = batch.select(np.flatnonzero(batch.finite))
         jumped = self.jumps.count
-        self.jumps.add(stamps, positions)
+        self.intervals.add(stamps)
+        if len(moved):
+            self.speed.add(moved.stamps_ns, moved.positions_m)
+            self.jumps.add(moved.stamps_ns, moved.positions_m)
         if self.jumps.count and not jumped:
             self._node.get_logger().error(
                 f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
-        self._on_poses(PoseBatch(stamps, positions, quaternions))
+        self._on_poses(batch)
 
     # --- poses
 
@@ -216,8 +219,7 @@ class AtomizerInput:
     def _transform(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
         stamp = stamp_ns(message.header)
-        p, q = message.pose.position, message.pose.orientation
-        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+        pose = pose_of(message.pose)
         if self._frame.is_own(frame_id):
             self.anomalies['poses without a frame'] += not frame_id
         else:
@@ -246,23 +248,20 @@ class AtomizerInput:
         self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:
-        stamp = stamp_ns(message.header)
         try:
-            if stamp == 0:
-                raise RecordingError('atomizer state without a stamp: stamp each state')
-            flow = relative_flow(message.spraying, message.flow)
-            self._on_state(TriggerChange(stamp, flow, message.brush, set_points_of(message)))
+            change = trigger_change(message)
+            self._on_state(change)
         except PaintError as error:
             if str(error) not in self.state_errors:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
             self.state_errors.add(str(error))
             self.anomalies['states refused'] += 1
             return
-        if message.spraying and flow == 0.0:
+        if message.spraying and change.flow == 0.0:
             if not self.anomalies[NO_FLOW]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
             self.anomalies[NO_FLOW] += 1
-        self.spraying = flow > 0.0
+        self.spraying = change.flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     def _report_progress(self) -> None:

@@ -11,7 +11,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.nodes.recording.recorder_parameters import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
@@ -153,4 +153,4 @@ def _pose(message: Recorded) -> list[float]:
 
 def _values(part_pose: Sequence[float]) -> list[float]:
     """The pose as it is published, none if it is not known."""
-    return list(Rigid.of(part_pose).values) if len(part_pose) else []
+    return list(Rigid.of(part_pose).values) if is_pose(part_pose) else []

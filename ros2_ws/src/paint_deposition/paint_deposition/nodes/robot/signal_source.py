@@ -14,7 +14,7 @@ from rclpy.qos import qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns
 from paint_deposition.motion.stream_figures import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
@@ -183,8 +183,7 @@ class SignalSource(PaintNode):
         self._publisher.publish(state)
 
     def _take_pose(self, pose: PoseStamped) -> None:
-        p = pose.pose.position
-        self._starts.add_pose(stamp_ns(pose.header), np.array([p.x, p.y, p.z]))
+        self._starts.add_pose(stamp_ns(pose.header), pose_of(pose.pose)[0])
 
     def _status(self) -> Status:
         received = {

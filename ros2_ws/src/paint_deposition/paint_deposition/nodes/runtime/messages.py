@@ -14,6 +14,8 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
+from paint_deposition.files.recordings.headers import nanoseconds
+
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
 # Three points and colours whose bytes occur nowhere else in a Marker.
@@ -43,10 +45,9 @@ def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marke
 
 
 def header_stamp_ns(cdr: bytes) -> int:
-    """Stamp of a serialised message that begins with a header [ns]."""
+    """``stamp_ns`` of a serialised message that begins with a header."""
     little_endian = cdr[1] & 1
-    sec, nanosec = struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET)
-    return sec * 1_000_000_000 + nanosec
+    return nanoseconds(*struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET))
 
 
 class SequenceNumbers:

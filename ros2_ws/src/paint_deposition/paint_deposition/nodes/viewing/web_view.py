@@ -5,6 +5,7 @@ import time
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,12 +13,16 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import (
+    pose_of,
+    stamp_ns,
+    transforms_of,
+    trigger_change,
+)
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.motion.trigger import relative_flow
 from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
@@ -199,19 +204,18 @@ class WebView(PaintNode):
             waiting.process(time.monotonic())
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
-        t, q = placed.transform.translation, placed.transform.rotation
-        self._frame.take_part_pose(placed.header.frame_id, [t.x, t.y, t.z, q.x, q.y, q.z, q.w])
+        for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
+            self._frame.take_part_pose(parent, pose)
 
     def _take_state(self, gun: str, state: AtomizerState, _sent_ns: int) -> None:
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
-            self._flow[gun] = relative_flow(state.spraying, state.flow)
+            self._flow[gun] = trigger_change(state).flow
 
     def _take_pose(self, gun: str, message: PoseStamped, _sent_ns: int) -> None:
         self._waiting[gun].add(message, time.monotonic())
 
     def _move_gun(self, gun: str, message: PoseStamped) -> None:
-        p, q = message.pose.position, message.pose.orientation
-        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+        pose = pose_of(message.pose)
         frame_id, stamp = message.header.frame_id, stamp_ns(message.header)
         if not self._frame.is_own(frame_id):
             pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
