@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.motion.repeated_samples import RepeatedSamples
-from paint_deposition.motion.trajectory import PoseCounts
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Two hours at 250 Hz, 64 bytes a pose.
@@ -65,6 +65,31 @@ class PoseBatch:
 
 
 NO_POSES = PoseBatch(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+
+def events_of(
+    motion: Trajectory, after: int = -1, until: int | None = None
+) -> Iterator[TriggerChange | PoseBatch]:
+    """The poses and the trigger changes of a recorded motion in the order in which they came.
+
+    The first change comes first: it says how the gun was before it. Of a part of the motion, what
+    came after so many poses, ``until`` as many were there.
+    """
+    batch = PoseBatch(
+        np.asarray(motion.stamps_ns, np.int64), np.asarray(motion.positions_m, float),
+        np.asarray(motion.quaternions_xyzw, float),
+    )  # fmt: skip
+    begin, end = max(after, 0), len(motion) if until is None else until
+    came = np.zeros(len(motion.trigger_flow), np.int64)
+    came[1:] = motion.trigger_rows[1:] if len(motion.trigger_rows) else 0
+    for number, (row, change) in enumerate(zip(came.tolist(), motion.triggers, strict=True)):
+        if after < row <= end:
+            if row > begin:
+                yield batch.select(slice(begin, row))
+                begin = row
+            yield TriggerChange(*change, motion.set_points_of(number))
+    if begin < end:
+        yield batch.select(slice(begin, end))
 
 
 class MotionLog:
@@ -194,10 +219,11 @@ class PoseScreen:
         self._behind = poses.select(behind)
         return [poses.select(rows) for rows in streams]
 
-    def finish(self) -> None:
-        """The stream has ended: what still waits is dropped."""
-        self.counts.backward_stamps += len(self._behind)
-        self._behind = self._behind.select([])
+    def finish(self) -> int:
+        """The stream has ended: what still waits is dropped; the number of these poses."""
+        dropped, self._behind = len(self._behind), NO_POSES
+        self.counts.backward_stamps += dropped
+        return dropped
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw

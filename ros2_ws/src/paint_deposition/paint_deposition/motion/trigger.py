@@ -97,13 +97,11 @@ class FlowSchedule:
     ) -> None:
         """Set flow (relative; 0 is gun off) and brush from a time on.
 
-        Of two changes at one time the later to come counts. ``another_stream``: the change may
-        belong to a stream that is about to restart.
+        Of two changes at one time the later to come counts. ``another_stream``: the change waits,
+        since it may belong to a stream that is about to restart.
         """
         change = (int(stamp_ns), float(flow), int(brush) if flow > 0.0 else ONLY_BRUSH)
-        insort(self._changes, change, key=_STAMP)
-        if another_stream:
-            insort(self._of_another_stream, change, key=_STAMP)
+        insort(self._of_another_stream if another_stream else self._changes, change, key=_STAMP)
 
     def steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (C,) int64 of changes; flow and brush (C + 1,) before, between and after them."""
@@ -123,14 +121,26 @@ class FlowSchedule:
             del self._changes[:superseded]
             self._forgetful = True
 
-    def restart(self) -> int:
-        """Go back to the changes of a restarted stream; returns how many of them had come early.
+    @property
+    def waiting(self) -> list[int]:
+        """Times of the changes that wait, in order."""
+        return [stamp for stamp, *_ in self._of_another_stream]
 
-        If none had, the gun is off until the next change, unless nothing was forgotten yet.
+    def go_on(self) -> list[int]:
+        """The stream has not restarted: changes that waited are of this one; their times."""
+        stamps, late = self.waiting, self._of_another_stream
+        self._of_another_stream = []
+        for change in late:
+            insort(self._changes, change, key=_STAMP)
+        return stamps
+
+    def restart(self) -> None:
+        """Go back to the changes of a restarted stream: those that waited for it.
+
+        If none did, the gun is off until the next change, unless nothing was forgotten yet.
         """
         early, self._of_another_stream = self._of_another_stream, []
         if early:
             self._changes = early
         elif self._forgetful:
             self._changes = [(self._changes[0][0], 0.0, ONLY_BRUSH)]
-        return len(early)

@@ -12,6 +12,7 @@ from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
 # Fields of AtomizerState with set-points, in the order of a trajectory's set-points.
+PLACED = ('translation', 'rotation')
 SET_POINTS = ('flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 
 
@@ -27,8 +28,12 @@ def nanoseconds(sec: int, nanosec: int) -> int:
 
 
 def pose_of(message: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) [m] and quaternion (4,) of a pose; one that is infinite or far off is NaN."""
-    p, q = message.position, message.orientation
+    """Position (3,) [m] and quaternion (4,) of a Pose or Transform.
+
+    They are NaN where one is infinite or further off than any part.
+    """
+    kind = ('position', 'orientation') if hasattr(message, 'position') else PLACED
+    p, q = (getattr(message, name) for name in kind)
     values = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
     if not (np.abs(values) <= FARTHEST_M).all():
         values[:] = np.nan

@@ -253,10 +253,12 @@ def read_joint_poses(
         if key not in streams:
             streams[key] = _Columns(topic, list(message.name))
         stream = streams[key]
-        if len(message.position) == len(message.name):
+        if len(message.position) == len(message.name) and np.isfinite(message.position).all():
             stream.stamps_ns.append(stamp_ns(message.header))
             stream.log_times_ns.append(log_time_ns)
             stream.values.append(list(message.position))
+        else:
+            bag.skipped[f'joint states on {topic} without a finite position of each joint'] += 1
     its = {name: name for stream in streams.values() for name in stream.names}
     recorded = robot.recorded_joints(its, f'{" and ".join(topics)} in {bag.path}')
     wanted = dict.fromkeys(recorded.values())
