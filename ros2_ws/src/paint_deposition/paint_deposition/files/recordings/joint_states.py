@@ -253,12 +253,10 @@ def read_joint_poses(
         if key not in streams:
             streams[key] = _Columns(topic, list(message.name))
         stream = streams[key]
-        if len(message.position) == len(message.name) and np.isfinite(message.position).all():
+        if len(message.position) == len(message.name):
             stream.stamps_ns.append(stamp_ns(message.header))
             stream.log_times_ns.append(log_time_ns)
             stream.values.append(list(message.position))
-        else:
-            bag.skipped[f'joint states on {topic} without a finite position of each joint'] += 1
     its = {name: name for stream in streams.values() for name in stream.names}
     recorded = robot.recorded_joints(its, f'{" and ".join(topics)} in {bag.path}')
     wanted = dict.fromkeys(recorded.values())
@@ -268,6 +266,11 @@ def read_joint_poses(
     warnings: list[str] = []
     for stream in used:
         stamps, logged, values, faults = stream.without_repeats()
+        finite = np.isfinite(values[:, [name in wanted for name in stream.names]]).all(axis=1)
+        if not finite.all():
+            what = f'joint states on {stream.topic} with joints that are not finite'
+            bag.skipped[what] += int(np.count_nonzero(~finite))
+            stamps, logged, values = stamps[finite], logged[finite], values[finite]
         warnings += faults
         for column, name in enumerate(stream.names):
             if name in wanted and len(stamps) > len(columns.get(name, ([],))[0]):
