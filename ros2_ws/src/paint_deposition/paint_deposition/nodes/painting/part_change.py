@@ -139,16 +139,21 @@ class PartChange:
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
-        began_s, since_ns = time.monotonic(), self._newest_ns()
+        began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
         save = None
         self.waiting = True
         try:
             if len(node.inputs) > 1:
-                node.hold(max(source.sent_ns for source in node.inputs))
+                node.hold(following.last_sent_ns)
                 await self._settled()
             node.hold()
+            # So do those that wait for their transform, which comes or is given up.
+            while any(len(source.tf_queue) for source in node.inputs):
+                await self._settled()
+            node.catch_up()
+            since_ns = self._newest_ns()
             version = mesh_version(following.mesh_file)
             ready = None if request.coat else await self._ready(version)
             if node.film.counts.received:
@@ -230,7 +235,13 @@ class PartChange:
         self._resets += 1
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
+        self.part.last_sent_ns = self._last_sent_ns
         self._publish(self._newest_ns(), ())
+
+    @property
+    def _last_sent_ns(self) -> int:
+        """When the newest pose of any gun was sent, 0 before the first."""
+        return max(source.sent_ns for source in self._node.inputs)
 
     def _newest_ns(self) -> int:
         """Stamp of the newest pose of the part in the cell; without any the time now."""
