@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 
@@ -23,6 +24,7 @@ from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
 
@@ -336,3 +338,32 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
         assert len(motion) == half
         assert np.array_equal(offline_um(of, motion), live)
     assert second.max() > 1.0
+
+
+@pytest.mark.parametrize('placed', [True, False])
+def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
+    simulator, robot, painted, asked, wait_until, placed
+):
+    """The change waits for them; without a transform they are refused on their own part."""
+    node = simulator()
+    # A cell in which transforms may come.
+    node.frame._topics.append(
+        AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
+    )
+    source = robot(node)
+    source.send(MOTION, frame_id='cell')
+    wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
+    future = asked(serial='1')
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(later(MOTION))
+    if placed:
+        node.frame.take_part_pose('cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    wait_until(future.done, what='the change')
+    answer = future.result()
+    assert answer.success, answer.message
+    if placed:
+        figures = json.loads(Path(answer.paths[2]).read_text())
+        assert figures['poses']['received'] == len(MOTION)
+    else:
+        assert not answer.paths
+    assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
