@@ -132,4 +132,6 @@ def test_joint_states_that_are_not_finite_are_left_out_and_counted(arm, tmp_path
     read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(arm), frame_id='base_link')
     assert len(read) == len(rows) - 1
     assert np.isfinite(read.positions_m).all()
-    assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(read.warnings)
+    assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
+        read.warnings
+    )

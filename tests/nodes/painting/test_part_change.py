@@ -24,9 +24,9 @@ from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'

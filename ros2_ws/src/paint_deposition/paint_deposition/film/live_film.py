@@ -9,6 +9,7 @@ from operator import attrgetter
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.interpolated_brushes import (
     uses_set_points,
@@ -31,6 +32,8 @@ from paint_deposition.part.visibility import Occluder
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change that is older than the newest pose by more is from a restarted stream [ns].
 STREAM_RESTART_NS = 1_000_000_000
+# That wait for poses; no gun is switched so often within the time that poses may be missing.
+MOST_CHANGES = 100_000
 # Earlier than any stamp [ns].
 BEFORE_ALL_NS = -(2**62)
 _STAMP = attrgetter('stamp_ns')
@@ -156,7 +159,13 @@ class LiveFilm:
         Raises:
             ModelError: its brush is not in the model, or its set-points lie outside the calibrated
                 ones; the change is ignored.
+            RecordingError: too many wait for poses; the change is ignored.
         """
+        if len(self._changes) >= MOST_CHANGES:
+            raise RecordingError(
+                f'over {MOST_CHANGES} states are stamped ahead of the poses: send poses, or set '
+                'the clocks'
+            )
         if change.flow > 0.0:
             change = self._with_brush_number(change)
             self.model.require_brushes({*self._brushes, change.brush})

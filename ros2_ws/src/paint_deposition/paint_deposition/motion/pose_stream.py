@@ -119,15 +119,16 @@ class MotionLog:
         """Note what came."""
         if not self.complete:
             return
-        if isinstance(event, TriggerChange):
-            self._changes.append((self.poses, event))
-            return
-        if self.poses + len(event) > self.pose_memory:
+        size = 1 if isinstance(event, TriggerChange) else len(event)
+        if self.poses + self.changes + size > self.pose_memory:
             self.complete = False
             self._kept, self._changes = NO_POSES, []
+        elif isinstance(event, TriggerChange):
+            self._changes.append((self.poses, event))
+            return
         else:
             self._pack(event)
-        self.poses += len(event)
+        self.poses += len(event) if isinstance(event, PoseBatch) else 0
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
         """What came until now, after so many poses and changes."""
@@ -168,6 +169,8 @@ QUATERNION_TOLERANCE = 0.01
 FARTHEST_M = 1e6
 # So many poses in order, over more than a gap, are no stragglers: the stream was restarted.
 FEWEST_OF_A_RESTART = 3
+# So many within a gap are no stream.
+MOST_BEHIND = 10_000
 
 
 class PoseScreen:
@@ -203,7 +206,7 @@ class PoseScreen:
                 streams[-1].append(row)
             elif stamp == self.newest_ns or (behind and stamp == stamps[behind[-1]]):
                 self.counts.repeated_stamps += 1
-            elif behind and stamp < stamps[behind[-1]]:
+            elif (behind and stamp < stamps[behind[-1]]) or len(behind) >= MOST_BEHIND:
                 self.counts.backward_stamps += len(behind)
                 behind = [row]
             else:

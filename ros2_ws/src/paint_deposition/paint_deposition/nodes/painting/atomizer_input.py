@@ -3,8 +3,9 @@
 import math
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -16,9 +17,9 @@ from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
 
@@ -30,6 +31,12 @@ PROGRESS_PERIOD_S = 0.2
 # No robot announces a state so long before the pose at which it holds.
 AHEAD_NS = 1_000_000_000
 AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
+# Of what a peer names: so many different ones are told apart, and so many characters of each.
+MOST_NAMES, LONGEST_NAME = 20, 200
+OTHERS = 'others'
+# Hours of poses: more do not wait for a part.
+MOST_HELD = 2_000_000
+NOT_HELD = 'messages dropped, since too many waited for the part'
 NO_FLOW = 'states that spray with flow 0'
 
 
@@ -87,7 +94,6 @@ class AtomizerInput:
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
-        self.reset_counts()
         depth = node.values['pose_queue_depth']
         subscribe = partial(AdaptiveSubscription, node, depth=depth)
         self._topics = [
@@ -95,6 +101,7 @@ class AtomizerInput:
             # A latched state from before the node started is still in effect.
             subscribe(AtomizerState, self._state_topic, self._take_state, latched=True),
         ]
+        self.reset_counts()
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
@@ -108,8 +115,8 @@ class AtomizerInput:
 
     @property
     def messages_lost(self) -> int:
-        """Messages that the middleware reported as lost."""
-        return sum(topic.lost for topic in self._topics)
+        """Messages that the middleware has lost since the last reset."""
+        return sum(topic.lost for topic in self._topics) - self._lost_before
 
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
@@ -128,6 +135,7 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
+        self._lost_before = sum(topic.lost for topic in self._topics)
         self.intervals = Intervals()
         self.jumps = Jumps()
 
@@ -156,7 +164,10 @@ class AtomizerInput:
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
-            self._held.append(message)
+            if len(self._held) < MOST_HELD:
+                self._held.append(message)
+            else:
+                self.anomalies[NOT_HELD] += 1
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:
@@ -204,8 +215,11 @@ class AtomizerInput:
 
     # --- poses
 
-    def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
+    def _take_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
         self.poses_received += 1
+        sent_ns = info['source_timestamp']
+        if len(message.header.frame_id) > LONGEST_NAME:
+            message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
         self._newest, self.sent_ns = message, sent_ns
         if self._early and sent_ns > self._early[1]:
             if self._early[0] - stamp_ns(message.header) > AHEAD_NS:
@@ -228,6 +242,8 @@ class AtomizerInput:
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
+        if frame_id not in self.refused_frames and len(self.refused_frames) >= MOST_NAMES:
+            frame_id = OTHERS
         self.refusal = str(missing)
         self.refused_s = time.monotonic()
         if frame_id not in self.refused_frames:
@@ -239,8 +255,9 @@ class AtomizerInput:
 
     # --- states
 
-    def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
+    def _take_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
         self.states_received += 1
+        sent_ns = info['source_timestamp']
         state_ns = stamp_ns(message.header)
         # Before its poses after a pause, too: the next pose tells.
         if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
@@ -252,9 +269,9 @@ class AtomizerInput:
             change = trigger_change(message)
             self._on_state(change)
         except PaintError as error:
-            if str(error) not in self.state_errors:
+            if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
-            self.state_errors.add(str(error))
+                self.state_errors.add(str(error))
             self.anomalies['states refused'] += 1
             return
         if message.spraying and change.flow == 0.0:

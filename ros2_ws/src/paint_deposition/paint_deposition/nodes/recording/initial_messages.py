@@ -53,8 +53,8 @@ class InitialMessages:
         self.begin_ns = 0
         # Topics of states that this run does not have yet.
         self._due: set[str] = set()
-        self._placed: list[Recorded] = []
-        self._transforms: deque[Recorded] = deque()
+        self._placed: deque[Recorded] = deque(maxlen=REMEMBERED_MESSAGES)
+        self._transforms: deque[Recorded] = deque(maxlen=REMEMBERED_MESSAGES)
         self._lasting: dict[object, Recorded] = {}
 
     def add(self, topic: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> list[Recorded]:
@@ -102,9 +102,9 @@ class InitialMessages:
         early = {poses: self._forget_motion(poses, cut_ns) for poses in self._guns}
         # A simulator says where a part stands after it has said that the part is there.
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
-        before = self._placed[: len(self._placed) - len(later)][-1:]
+        before = [*self._placed][: len(self._placed) - len(later)][-1:]
         stays = not later and before and _pose(before[0]) == _values(part.part_pose)
-        self._placed = before if stays else later
+        self._placed = deque(before if stays else later, REMEMBERED_MESSAGES)
         early[self._part_pose] = len(later)
         return cut_ns, {topic: count for topic, count in early.items() if count}
 
@@ -114,7 +114,7 @@ class InitialMessages:
 
     def end_motion(self) -> None:
         """Forget the poses, which no run needs any more, and where the part stood before."""
-        self._placed = self._placed[-1:]
+        self._placed = deque([*self._placed][-1:], REMEMBERED_MESSAGES)
         for poses in self._guns:
             self._forget_motion(poses, math.inf)
 
@@ -130,6 +130,8 @@ class InitialMessages:
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)
         self._lasting[key] = message
+        if len(self._lasting) > REMEMBERED_MESSAGES:
+            del self._lasting[next(iter(self._lasting))]
 
     def _states_in_force(self, first: Recorded) -> list[Recorded]:
         """The states of a gun before its first message in a run, unless its stream restarted."""

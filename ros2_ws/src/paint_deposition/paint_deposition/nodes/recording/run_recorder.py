@@ -36,9 +36,7 @@ from paint_deposition.nodes.runtime.topics import (
     PART_TOPIC,
     PROGRESS,
     PROGRESS_TOPIC,
-    compatible_qos,
     gun_topic,
-    incompatible_policies,
 )
 
 DISCOVERY_PERIOD_S = 0.1
@@ -153,7 +151,6 @@ class RunRecorder(ManagedNode):
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
         depth = POSE_QUEUE_DEPTH if is_pose or name == TF else QUEUE_DEPTH
-        profile = compatible_qos([publisher.qos_profile for publisher in publishers], depth)
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
@@ -162,8 +159,7 @@ class RunRecorder(ManagedNode):
             topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
-        if topic.profile is None or incompatible_policies(profile, topic.profile):
-            topic.subscribe(profile)
+        topic.subscribe(depth)
 
     # --- writing
 

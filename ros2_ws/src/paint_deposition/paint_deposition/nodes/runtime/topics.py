@@ -37,15 +37,6 @@ def compatible_qos(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
     )
 
 
-def incompatible_policies(offered: QoSProfile, wanted: QoSProfile) -> list[str]:
-    """The policies in which an offered QoS is weaker than the wanted one: a larger number."""
-    return [
-        name
-        for name in ('reliability', 'durability')
-        if getattr(offered, name) > getattr(wanted, name)
-    ]
-
-
 def node_name(info: TopicEndpointInfo) -> str:
     """The fully qualified name of the node of an endpoint."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'

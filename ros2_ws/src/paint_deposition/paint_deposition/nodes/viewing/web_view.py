@@ -23,10 +23,10 @@ from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -207,11 +207,11 @@ class WebView(PaintNode):
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
             self._frame.take_part_pose(parent, pose)
 
-    def _take_state(self, gun: str, state: AtomizerState, _sent_ns: int) -> None:
+    def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
             self._flow[gun] = trigger_change(state).flow
 
-    def _take_pose(self, gun: str, message: PoseStamped, _sent_ns: int) -> None:
+    def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
         self._waiting[gun].add(message, time.monotonic())
 
     def _move_gun(self, gun: str, message: PoseStamped) -> None:
