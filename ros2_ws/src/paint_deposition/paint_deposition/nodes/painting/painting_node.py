@@ -262,7 +262,12 @@ class PaintingNode(ManagedNode, ABC):
             self._adopt_repainted(self.repainting)
         oriented = self._outward_side.orient(self.surface, self.film.guns)
         if oriented is not self.surface:
-            self._turn_inside_out(oriented)
+            try:
+                self._turn_inside_out(oriented)
+            except PaintError as error:  # readings that were taken on its other side, say
+                self._outward_side = OutwardSide(0)
+                self.model_problem = f'the gun paints the other side of the part: {error}'
+                self.get_logger().error(self.model_problem)
 
     def _adopt_repainted(self, repainting: Repainting) -> None:
         self.repainting = None
