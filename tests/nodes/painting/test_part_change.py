@@ -367,3 +367,38 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
+
+
+def test_a_part_is_resumed_from_its_recording_after_a_crash(
+    record, simulator, robot, painted, call, onlooker, executor, wait_until, tmp_path
+):
+    """Poses go on all the time; the recorder goes on with the run, and the film is whole."""
+    recorder, node = record(output_directory=str(tmp_path / 'runs')), simulator()
+    source, operator = robot(node), onlooker({})
+    wait_until(lambda: source.has_subscribers(2), what='both')
+    assert call(operator, ChangePart, SERVICE, ChangePart.Request(serial='7')).success
+    wait_until(lambda: recorder.run.folder.name == '7', what='the run')
+    source.send(MOTION, slice(0, 100))
+    painted(node, 100)
+    executor.remove_node(node)
+    node.destroy_node()
+    source.send(MOTION, slice(100, 150))
+    again = simulator()
+    wait_until(lambda: source.is_subscribed_by(again), what='the next simulator')
+    source.send(MOTION, slice(150, 200))
+    painted(again, 50)
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    run = str(tmp_path / 'runs/7')
+    future = client.call_async(ChangePart.Request(serial='7', resume=run))
+    wait_until(lambda: again.parts.waiting, what='the request')
+    source.send(MOTION, slice(200, 250))
+    wait_until(future.done, what='the answer')
+    assert future.result().success, future.result().message
+    assert future.result().run == '7'
+    source.send(MOTION, slice(250, None))
+    film = painted(again, len(MOTION))
+    assert np.array_equal(film, offline_um(again, MOTION))
+    assert again.film.counts.rejected == 0
+    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='the recorder')
+    assert recorder.run.folder.name == '7'

@@ -142,6 +142,10 @@ class LiveFilm:
         self._integrator.use(with_brushes_of(self.model, before.model))
         self._clear()
 
+    def forget_trigger(self) -> None:
+        """Forget how the gun was before a reset; what comes next says it."""
+        self._carried, self._brushes = [], set()
+
     def _clear(self) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(

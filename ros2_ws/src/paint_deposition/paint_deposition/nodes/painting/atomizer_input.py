@@ -33,7 +33,7 @@ AHEAD_NS = 1_000_000_000
 AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
 # Of what a peer names: so many different ones are told apart, and so many characters of each.
 MOST_NAMES, LONGEST_NAME = 20, 200
-OTHERS = 'others'
+OTHERS, STATES_REFUSED = 'others', 'states refused'
 # Hours of poses: more do not wait for a part.
 MOST_HELD = 2_000_000
 NOT_HELD = 'messages dropped, since too many waited for the part'
@@ -118,11 +118,15 @@ class AtomizerInput:
         """Messages that the middleware has lost since the last reset."""
         return sum(topic.lost for topic in self._topics) - self._lost_before
 
+    @property
+    def received_ns(self) -> int:
+        """Stamp of the newest pose received, 0 before the first."""
+        return stamp_ns(self._newest.header) if self._newest is not None else 0
+
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
         self.reset_counts()
-        if self._newest is not None:
-            self.newest_ns = stamp_ns(self._newest.header)
+        self.newest_ns = self.received_ns
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
@@ -161,6 +165,16 @@ class AtomizerInput:
         for message in held:
             self._process(message, 0)
         self.flush()
+
+    def drop_held(self, until_ns: int) -> None:
+        """Drop kept poses up to the newest with this stamp, and those before it."""
+        stamps = [
+            stamp_ns(kept.header) if isinstance(kept, PoseStamped) else -1
+            for kept in self._held or []
+        ]
+        if until_ns in stamps:
+            end = len(stamps) - stamps[::-1].index(until_ns)
+            self._held[:end] = [k for k in self._held[:end] if isinstance(k, AtomizerState)]
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
@@ -272,7 +286,7 @@ class AtomizerInput:
             if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
                 self.state_errors.add(str(error))
-            self.anomalies['states refused'] += 1
+            self.anomalies[STATES_REFUSED] += 1
             return
         if message.spraying and change.flow == 0.0:
             if not self.anomalies[NO_FLOW]:

@@ -48,8 +48,9 @@ QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
 # The answer of a process that ends at once may be lost, and its client would wait for ever.
 ANSWER_S = 1.0
-# The run of a part that has left takes poses that were sent for it until none has come so long.
-LATE_S = 0.5
+# The run of a part that has left takes poses that were sent for it until none has come so long, or
+# so long after each gun's first pose for the next part: a publisher keeps the order.
+LATE_S, FOLLOWED_S = 2.0, 0.3
 
 
 class RunRecorder(ManagedNode):
@@ -103,6 +104,8 @@ class RunRecorder(ManagedNode):
         # last of them was sent. Poses that came even later.
         self._leaving: RunWriter | None = None
         self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
+        # Poses of these topics have not come since it left.
+        self._behind: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -173,6 +176,9 @@ class RunRecorder(ManagedNode):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
             if name in self._progress:
                 return
+        elif self._leaving is not None and name in self._behind:
+            self._behind.discard(name)
+            self._leave_soon()
         elif self._leaving is not None and name == TF in self._leaving.counts:
             self._guarded(self._leaving.write, name, cdr, log_time_ns, sent_ns)
         for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
@@ -194,6 +200,10 @@ class RunRecorder(ManagedNode):
         self._leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
         self._leaving.keep_another(name)
         self._leaves_s = time.monotonic() + LATE_S
+
+    def _leave_soon(self) -> None:
+        if not self._behind:
+            self._leaves_s = min(self._leaves_s, time.monotonic() + FOLLOWED_S)
 
     def _end_of_leaving(self) -> None:
         """Complete the run of the part that has left."""
@@ -222,6 +232,9 @@ class RunRecorder(ManagedNode):
             self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
             self._leaving, self._lost_of_leaving = self.run, self._losses
             self._leaves_s = time.monotonic() + LATE_S
+            self._behind = {name for name in self._progress if self.run.counts.get(name)}
+            self._behind -= early.keys()
+            self._leave_soon()
             self._begin_run(new_run, log_time_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:

@@ -8,6 +8,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
 PART_TOPIC = 'part'
+TRUST_TOPIC = 'thickness/trust'
 
 # Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
 # builds one mesh marker, whatever the reliability: a full queue drops its oldest message.

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
@@ -45,6 +46,8 @@ from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
 # Poses are taken from their queue so often [s]; at 1 kHz half a second of them fits into it.
 TAKE_PERIOD_S = 0.05
 DEPTH = 500
+# The simulator speaks twice a second [s].
+TRUST_PERIOD_S, SILENT_S = 0.5, 2.0
 
 WEB_VIEW = dict(
     **fixed_while_running(
@@ -90,6 +93,7 @@ class WebView(PaintNode):
             (ThicknessField, 'thickness/field', self._take_field, results),
             (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
             (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+            (DiagnosticStatus, topics.TRUST_TOPIC, self._take_trust, topics.LATCHED),
         ):
             self.create_subscription(message, topic, take, profile)
         self._inputs = [
@@ -104,6 +108,7 @@ class WebView(PaintNode):
             )
         ]  # fmt: skip
         self.create_steady_timer(TAKE_PERIOD_S, self._take_motion)
+        self.create_steady_timer(TRUST_PERIOD_S, self._show_trust)
         self._diagnostics = Diagnostics(self, {'page': self._status})
 
     def _load_files(self) -> None:
@@ -118,6 +123,8 @@ class WebView(PaintNode):
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
         self._rmse_um = float('nan')
+        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
+        self._doubts, self._trusted_s = '', time.monotonic()
         self._problem = ''
         self._sent = 0, time.monotonic()
         self._show_part(self.values['mesh_file'])
@@ -186,6 +193,15 @@ class WebView(PaintNode):
 
     def _take_comparison(self, stats: ComparisonStats) -> None:
         self._rmse_um = stats.rmse_um
+
+    def _take_trust(self, trust: DiagnosticStatus) -> None:
+        self._doubts = '' if trust.level == OK else trust.message
+        self._trusted_s = time.monotonic()
+
+    def _show_trust(self) -> None:
+        silent_s = time.monotonic() - self._trusted_s
+        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > SILENT_S else ''
+        self.scene.tell('trust', doubts=silent or self._doubts)
 
     def _say(self, problem: str) -> None:
         """Tell what keeps the film from being shown; '' is nothing."""
