@@ -43,7 +43,7 @@ def test_beginning_again_keeps_what_came_early_for_it():
     flow.add(0, 0.0, another_stream=True)
     flow.add(50, 1.0, another_stream=True)
     assert flow_at(flow, [10, 1500, 2500]).tolist() == [0.0, 1.0, 0.0]
-    flow.restart()
+    flow.restart(ended_ns=1500)
     assert flow_at(flow, [10, 60, 1500]).tolist() == [0.0, 1.0, 1.0]
     flow.add(10, 0.5, another_stream=True)
     assert flow.go_on() == [10]

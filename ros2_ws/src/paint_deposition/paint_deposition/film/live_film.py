@@ -25,7 +25,7 @@ from paint_deposition.motion.pose_stream import (
     TriggerChange,
 )
 from paint_deposition.motion.trajectory import PoseCounts
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trigger import BEFORE_ALL_NS, ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
@@ -34,8 +34,6 @@ DEFAULT_TRIGGER_LATENCY_S = 0.1
 STREAM_RESTART_NS = 1_000_000_000
 # That wait for poses; no gun is switched so often within the time that poses may be missing.
 MOST_CHANGES = 100_000
-# Earlier than any stamp [ns].
-BEFORE_ALL_NS = -(2**62)
 _STAMP = attrgetter('stamp_ns')
 
 

@@ -59,6 +59,8 @@ class PathBuilder:
         self._gap_before_next = False
         self._states: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._began_ns: int | None = None
+        # First stamp of the stream.
+        self._stream_ns: int | None = None
 
     @property
     def counts(self) -> PoseCounts:
@@ -97,14 +99,17 @@ class PathBuilder:
         )
         continued, *restarted = self._screen.take(batch)
         self._waiting.append(continued)
+        if self._stream_ns is None and len(continued):
+            self._stream_ns = int(continued.stamps_ns[0])
         if len(continued) and continued.stamps_ns[-1] > self._restart_until_ns:
             self._go_on()
         for stream in restarted:
+            ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
+            within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
+            self._stream_ns = int(stream.stamps_ns[0])
             self._cut_segments(until_ns=None, finish=True)
             if not self._knows_all_changes:
-                if self._integrated_ns is not None:
-                    self._flow.forget(self._integrated_ns)
-                self._flow.restart()
+                self._flow.restart(ended_ns if within else None)
             self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
             self._waiting = [stream]

@@ -11,6 +11,8 @@ from paint_deposition.kernel.compiler import njit
 
 # The brush of a motion that names none: the only one.
 ONLY_BRUSH = 0
+# Earlier than any stamp [ns].
+BEFORE_ALL_NS = -(2**62)
 _TIMES = ('dwell_s', 'since_on_s', 'since_off_s')
 TRIGGER_STATE = np.dtype(
     [(name, 'f8') for name in ('flow', 'open_flow', *_TIMES)] + [('open_brush', 'i8')]
@@ -87,7 +89,6 @@ class FlowSchedule:
     def __init__(self) -> None:
         self._changes: list[tuple[int, float, int]] = []
         self._of_another_stream: list[tuple[int, float, int]] = []
-        self._forgetful = False
 
     def __bool__(self) -> bool:
         return bool(self._changes)
@@ -119,7 +120,6 @@ class FlowSchedule:
         superseded = bisect_right(self._changes, until_ns, key=_STAMP) - 1
         if superseded > 0:
             del self._changes[:superseded]
-            self._forgetful = True
 
     @property
     def waiting(self) -> list[int]:
@@ -134,13 +134,16 @@ class FlowSchedule:
             insort(self._changes, change, key=_STAMP)
         return stamps
 
-    def restart(self) -> None:
-        """Go back to the changes of a restarted stream: those that waited for it.
+    def restart(self, ended_ns: int | None) -> None:
+        """Go over to a restarted stream, and the changes that waited for it.
 
-        If none did, the gun is off until the next change, unless nothing was forgotten yet.
+        Until the first of them the gun stays as it was when the stream before ended, at
+        ``ended_ns``, if the clock was set back in its midst; None: a replay, off until then.
         """
         early, self._of_another_stream = self._of_another_stream, []
-        if early:
+        if not self._changes:
             self._changes = early
-        elif self._forgetful:
-            self._changes = [(self._changes[0][0], 0.0, ONLY_BRUSH)]
+            return
+        passed = bisect_right(self._changes, ended_ns, key=_STAMP) if ended_ns is not None else 0
+        _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
+        self._changes = [(BEFORE_ALL_NS, flow, brush), *early]

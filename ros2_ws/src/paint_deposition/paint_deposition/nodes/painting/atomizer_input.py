@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -89,6 +89,9 @@ class AtomizerInput:
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._early: tuple[int, int] | None = None
         self._flushed_s = -math.inf
+        # What was taken from the queues, and when it was sent.
+        self._new_poses: list[tuple[PoseStamped, int]] = []
+        self._new_states: list[tuple[AtomizerState, int]] = []
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
@@ -97,9 +100,9 @@ class AtomizerInput:
         depth = node.values['pose_queue_depth']
         subscribe = partial(AdaptiveSubscription, node, depth=depth)
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, self._take_pose),
+            subscribe(PoseStamped, self._pose_topic, self._note_pose),
             # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, self._take_state, latched=True),
+            subscribe(AtomizerState, self._state_topic, self._note_state, latched=True),
         ]
         self.reset_counts()
         self._progress = node.create_publisher(
@@ -191,15 +194,25 @@ class AtomizerInput:
 
     def take_pending(self) -> None:
         """Take all messages in the queues and pass them on."""
-        self._frame.take_pending()
-        for topic in self._topics:
-            topic.take_pending()
+        self._drain()
         self.flush()
 
-    def _take(self) -> None:
+    def _drain(self) -> None:
+        """Process what is in the queues, each state before the first pose that was sent later."""
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
+        poses, self._new_poses = self._new_poses, []
+        states, self._new_states = deque(self._new_states), []
+        for pose, sent_ns in poses:
+            while states and states[0][1] < sent_ns:
+                self._take_state(*states.popleft())
+            self._take_pose(pose, sent_ns)
+        for state in states:
+            self._take_state(*state)
+
+    def _take(self) -> None:
+        self._drain()
         waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
         if waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
@@ -227,11 +240,16 @@ class AtomizerInput:
             )
         self._on_poses(batch)
 
+    def _note_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
+        self._new_poses.append((message, info['source_timestamp']))
+
+    def _note_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
+        self._new_states.append((message, info['source_timestamp']))
+
     # --- poses
 
-    def _take_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
+    def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
         self.poses_received += 1
-        sent_ns = info['source_timestamp']
         if len(message.header.frame_id) > LONGEST_NAME:
             message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
         self._newest, self.sent_ns = message, sent_ns
@@ -269,9 +287,8 @@ class AtomizerInput:
 
     # --- states
 
-    def _take_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
+    def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
         self.states_received += 1
-        sent_ns = info['source_timestamp']
         state_ns = stamp_ns(message.header)
         # Before its poses after a pause, too: the next pose tells.
         if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
