@@ -1,16 +1,19 @@
 """The messages with which a run begins: what is in force, and what came for its part already."""
 
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from geometry_msgs.msg import TransformStamped
-from paint_msgs.msg import Part
+from paint_msgs.msg import AtomizerState, Part
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
+from paint_deposition.film.live_film import STREAM_RESTART_NS
 from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.nodes.recording.recorder_parameters import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
@@ -62,8 +65,16 @@ class InitialMessages:
         message = Recorded(topic, cdr, log_time_ns, sent_ns)
         if topic in self._motion:
             message = message._replace(stamp_ns=header_stamp_ns(cdr))
+            if topic in self._guns:
+                states = self._states_in_force(message)
+                self._motion[topic].append(message)
+                return states
+            try:
+                trigger_change(deserialize_message(cdr, AtomizerState))
+            except RecordingError:  # whoever paints refuses it, too
+                return []
             states = self._states_in_force(message)
-            self._motion[topic].append(message)
+            self._remember_state(message)
             return states
         if topic == self._part_pose:
             self._placed.append(message)
@@ -126,6 +137,18 @@ class InitialMessages:
         self.begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
         states = [state for pose in early for state in self._states_in_force(pose)]
         return [m._replace(log_time_ns=self.begin_ns) for m in lasting] + states + early
+
+    def _remember_state(self, state: Recorded) -> None:
+        """In the order of the stamps, as a film has them; all anew where a stream restarted."""
+        states = self._motion[state.topic]
+        (poses,) = (poses for poses, its in self._guns.items() if its == state.topic)
+        newest = (self._motion[poses] or [self._forgotten[poses]])[-1]
+        if newest.stamp_ns - state.stamp_ns > STREAM_RESTART_NS:
+            states.clear()
+        if len(states) == REMEMBERED_MESSAGES:
+            states.popleft()
+        row = bisect_right(states, state.stamp_ns, key=lambda other: other.stamp_ns)
+        states.insert(row, state)
 
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)
