@@ -147,8 +147,8 @@ class FrameTree:
         return restarted
 
     def _has_room(self, child: str) -> bool:
-        known = self._fixed, self._moving
-        return any(_name(child) in its for its in known) or sum(map(len, known)) < MOST_FRAMES
+        known = self._fixed.keys() | self._moving.keys()
+        return _name(child) in known or len(known) < MOST_FRAMES
 
     def placed(self, child: str) -> tuple[str, Rigid] | None:
         """Parent and pose of a frame that does not move, None if it does or is not known."""

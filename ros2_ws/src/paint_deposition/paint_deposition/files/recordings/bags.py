@@ -74,7 +74,8 @@ def trajectory_of(
             f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
-    order, rows = np.argsort(gun.stamps_ns, kind='stable'), np.empty(0, np.int64)
+    order: np.ndarray = np.argsort(gun.stamps_ns, kind='stable')
+    rows: np.ndarray = np.empty(0, np.int64)
     if np.any(np.diff(trajectory.stamps_ns) < 0):
         # Where the clock was set back, the order in which they came says of which stream they are.
         order = np.arange(len(order))

@@ -171,13 +171,11 @@ class AtomizerInput:
 
     def drop_held(self, until_ns: int) -> None:
         """Drop kept poses up to the newest with this stamp, and those before it."""
-        stamps = [
-            stamp_ns(kept.header) if isinstance(kept, PoseStamped) else -1
-            for kept in self._held or []
-        ]
+        held = self._held or []
+        stamps = [stamp_ns(k.header) if isinstance(k, PoseStamped) else -1 for k in held]
         if until_ns in stamps:
             end = len(stamps) - stamps[::-1].index(until_ns)
-            self._held[:end] = [k for k in self._held[:end] if isinstance(k, AtomizerState)]
+            held[:end] = [k for k in held[:end] if isinstance(k, AtomizerState)]
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
