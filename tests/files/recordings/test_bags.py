@@ -14,6 +14,7 @@ from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, Definition, standard
+from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 
 
@@ -128,11 +129,46 @@ def test_poses_beside_service_events_are_read(tmp_path):
     assert same(read_trajectory(tmp_path / 'mixed'), written)
 
 
-def test_mixed_frames_are_named(tmp_path):
-    entries = pose_entries(straight_pass(8, triggers=False, frame_id='door'))
-    entries[5:] = pose_entries(straight_pass(8, triggers=False, frame_id='base'))[5:]
-    text = refusal(write_bag(tmp_path / 'mixed', entries))
-    assert "mixes frames 'base' (3), 'door' (5)" in text
+def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_strict(tmp_path):
+    """A pose that nothing places, states without stamp or possible flow; one frame is none."""
+    written, messages = straight_pass(20, triggers=False, frame_id='part'), Messages()
+    entries = pose_entries(written)
+    for row, frame in ((3, ''), (5, 'nowhere'), (7, '/part')):
+        pose = written.positions_m[row], written.quaternions_xyzw[row]
+        entries[row] = (*entries[row][:2], messages.pose(written.stamps_ns[row], *pose, frame))
+    states = [(0, True, 1.0), (START_NS, True, -1.0), (START_NS, True, np.inf),
+              (START_NS + 1, True, 0.5)]  # fmt: skip
+    entries += [('/state', START_NS + k, messages.state(*state)) for k, state in enumerate(states)]
+    path = write_bag(tmp_path / 'odd', entries)
+    read = read_recording(path, state_topic='/state')
+    rows = np.delete(np.arange(20), 5)
+    assert np.array_equal(read.stamps_ns, written.stamps_ns[rows])
+    assert np.array_equal(read.positions_m, written.positions_m[rows])
+    assert read.trigger_flow.tolist() == [0.5]
+    said = ' '.join(read.warnings)
+    assert "1 poses in frame 'nowhere', of which 'part' is not known: left out" in said
+    assert '3 states on /state, the first of them an atomizer state without a stamp' in said
+    with pytest.raises(RecordingError, match='leave out --strict'):
+        read_recording(path, state_topic='/state', strict=True)
+
+
+def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
+    """As the nodes bring them: by the transforms, or by where the part is said to stand."""
+    written, messages = straight_pass(20, triggers=False, frame_id='part'), Messages()
+    place = [0.5, 0.1, -0.2, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]
+    seen = Rigid.of(place).applied(written.positions_m, written.quaternions_xyzw)
+    entries = pose_entries(written)
+    for row in range(8, 20):
+        pose = seen[0][row], seen[1][row]
+        entries[row] = (*entries[row][:2], messages.pose(written.stamps_ns[row], *pose, 'cell'))
+    bare = write_bag(tmp_path / 'bare', entries)
+    static = messages.transforms((START_NS, 'cell', 'part', place))
+    placed = write_bag(tmp_path / 'placed', [('/tf_static', START_NS, static), *entries])
+    for read in (read_recording(bare, part_pose=place), read_recording(placed)):
+        assert (len(read), read.frame_id, read.warnings) == (20, 'part', ())
+        assert np.allclose(read.positions_m, written.positions_m, atol=1e-12)
+        assert np.allclose(read.quaternions_xyzw, written.quaternions_xyzw, atol=1e-12)
+    assert len(read_recording(bare)) == 8
 
 
 def test_poses_without_stamps_are_refused(tmp_path):

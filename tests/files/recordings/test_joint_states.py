@@ -124,3 +124,14 @@ def test_what_is_no_robot_is_refused(text, words, tmp_path):
     (tmp_path / 'robot.urdf').write_text(text)
     with pytest.raises(RecordingError, match=words):
         Robot.read(tmp_path / 'robot.urdf', tip='tool0')
+
+
+def test_joint_states_that_are_not_finite_are_left_out_and_counted(arm, tmp_path):
+    rows = rows_of()
+    rows[20] = (*rows[20][:3], np.full(6, np.nan))
+    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(arm), frame_id='base_link')
+    assert len(read) == len(rows) - 1
+    assert np.isfinite(read.positions_m).all()
+    assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
+        read.warnings
+    )

@@ -176,3 +176,26 @@ def test_bad_input_is_one_line(comparison):
         with pytest.raises(PaintError, match=words) as caught:
             comparison(**values)
         assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('toward_gun', [True, False])
+def test_readings_with_normals_on_a_sheet_that_is_wound_inward(
+    comparison, readings, robot, painted, onlooker, wait_until, tmp_path, toward_gun
+):
+    """They are taken as `paint compare` takes them; those on the side that stays bare are said."""
+    write_panel(tmp_path / 'panel.stl', reverse=True)
+    heading, *lines = readings.read_text().splitlines()
+    normal = f'0,{-1 if toward_gun else 1},0'
+    text = '\n'.join([f'{heading},nx,ny,nz', *(f'{line},{normal}' for line in lines)])
+    readings.write_text(f'{text}\n')
+    node = comparison()
+    viewer, source = onlooker(), robot(node)
+    source.send(MOTION)
+    painted(node)
+    if toward_gun:
+        assert np.array_equal(node.film.snapshot().film_um,
+                              offline_um(node, MOTION, precision='double'))  # fmt: skip
+        assert node.residuals().painted.all()
+    else:
+        told = 'the gun paints the other side of the part'
+        wait_until(lambda: viewer.reports('model_comparison: film', told, b'\x01'), what=told)

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import trimesh
+from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
 
@@ -25,6 +26,7 @@ from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'
@@ -336,3 +338,67 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
         assert len(motion) == half
         assert np.array_equal(offline_um(of, motion), live)
     assert second.max() > 1.0
+
+
+@pytest.mark.parametrize('placed', [True, False])
+def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
+    simulator, robot, painted, asked, wait_until, placed
+):
+    """The change waits for them; without a transform they are refused on their own part."""
+    node = simulator()
+    # A cell in which transforms may come.
+    node.frame._topics.append(
+        AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
+    )
+    source = robot(node)
+    source.send(MOTION, frame_id='cell')
+    wait_until(lambda: len(node.inputs[0].tf_queue) == len(MOTION), what='poses that wait')
+    future = asked(serial='1')
+    wait_until(lambda: node.parts.waiting, what='the request')
+    source.send(later(MOTION))
+    if placed:
+        node.frame.take_part_pose('cell', [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    wait_until(future.done, what='the change')
+    answer = future.result()
+    assert answer.success, answer.message
+    if placed:
+        figures = json.loads(Path(answer.paths[2]).read_text())
+        assert figures['poses']['received'] == len(MOTION)
+    else:
+        assert not answer.paths
+    assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
+
+
+def test_a_part_is_resumed_from_its_recording_after_a_crash(
+    record, simulator, robot, painted, call, onlooker, executor, wait_until, tmp_path
+):
+    """Poses go on all the time; the recorder goes on with the run, and the film is whole."""
+    recorder, node = record(output_directory=str(tmp_path / 'runs')), simulator()
+    source, operator = robot(node), onlooker({})
+    wait_until(lambda: source.has_subscribers(2), what='both')
+    assert call(operator, ChangePart, SERVICE, ChangePart.Request(serial='7')).success
+    wait_until(lambda: recorder.run.folder.name == '7', what='the run')
+    source.send(MOTION, slice(0, 100))
+    painted(node, 100)
+    executor.remove_node(node)
+    node.destroy_node()
+    source.send(MOTION, slice(100, 150))
+    again = simulator()
+    wait_until(lambda: source.is_subscribed_by(again), what='the next simulator')
+    source.send(MOTION, slice(150, 200))
+    painted(again, 50)
+    client = operator.create_client(ChangePart, SERVICE)
+    wait_until(client.service_is_ready)
+    run = str(tmp_path / 'runs/7')
+    future = client.call_async(ChangePart.Request(serial='7', resume=run))
+    wait_until(lambda: again.parts.waiting, what='the request')
+    source.send(MOTION, slice(200, 250))
+    wait_until(future.done, what='the answer')
+    assert future.result().success, future.result().message
+    assert future.result().run == '7'
+    source.send(MOTION, slice(250, None))
+    film = painted(again, len(MOTION))
+    assert np.array_equal(film, offline_um(again, MOTION))
+    assert again.film.counts.rejected == 0
+    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='the recorder')
+    assert recorder.run.folder.name == '7'

@@ -1,5 +1,6 @@
 """What the gun's states do to the film while it is painted."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
@@ -84,7 +85,10 @@ def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, pai
 
 
 def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, painted, wait_until):
-    """A best-effort robot joins a reliable one, which has been heard from its first pose on."""
+    """A best-effort robot joins a reliable one, which has been heard from its first pose on.
+
+    Once it has left, no pose of the other may be lost again.
+    """
     node = simulator(pose_queue_depth=5000)
     first = Robot(ros_context)
     spin(first)
@@ -96,8 +100,24 @@ def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, pai
     wait_until(lambda: second.pose_publisher.get_subscription_count(), what='best effort')
     second.send(UNTRIGGERED, slice(300, 310))
     wait_until(lambda: node.film.counts.received > 300, what='poses of best effort')
-    (pose_input,) = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
-    assert pose_input.qos_profile.reliability == ReliabilityPolicy.BEST_EFFORT
+
+    def reliability() -> list[ReliabilityPolicy]:
+        inputs = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
+        return [each.qos_profile.reliability for each in inputs]
+
+    wait_until(lambda: reliability() == [ReliabilityPolicy.BEST_EFFORT], what='one subscription')
+    second.destroy_node()
+    # Poses go on while it is replaced, and each of them counts once.
+    row = 310
+    while reliability() != [ReliabilityPolicy.RELIABLE]:
+        first.send(UNTRIGGERED, slice(row, row + 1))
+        row += row < 599
+        until_s = time.monotonic() + 0.01
+        wait_until(lambda until_s=until_s: time.monotonic() > until_s)
+    first.send(UNTRIGGERED, slice(row, 600))
+    assert 310 < row < 599
+    wait_until(lambda: node.film.counts.received == 600, what='all poses')
+    assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
 
 
 def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(
@@ -125,3 +145,17 @@ def test_a_bool_as_the_state_is_an_error(simulator, onlooker, ros_domain, wait_u
     wait_until(lambda: viewer.reports(POSES, told, b'\x02'))
     controller.destroy_node()
     apart.try_shutdown()
+
+
+def test_what_a_peer_names_takes_no_memory(simulator, robot, onlooker, wait_until):
+    node, viewer = simulator(), onlooker()
+    source = robot(node)
+    place = UNTRIGGERED.positions_m[0], UNTRIGGERED.quaternions_xyzw[0]
+    for k in range(40):
+        source.send_pose(UNTRIGGERED.stamps_ns[k], *place, f'{k}' + 'a' * 100_000)
+        source.send_fields(UNTRIGGERED.stamps_ns[k], spraying=True, flow=-1.0 - k)
+    wait_until(lambda: viewer.reports(POSES, '40 poses refused', b'\x02'))
+    wait_until(lambda: node.inputs[0].anomalies['states refused'] == 40)
+    kept = [*node.inputs[0].refused_frames, *node.inputs[0].state_errors]
+    assert sum(map(len, kept)) < 10_000
+    assert len(viewer.status(POSES).message) < 10_000

@@ -1,5 +1,7 @@
 """Recording over real DDS: byte for byte, what was asked for, and with what."""
 
+import time
+
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
@@ -155,3 +157,33 @@ def test_of_two_states_with_one_stamp_the_newer_is_in_force(ros_context, record,
     recorder.close()
     motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
     assert motion.trigger_flow[-1] == 0.5
+
+
+def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
+    record, ros_context, spin, onlooker, wait_until, tmp_path
+):
+    """One comes before its part is announced, others after the next part is."""
+    recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
+    spin(robot)
+    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
+    wait_until(lambda: robot.has_subscribers(1), what='the recorder')
+    robot.send_pose(START_NS, *place)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
+    until_ns = time.time_ns() + 300_000_000
+    at = header('part', START_NS + 9)
+    parts.publish(Part(run='1', header=at, last_sent_ns=until_ns))
+    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
+    for k in range(1, 10):
+        robot.send_pose(START_NS + k, *place)
+    robot.send_state(START_NS + 5, 0.5)
+    wait_until(lambda: recorder._leaving.counts.get('/atomizer/pose') == 10, what='late ones')
+    wait_until(lambda: time.time_ns() > until_ns)
+    robot.send_pose(START_NS + 10, *place)
+    wait_until((tmp_path / 'run/metadata.yaml').is_file, what='the end of the first run')
+    robot.send_pose(START_NS + 11, *place)
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='its own')
+    recorder.close()
+    for run, poses in (('run', range(10)), ('1', range(10, 12))):
+        motion = read_recording(tmp_path / run, state_topic='/atomizer/state')
+        assert motion.stamps_ns.tolist() == [START_NS + k for k in poses]
+        assert motion.trigger_flow.tolist() == [0.5]

@@ -43,6 +43,28 @@ class Driver(Node):
         return all(publisher.get_subscription_count() for publisher in publishers)
 
 
+def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
+    source, ros_context, spin, onlooker, wait_until
+):
+    node = source()
+    viewer = onlooker({'atomizer/pose': (PoseStamped, QoSProfile(depth=500))})
+    stamp = 1_760_000_000_000_000_000
+    for reliability in (ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT):
+        driver = Node('driver', context=ros_context)
+        profile = QoSProfile(depth=100, reliability=reliability)
+        joints = driver.create_publisher(JointState, 'joint_states', profile)
+        spin(driver)
+        wait_until(lambda joints=joints: joints.get_subscription_count() == 1, what='the source')
+        heard = len(viewer.heard['atomizer/pose'])
+        stamp += 4_000_000
+        message = JointState(name=list(JOINTS), position=[0.1] * 6)
+        message.header.stamp = Time(nanoseconds=stamp).to_msg()
+        joints.publish(message)
+        wait_until(lambda n=heard: len(viewer.heard['atomizer/pose']) > n, what='its pose')
+        driver.destroy_node()
+    assert node._poses == 2
+
+
 @pytest.fixture
 def source(ros_context, spin, tmp_path):
     """`source(**parameters)`: the node, with the arm's URDF."""

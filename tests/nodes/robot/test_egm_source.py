@@ -84,6 +84,32 @@ def test_packets_are_counted_by_their_numbers_and_a_restart_is_none_of_them():
     assert stream.own_lag_ns == 30_000_000
 
 
+def test_only_whole_packets_take_the_port_and_a_silent_robot_leaves_it():
+    stream, now_ns = EgmStream(0), 10**18
+    rng = np.random.default_rng(5)
+    odd = [b'', b'\x08', numbered([numbered([7, 8])]), egm_robot(3, 4)[:12]]
+    odd += [rng.bytes(60) for _ in range(40)]
+    for packet in odd:
+        assert stream.take(packet, now_ns, 'stranger') is None
+    assert (stream.sender, stream.invalid, stream.lost) == ('', len(odd), 0)
+    assert stream.take(egm_robot(1, 4), now_ns, 'robot') is not None
+    assert stream.take(egm_robot(9000, 4), now_ns + 10**9, 'another') is None
+    assert (stream.sender, stream.other, stream.lost) == ('robot', 'another', 0)
+    assert stream.take(egm_robot(9001, 8), now_ns + 2 * 10**9, 'another') is not None
+    assert (stream.sender, stream.lost) == ('another', 0)
+
+
+@pytest.mark.parametrize('step_ms', [-(2**32), -60_000, 60_000])
+def test_a_step_of_the_controllers_clock_does_not_move_the_stamps(step_ms):
+    """It runs over after 49.7 days, and is set."""
+    stream, now_ns = EgmStream(LAG_NS), 10**18
+    begin_ms = 2**32 - 100 if step_ms == -(2**32) else 100_000
+    for k in range(60):
+        tm_ms = begin_ms + 4 * k + (step_ms if k >= 25 else 0)
+        sample = stream.take(egm_robot(k + 7, tm_ms), now_ns + 4_000_000 * k)
+        assert sample.stamp_ns == now_ns + 4_000_000 * k - LAG_NS
+
+
 def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
     ros_context, spin, onlooker, wait_until
 ):

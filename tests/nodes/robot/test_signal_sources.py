@@ -47,6 +47,7 @@ class Controller:
         self.subscribed: dict[str, list[str]] = {}
         self.socket = None
         self.cookie = ''
+        self.sessions = 0
 
     def tell(self, **values: float) -> None:
         self.socket.send(event(**values))
@@ -65,11 +66,17 @@ class Controller:
                     self.end_headers()
                     return
                 controller.subscribed = parse_qs(body)
+                controller.sessions += 1
                 self.send_response(201)
                 self.send_header('Location', f'ws://127.0.0.1:{port}/poll/1')
                 self.send_header('Set-Cookie', 'ABBCX=21; path=/')
                 self.end_headers()
                 self.wfile.write(event(gun=0, flow=0).encode())
+
+            def do_GET(self) -> None:
+                controller.sessions -= self.path == '/logout' and 'ABBCX' in self.headers['Cookie']
+                self.send_response(200)
+                self.end_headers()
 
             def log_message(self, *_) -> None:
                 pass
@@ -134,8 +141,8 @@ class Supply:
             task.cancel()
         await asyncio.gather(*left, return_exceptions=True)
 
-    def set(self, name: str, value, at: datetime) -> None:
-        data = ua.DataValue(ua.Variant(value), SourceTimestamp=at)
+    def set(self, name: str, value, at: datetime, **status: ua.StatusCode) -> None:
+        data = ua.DataValue(ua.Variant(value), SourceTimestamp=at, **status)
         self._wait(self._nodes[name].write_value(data))
 
     def _wait(self, work):
@@ -170,6 +177,11 @@ def test_signals_of_a_controller_switch_the_gun(ros_context, spin, states, wait_
         wait_until(lambda: states.reports('rws_source: signals', 'following the signals'))
         controller.socket.close()
         wait_until(lambda: states.reports('rws_source: signals', url, b'\x02'), what='the break')
+        controller.socket = None
+        wait_until(lambda: controller.socket is not None, what='another connection')
+        assert controller.sessions == 1
+        node.close()
+        wait_until(lambda: controller.sessions == 0, what='the end of the session')
 
 
 def test_variables_of_a_material_supply_count_from_their_own_time(
@@ -195,6 +207,16 @@ def test_variables_of_a_material_supply_count_from_their_own_time(
         told = 'Voltage arrives 30'
         wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
         assert states.newest('atomizer/state').voltage_kv == 62.0
+        # Nothing that is no value goes unnoticed, nor is taken for one.
+        heard = len(states.heard['atomizer/state'])
+        bad = ua.StatusCode(ua.StatusCodes.BadSensorFailure)
+        supply.set('Voltage', None, datetime.now(timezone.utc), StatusCode=bad)
+        told = 'Voltage is BadSensorFailure; the gun stays as it was'
+        wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
+        supply.set('Open', False, datetime.now(timezone.utc))
+        wait_until(lambda: len(states.heard['atomizer/state']) > heard, what='the closing')
+        assert states.newest('atomizer/state').voltage_kv == 62.0
+        wait_until(lambda: states.reports('opcua_source: signals', told, b'\x02'), what=told)
 
 
 @pytest.fixture
@@ -202,6 +224,28 @@ def free_port():
     with socket.socket() as free:
         free.bind(('127.0.0.1', 0))
         return free.getsockname()[1]
+
+
+def test_values_from_before_a_connection_are_not_called_late(ros_context):
+    """After a break, too; and whoever looks does so while the source takes values."""
+
+    class Twice(OpcuaSource):
+        connections = 0
+
+        def follow(self, stopped) -> None:
+            self.connections += 1
+            for _ in range(3000 if self.connections > 1 else 1):
+                self.take('gun', 1.0, time.time_ns() - (0 if self.lags() else 80_000_000_000))
+            raise OSError('broken off')
+
+        def lags(self) -> int:
+            return 'gun' not in self._silent
+
+    node = Twice(context=ros_context, parameter_overrides=parameters(trigger='gun'))
+    while node.connections < 3:
+        status = node._status()
+        assert 'after its own time' not in status.message
+    node.destroy_node()
 
 
 def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():

@@ -19,7 +19,7 @@ from paint_deposition.film.statistics import (
     require_band,
 )
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import PoseBatch, events_of
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.live.scene import Scene
@@ -129,9 +129,7 @@ class Replay:
         film = LiveFilm(
             self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
         )
-        recorded = motion.trajectory
-        for row, (stamp_ns, flow, brush) in enumerate(recorded.triggers):
-            film.add_trigger(TriggerChange(stamp_ns, flow, brush, recorded.set_points_of(row)))
+        film.replay(events_of(motion.trajectory, until=0))
         return film
 
     def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
@@ -140,7 +138,7 @@ class Replay:
         first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
         rows = slice(int(first), int(end))
         batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
-        film.add_poses(batch.select(rows))
+        film.replay(events_of(motion, int(first), int(end)))
         for row in range(*rows.indices(len(motion))):
             for position, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
                 self.scene.move_gun(self._motions[number].name, position, z_axis, flow[row])
@@ -162,5 +160,6 @@ def _flow_at_poses(motion: Trajectory) -> np.ndarray:
     """(N,) relative flow at each pose; 1 without a trigger."""
     if not len(motion.trigger_flow):
         return np.ones(len(motion))
-    passed = np.searchsorted(motion.trigger_stamps_ns, motion.stamps_ns, side='right')
-    return np.concatenate([[0.0], motion.trigger_flow])[passed]
+    order = np.argsort(motion.trigger_stamps_ns, kind='stable')
+    passed = np.searchsorted(motion.trigger_stamps_ns[order], motion.stamps_ns, side='right')
+    return np.concatenate([[0.0], motion.trigger_flow[order]])[passed]

@@ -197,6 +197,8 @@ MOTION = (
     click.option('--angle-unit', type=click.Choice(['deg', 'rad']),
                  help='Unit of joints and angles; default: that of the headings, else rad.'),
     click.option('--frame-id', help="Name of the part's frame; default: part."),
+    click.option('--strict', is_flag=True,
+                 help='Refuse a recording with a pose or state that would be left out.'),
     PART_POSE,
 )  # fmt: skip
 

@@ -1,5 +1,6 @@
 """Reading the motion of guns from files of any kind, in the frame of the part."""
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -76,8 +77,14 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
-            recorded = replace(recorded, warnings=(*recorded.warnings, *bag.warnings))
-            return _in_part_frame(recorded, source, bag)
+            if recorded.frames:
+                recorded = _in_one_frame(recorded, source, bag)
+                source = source.model_copy(update={'part_pose': None})
+            brought = _in_part_frame(recorded, source, bag)
+            skipped = tuple(f'{path}: {n} {what}: left out' for what, n in bag.skipped.items())
+            if skipped and source.strict:
+                raise RecordingError(f'{skipped[0]}; mend the recording, or leave out --strict')
+            return replace(brought, warnings=(*brought.warnings, *bag.warnings, *skipped))
     return _in_part_frame(replace(recorded, source=str(path)), source, None)
 
 
@@ -202,6 +209,37 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
     return replace(recorded, warnings=(*recorded.warnings, warning))
 
 
+def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Trajectory:
+    """Bring poses of several frames into one, as the nodes do: a pose without a frame is the
+    part's, and one for which no transform is known is left out.
+    """
+    from paint_deposition.files.recordings.transforms import lookups, read_frames
+
+    tree, part, frames = read_frames(bag), source.frame_id or PART, np.array(recorded.frames)
+    others = Counter(frame for frame in recorded.frames if not is_frame(frame, part))
+    if source.part_pose is not None and others:
+        tree.place(part, others.most_common(1)[0][0], source.part_pose)
+    own = [frame for frame in {*recorded.frames} if is_frame(frame, part)]
+    known = own or tree.moving_between(recorded.frame_id, part) is not None
+    target = part if known else recorded.frame_id
+    taken = np.isin(frames, [*own, target])
+    positions, quaternions = recorded.positions_m.copy(), recorded.quaternions_xyzw.copy()
+    for frame in sorted({*recorded.frames} - {*own, target}):
+        (rows,) = np.nonzero(frames == frame)
+        found, transforms = lookups(tree, frame, target, recorded.stamps_ns[rows])
+        for row, transform in zip(rows[found], transforms, strict=True):
+            pose = transform.applied(positions[row], quaternions[row])
+            positions[row], quaternions[row] = pose
+        taken[rows[found]] = True
+        if lost := len(rows) - len(transforms):
+            bag.skipped[f"poses in frame '{frame}', of which '{target}' is not known"] += lost
+    return replace(
+        recorded, stamps_ns=recorded.stamps_ns[taken], positions_m=positions[taken],
+        quaternions_xyzw=quaternions[taken], frame_id=target, frames=(),
+        trigger_rows=np.searchsorted(np.flatnonzero(taken), recorded.trigger_rows),
+    )  # fmt: skip
+
+
 def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') -> Trajectory:
     """Transform by where the part is at each time at which it is known."""
     from paint_deposition.files.recordings.transforms import lookups
@@ -219,6 +257,7 @@ def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') ->
     brought = replace(
         recorded, stamps_ns=recorded.stamps_ns[known], positions_m=positions,
         quaternions_xyzw=quaternions, frame_id=part,
+        trigger_rows=np.searchsorted(np.flatnonzero(known), recorded.trigger_rows),
     )  # fmt: skip
     if left_out := len(recorded) - len(brought):
         warning = (

@@ -61,6 +61,9 @@ class MotionSource(BaseModel, extra='forbid'):
     rotation: Annotated[Text, AfterValidator(_rotation)] | None = Field(
         None, description=ROTATION_WORDS
     )
+    strict: bool = Field(
+        False, description='true or false, whether to refuse what would be left out with a warning'
+    )
     angle_unit: Literal['deg', 'rad'] | None = Field(
         None, description="'deg' or 'rad', the unit of recorded angles and joints"
     )

@@ -9,6 +9,7 @@ from operator import attrgetter
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.film.interpolated_brushes import (
     uses_set_points,
@@ -24,15 +25,15 @@ from paint_deposition.motion.pose_stream import (
     TriggerChange,
 )
 from paint_deposition.motion.trajectory import PoseCounts
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trigger import BEFORE_ALL_NS, ONLY_BRUSH
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change that is older than the newest pose by more is from a restarted stream [ns].
 STREAM_RESTART_NS = 1_000_000_000
-# Earlier than any stamp [ns].
-BEFORE_ALL_NS = -(2**62)
+# That wait for poses; no gun is switched so often within the time that poses may be missing.
+MOST_CHANGES = 100_000
 _STAMP = attrgetter('stamp_ns')
 
 
@@ -139,6 +140,10 @@ class LiveFilm:
         self._integrator.use(with_brushes_of(self.model, before.model))
         self._clear()
 
+    def forget_trigger(self) -> None:
+        """Forget how the gun was before a reset; what comes next says it."""
+        self._carried, self._brushes = [], set()
+
     def _clear(self) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(
@@ -156,7 +161,13 @@ class LiveFilm:
         Raises:
             ModelError: its brush is not in the model, or its set-points lie outside the calibrated
                 ones; the change is ignored.
+            RecordingError: too many wait for poses; the change is ignored.
         """
+        if len(self._changes) >= MOST_CHANGES:
+            raise RecordingError(
+                f'over {MOST_CHANGES} states are stamped ahead of the poses: send poses, or set '
+                'the clocks'
+            )
         if change.flow > 0.0:
             change = self._with_brush_number(change)
             self.model.require_brushes({*self._brushes, change.brush})

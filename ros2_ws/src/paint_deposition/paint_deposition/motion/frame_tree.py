@@ -15,6 +15,10 @@ from paint_deposition.motion.part_frame import Rigid
 LONGEST_GAP_NS = 2_000_000_000
 # A live transform that is older than the newest by more is from a restarted stream [ns].
 RESTART_NS = 1_000_000_000
+# Stamps from here on, of the year 2001, are of a clock and not of a simulation that began at 0.
+CLOCK_NS = 1_000_000_000_000_000_000
+# Frames and poses of a frame that are remembered, more than any cell has.
+MOST_FRAMES, MOST_POSES = 1000, 100_000
 # As in tf2 [ns].
 REMEMBERED_NS = 10_000_000_000
 
@@ -39,6 +43,9 @@ class _Motion:
         is_known = row < len(self.stamps_ns) and self.stamps_ns[row] == stamp_ns
         self.stamps_ns[row : row + is_known] = [stamp_ns]
         self.poses[row : row + is_known] = [(parent, pose)]
+
+    def forget_surplus(self) -> None:
+        del self.stamps_ns[:-MOST_POSES], self.poses[:-MOST_POSES]
 
     def forget(self, before_ns: int) -> None:
         row = bisect_left(self.stamps_ns, before_ns)
@@ -105,8 +112,9 @@ class FrameTree:
 
     def fix(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Take a static transform, which replaces earlier ones of the frame."""
-        self._lasting.clear()
-        self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
+        if self._has_room(child):
+            self._lasting.clear()
+            self._fixed[_name(child)] = _name(parent), Rigid.of(pose)
 
     def place(self, child: str, parent: str, pose: Sequence[float]) -> None:
         """Say where a frame is, whatever transforms say of it; no pose: they say it again."""
@@ -121,7 +129,12 @@ class FrameTree:
         Returns:
             Whether a live stream began again: poses over time from before it are forgotten.
         """
-        restarted = self._live and stamp_ns < self.newest_ns(child) - RESTART_NS
+        if not self._has_room(child):
+            return False
+        newest_ns = self.newest_ns(child)
+        restarted = self._live and stamp_ns < newest_ns - RESTART_NS
+        # One without a stamp among those of a clock begins nothing.
+        restarted &= stamp_ns > 0 or newest_ns < CLOCK_NS
         if restarted:
             self._moving.clear()
         if _name(child) not in self._moving:
@@ -130,7 +143,12 @@ class FrameTree:
         motion.add(stamp_ns, _name(parent), np.array(pose, dtype=float))
         if self._live:
             motion.forget(motion.stamps_ns[-1] - REMEMBERED_NS)
+            motion.forget_surplus()
         return restarted
+
+    def _has_room(self, child: str) -> bool:
+        known = self._fixed.keys() | self._moving.keys()
+        return _name(child) in known or len(known) < MOST_FRAMES
 
     def placed(self, child: str) -> tuple[str, Rigid] | None:
         """Parent and pose of a frame that does not move, None if it does or is not known."""

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.passes import first_pass, follow_passes
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
+from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
 from paint_deposition.motion.sub_steps import followed_poses, split_segments
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
@@ -34,7 +34,8 @@ class PathBuilder:
     ``PoseScreen`` says which poses are dropped and when a stream counts as restarted; that is
     followed as after a gap. A time between poses longer than ``max_pose_gap_s`` is gun off; the
     spray travels ``max_step_m`` at most in a sub-step. With ``whole_strokes`` a stroke is handed
-    out when it is complete, with what lies ahead of each sub-step known.
+    out when it is complete, with what lies ahead of each sub-step known. ``knows_all_changes``:
+    the changes of the trigger come before the poses, and hold for each restarted stream.
     """
 
     def __init__(
@@ -42,7 +43,9 @@ class PathBuilder:
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
         max_step_m: float = DEFAULT_MAX_STEP_M,
         whole_strokes: bool = False,
+        knows_all_changes: bool = False,
     ) -> None:
+        self._knows_all_changes = knows_all_changes
         self.max_gap_ns = gap_ns(max_pose_gap_s)
         self.max_step_m = max_step_m
         self.whole_strokes = whole_strokes
@@ -50,10 +53,14 @@ class PathBuilder:
         self._flow = FlowSchedule()
         self._waiting: list[PoseBatch] = []
         self._integrated_ns: int | None = None
+        # The stream has not restarted once its stamps are beyond; see ``add_trigger``.
+        self._restart_until_ns = 0
         self._finished: list[SprayPath] = []
         self._gap_before_next = False
         self._states: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._began_ns: int | None = None
+        # First stamp of the stream.
+        self._stream_ns: int | None = None
 
     @property
     def counts(self) -> PoseCounts:
@@ -69,11 +76,17 @@ class PathBuilder:
         """Change the flow (relative; 0 is gun off) and the brush at a time.
 
         Before the first change the gun is off; without any it always sprays. A change that comes
-        after the path beyond it was handed out is counted and takes effect from there on.
+        after the path beyond it was handed out is counted and takes effect from there on. One
+        from before the newest pose by more than a gap waits as long, and the path with it: it is
+        a late one if the stream goes on, and else one of the restarted stream.
         """
-        late_ns = 0 if self._integrated_ns is None else self._integrated_ns - int(stamp_ns)
-        self.counts.late_triggers += late_ns > 0
-        self._flow.add(stamp_ns, flow, brush, another_stream=late_ns > self.max_gap_ns)
+        newest_ns = int(stamp_ns) if self.newest_ns is None else self.newest_ns
+        waits = newest_ns - int(stamp_ns) > self.max_gap_ns
+        if waits:
+            self._restart_until_ns = newest_ns + self.max_gap_ns
+        elif self._integrated_ns is not None:
+            self.counts.late_triggers += int(stamp_ns) < self._integrated_ns
+        self._flow.add(stamp_ns, flow, brush, another_stream=waits)
 
     def add_poses(
         self, stamps_ns: ArrayLike, positions_m: ArrayLike, quaternions_xyzw: ArrayLike
@@ -86,9 +99,17 @@ class PathBuilder:
         )
         continued, *restarted = self._screen.take(batch)
         self._waiting.append(continued)
+        if self._stream_ns is None and len(continued):
+            self._stream_ns = int(continued.stamps_ns[0])
+        if len(continued) and continued.stamps_ns[-1] > self._restart_until_ns:
+            self._go_on()
         for stream in restarted:
+            ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
+            within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
+            self._stream_ns = int(stream.stamps_ns[0])
             self._cut_segments(until_ns=None, finish=True)
-            self.counts.late_triggers -= self._flow.restart()
+            if not self._knows_all_changes:
+                self._flow.restart(ended_ns if within else None)
             self._integrated_ns = self._began_ns = None
             self._gap_before_next = True
             self._waiting = [stream]
@@ -99,8 +120,9 @@ class PathBuilder:
         ``finish``: the stream has ended; the poses behind the last that was followed, and
         incomplete strokes, are handed out too.
         """
-        if finish:
-            self._screen.finish()
+        # Of a restart that was about to come nothing is left, nor of its changes.
+        if finish and not self._screen.finish():
+            self._go_on()
         self._cut_segments(until_ns, finish)
         if self._integrated_ns is not None:
             self._flow.forget(self._integrated_ns)
@@ -108,12 +130,20 @@ class PathBuilder:
         self._finished = []
         return self._whole_strokes(path, finish) if self.whole_strokes and len(path) else path
 
+    def _go_on(self) -> None:
+        """The stream has not restarted: changes that waited for that are of this one."""
+        waited = self._flow.go_on()
+        if self._integrated_ns is not None:
+            self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
+
     def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:
             return
         poses = PoseBatch.joined(self._waiting)
         self._waiting = [poses]
         ready = len(poses)
+        if self._flow.waiting and not finish:
+            until_ns = min(self._flow.waiting[0], until_ns or self._flow.waiting[0])
         if until_ns is not None:
             ready = int(np.searchsorted(poses.stamps_ns, until_ns, side='right'))
         if ready < 2:
@@ -188,8 +218,12 @@ def spray_path(
     whole_strokes: bool = True,
 ) -> tuple[SprayPath, PoseCounts]:
     """Screen a whole recording and cut it into sub-steps; also returns what was dropped."""
-    builder = PathBuilder(max_pose_gap_s, max_step_m, whole_strokes)
-    for change in trajectory.triggers:
-        builder.add_trigger(*change)
-    builder.add_poses(trajectory.stamps_ns, trajectory.positions_m, trajectory.quaternions_xyzw)
+    builder = PathBuilder(
+        max_pose_gap_s, max_step_m, whole_strokes, not len(trajectory.trigger_rows)
+    )
+    for event in events_of(trajectory):
+        if isinstance(event, TriggerChange):
+            builder.add_trigger(event.stamp_ns, event.flow, event.brush)
+        else:
+            builder.add_poses(*vars(event).values())
     return builder.take(finish=True), builder.counts

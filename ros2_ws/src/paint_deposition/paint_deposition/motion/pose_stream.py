@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.motion.repeated_samples import RepeatedSamples
-from paint_deposition.motion.trajectory import PoseCounts
+from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Two hours at 250 Hz, 64 bytes a pose.
@@ -44,10 +44,15 @@ class PoseBatch:
         chosen = rows if isinstance(rows, slice) else np.asarray(rows, dtype=np.int64)
         return PoseBatch(*(column[chosen] for column in vars(self).values()))
 
+    @property
+    def finite(self) -> np.ndarray:
+        """(N,) whether the numbers of a pose are, and no further away than any part."""
+        turned = (np.abs(self.quaternions_xyzw) <= FARTHEST_M).all(axis=1)
+        return turned & (np.abs(self.positions_m) <= FARTHEST_M).all(axis=1)
+
     def finite_axes(self) -> tuple[np.ndarray, np.ndarray]:
         """Positions (M, 3) [m] and tool z (M, 3) of the poses that are finite."""
-        finite = np.isfinite(self.quaternions_xyzw).all(axis=1)
-        finite &= np.isfinite(self.positions_m).all(axis=1)
+        finite = self.finite
         x, y, z, w = self.quaternions_xyzw[finite].T
         axes = [2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)]
         return self.positions_m[finite], np.stack(axes, axis=1)
@@ -60,6 +65,31 @@ class PoseBatch:
 
 
 NO_POSES = PoseBatch(np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 4)))
+
+
+def events_of(
+    motion: Trajectory, after: int = -1, until: int | None = None
+) -> Iterator[TriggerChange | PoseBatch]:
+    """The poses and the trigger changes of a recorded motion in the order in which they came.
+
+    The first change comes first: it says how the gun was before it. Of a part of the motion, what
+    came after so many poses, ``until`` as many were there.
+    """
+    batch = PoseBatch(
+        np.asarray(motion.stamps_ns, np.int64), np.asarray(motion.positions_m, float),
+        np.asarray(motion.quaternions_xyzw, float),
+    )  # fmt: skip
+    begin, end = max(after, 0), len(motion) if until is None else until
+    came = np.zeros(len(motion.trigger_flow), np.int64)
+    came[1:] = motion.trigger_rows[1:] if len(motion.trigger_rows) else 0
+    for number, (row, change) in enumerate(zip(came.tolist(), motion.triggers, strict=True)):
+        if after < row <= end:
+            if row > begin:
+                yield batch.select(slice(begin, row))
+                begin = row
+            yield TriggerChange(*change, motion.set_points_of(number))
+    if begin < end:
+        yield batch.select(slice(begin, end))
 
 
 class MotionLog:
@@ -89,15 +119,16 @@ class MotionLog:
         """Note what came."""
         if not self.complete:
             return
-        if isinstance(event, TriggerChange):
-            self._changes.append((self.poses, event))
-            return
-        if self.poses + len(event) > self.pose_memory:
+        size = 1 if isinstance(event, TriggerChange) else len(event)
+        if self.poses + self.changes + size > self.pose_memory:
             self.complete = False
             self._kept, self._changes = NO_POSES, []
+        elif isinstance(event, TriggerChange):
+            self._changes.append((self.poses, event))
+            return
         else:
             self._pack(event)
-        self.poses += len(event)
+        self.poses += len(event) if isinstance(event, PoseBatch) else 0
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
         """What came until now, after so many poses and changes."""
@@ -138,6 +169,8 @@ QUATERNION_TOLERANCE = 0.01
 FARTHEST_M = 1e6
 # So many poses in order, over more than a gap, are no stragglers: the stream was restarted.
 FEWEST_OF_A_RESTART = 3
+# So many within a gap are no stream.
+MOST_BEHIND = 10_000
 
 
 class PoseScreen:
@@ -173,7 +206,7 @@ class PoseScreen:
                 streams[-1].append(row)
             elif stamp == self.newest_ns or (behind and stamp == stamps[behind[-1]]):
                 self.counts.repeated_stamps += 1
-            elif behind and stamp < stamps[behind[-1]]:
+            elif (behind and stamp < stamps[behind[-1]]) or len(behind) >= MOST_BEHIND:
                 self.counts.backward_stamps += len(behind)
                 behind = [row]
             else:
@@ -189,16 +222,16 @@ class PoseScreen:
         self._behind = poses.select(behind)
         return [poses.select(rows) for rows in streams]
 
-    def finish(self) -> None:
-        """The stream has ended: what still waits is dropped."""
-        self.counts.backward_stamps += len(self._behind)
-        self._behind = self._behind.select([])
+    def finish(self) -> int:
+        """The stream has ended: what still waits is dropped; the number of these poses."""
+        dropped, self._behind = len(self._behind), NO_POSES
+        self.counts.backward_stamps += dropped
+        return dropped
 
     def _rotations(self, poses: PoseBatch) -> PoseBatch:
         quaternions = poses.quaternions_xyzw
-        placed = (np.abs(poses.positions_m) <= FARTHEST_M).all(axis=1)
-        finite = placed & np.isfinite(quaternions).all(axis=1)
-        norms = np.sqrt((quaternions**2).sum(axis=1))
+        finite = poses.finite
+        norms = np.sqrt((np.where(finite[:, np.newaxis], quaternions, 0.0) ** 2).sum(axis=1))
         unit = np.abs(norms - 1.0) <= QUATERNION_TOLERANCE
         self.counts.received += len(poses)
         self.counts.not_finite += int(np.count_nonzero(~finite))

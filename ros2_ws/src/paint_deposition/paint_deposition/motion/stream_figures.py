@@ -13,7 +13,7 @@ LONG = 1.5
 IMPOSSIBLE_M_PER_S = 10.0
 LEAST_STEP_M = 0.05
 # Single steps between poses carry the noise of the encoders and the jitter of the stamps.
-WINDOW_NS = 200_000_000
+WINDOW_NS, MOST_IN_WINDOW = 200_000_000, 2000
 
 
 class Intervals:
@@ -83,7 +83,7 @@ class SpeedNow:
         if not len(self._stamps_ns) or stamps_ns[0] > self._stamps_ns[-1]:
             stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
             positions_m = np.concatenate([self._positions_m, positions_m])
-        recent = stamps_ns >= stamps_ns[-1] - WINDOW_NS
+        recent = np.flatnonzero(stamps_ns >= stamps_ns[-1] - WINDOW_NS)[-MOST_IN_WINDOW:]
         self._stamps_ns, self._positions_m = stamps_ns[recent], positions_m[recent]
 
     @property

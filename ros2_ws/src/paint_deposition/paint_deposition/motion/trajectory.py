@@ -64,6 +64,9 @@ class Trajectory:
         trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
             magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.
             Empty: all are unknown.
+        frames: (N,) frame of each pose, where they are in several; else empty.
+        trigger_rows: (M,) int number of poses that came before each change; empty: all changes
+            came before the poses. It matters where a stream of poses begins again.
         notes, warnings: remarks for the user, and what is likely wrong, a line each.
         source: the file it came from, for messages.
         settings: of the process while the gun sprayed, by name; empty where not recorded.
@@ -84,6 +87,8 @@ class Trajectory:
     settings: Mapping[str, float] = field(default_factory=dict)
     trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     trigger_set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
+    trigger_rows: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
+    frames: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         return f'Trajectory({len(self)} poses over {self.duration_s:.1f} s)'
@@ -101,6 +106,7 @@ class Trajectory:
             ('flow values', self.trigger_flow, False),
             ('brushes', self.trigger_brush, True),
             ('rows of set-points', self.trigger_set_points, True),
+            ('numbers of poses before', self.trigger_rows, True),
         ):
             if len(column) != changes and not (may_lack and not len(column)):
                 raise RecordingError(

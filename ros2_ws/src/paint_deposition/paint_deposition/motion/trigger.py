@@ -11,6 +11,8 @@ from paint_deposition.kernel.compiler import njit
 
 # The brush of a motion that names none: the only one.
 ONLY_BRUSH = 0
+# Earlier than any stamp [ns].
+BEFORE_ALL_NS = -(2**62)
 _TIMES = ('dwell_s', 'since_on_s', 'since_off_s')
 TRIGGER_STATE = np.dtype(
     [(name, 'f8') for name in ('flow', 'open_flow', *_TIMES)] + [('open_brush', 'i8')]
@@ -87,7 +89,6 @@ class FlowSchedule:
     def __init__(self) -> None:
         self._changes: list[tuple[int, float, int]] = []
         self._of_another_stream: list[tuple[int, float, int]] = []
-        self._forgetful = False
 
     def __bool__(self) -> bool:
         return bool(self._changes)
@@ -97,13 +98,11 @@ class FlowSchedule:
     ) -> None:
         """Set flow (relative; 0 is gun off) and brush from a time on.
 
-        Of two changes at one time the later to come counts. ``another_stream``: the change may
-        belong to a stream that is about to restart.
+        Of two changes at one time the later to come counts. ``another_stream``: the change waits,
+        since it may belong to a stream that is about to restart.
         """
         change = (int(stamp_ns), float(flow), int(brush) if flow > 0.0 else ONLY_BRUSH)
-        insort(self._changes, change, key=_STAMP)
-        if another_stream:
-            insort(self._of_another_stream, change, key=_STAMP)
+        insort(self._of_another_stream if another_stream else self._changes, change, key=_STAMP)
 
     def steps(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Times (C,) int64 of changes; flow and brush (C + 1,) before, between and after them."""
@@ -121,16 +120,30 @@ class FlowSchedule:
         superseded = bisect_right(self._changes, until_ns, key=_STAMP) - 1
         if superseded > 0:
             del self._changes[:superseded]
-            self._forgetful = True
 
-    def restart(self) -> int:
-        """Go back to the changes of a restarted stream; returns how many of them had come early.
+    @property
+    def waiting(self) -> list[int]:
+        """Times of the changes that wait, in order."""
+        return [stamp for stamp, *_ in self._of_another_stream]
 
-        If none had, the gun is off until the next change, unless nothing was forgotten yet.
+    def go_on(self) -> list[int]:
+        """The stream has not restarted: changes that waited are of this one; their times."""
+        stamps, late = self.waiting, self._of_another_stream
+        self._of_another_stream = []
+        for change in late:
+            insort(self._changes, change, key=_STAMP)
+        return stamps
+
+    def restart(self, ended_ns: int | None) -> None:
+        """Go over to a restarted stream, and the changes that waited for it.
+
+        Until the first of them the gun stays as it was when the stream before ended, at
+        ``ended_ns``, if the clock was set back in its midst; None: a replay, off until then.
         """
         early, self._of_another_stream = self._of_another_stream, []
-        if early:
+        if not self._changes:
             self._changes = early
-        elif self._forgetful:
-            self._changes = [(self._changes[0][0], 0.0, ONLY_BRUSH)]
-        return len(early)
+            return
+        passed = bisect_right(self._changes, ended_ns, key=_STAMP) if ended_ns is not None else 0
+        _, flow, brush = self._changes[passed - 1] if passed else (0, 0.0, ONLY_BRUSH)
+        self._changes = [(BEFORE_ALL_NS, flow, brush), *early]

@@ -49,7 +49,12 @@ class RawMessage(NamedTuple):
 
 
 class Bag:
-    """An open bag; made by `open_bag`. ``warnings`` say what it lacks."""
+    """An open bag; made by `open_bag`.
+
+    Attributes:
+        warnings: what it lacks.
+        skipped: how many messages are left out as the nodes leave them out, by what they are.
+    """
 
     def __init__(self, path: Path, reader: Ros1Reader | Ros2Reader) -> None:
         self.path = path
@@ -63,6 +68,7 @@ class Bag:
         kept = custom_data(folder).get(KEPT, '').split()
         named = _information(folder).get('relative_file_paths') or []
         self.warnings: tuple[str, ...] = ()
+        self.skipped: Counter[str] = Counter()
         if path.name in named[:-1] or path.name in named[1:]:
             several = f'{path.name} is one of the {len(named)} files of a split bag'
             self.warnings = (f'{several}; give its folder, {folder}, for all of it',)

@@ -74,10 +74,18 @@ def trajectory_of(
             f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
+    order: np.ndarray = np.argsort(gun.stamps_ns, kind='stable')
+    rows: np.ndarray = np.empty(0, np.int64)
+    if np.any(np.diff(trajectory.stamps_ns) < 0):
+        # Where the clock was set back, the order in which they came says of which stream they are.
+        order = np.arange(len(order))
+        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), gun.log_times_ns)
+    columns = gun.stamps_ns, gun.flow, gun.brush, gun.set_points
+    stamps, flow, brush, points = (its[order] if len(its) else its for its in columns)
     return replace(
-        trajectory, trigger_stamps_ns=gun.stamps_ns, trigger_flow=gun.flow,
-        trigger_brush=gun.brush, trigger_set_points=gun.set_points,
-        notes=(*trajectory.notes, *gun.notes), settings=gun.settings,
+        trajectory, trigger_stamps_ns=stamps, trigger_flow=flow, trigger_brush=brush,
+        trigger_set_points=points, trigger_rows=rows, settings=gun.settings,
+        notes=(*trajectory.notes, *gun.notes),
     )  # fmt: skip
 
 

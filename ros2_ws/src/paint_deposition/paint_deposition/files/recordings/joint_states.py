@@ -266,6 +266,11 @@ def read_joint_poses(
     warnings: list[str] = []
     for stream in used:
         stamps, logged, values, faults = stream.without_repeats()
+        finite = np.isfinite(values[:, [name in wanted for name in stream.names]]).all(axis=1)
+        if not finite.all():
+            what = f'joint states on {stream.topic} with joints that are not finite'
+            bag.skipped[what] += int(np.count_nonzero(~finite))
+            stamps, logged, values = stamps[finite], logged[finite], values[finite]
         warnings += faults
         for column, name in enumerate(stream.names):
             if name in wanted and len(stamps) > len(columns.get(name, ([],))[0]):

@@ -82,6 +82,7 @@ class RunWriter:
         self.custom_data = {key: str(value) for key, value in (custom_data or {}).items()}
         self.ros_distro = ros_distro or os.environ.get('ROS_DISTRO', 'unknown')
         self.counts: dict[str, int] = {}
+        self._kept: dict[str, int] = {}
         self.complete = False
         self._topics: dict[str, RunTopic] = {}
         self._channels: dict[str, int] = {}
@@ -154,8 +155,13 @@ class RunWriter:
 
     def keep(self, counts: Mapping[str, int]) -> None:
         """Readers are to take so many messages of these topics, the first; the rest is not its."""
-        if counts:
-            self.custom_data[KEPT] = ' '.join(f'{name}={n}' for name, n in counts.items())
+        self._kept |= counts
+        if self._kept:
+            self.custom_data[KEPT] = ' '.join(f'{name}={n}' for name, n in self._kept.items())
+
+    def keep_another(self, topic: str) -> None:
+        """One more message of a topic is kept, if not all are."""
+        self.keep({topic: self._kept[topic] + 1} if topic in self._kept else {})
 
     def finish(self) -> Path:
         """Complete the run and return its folder."""

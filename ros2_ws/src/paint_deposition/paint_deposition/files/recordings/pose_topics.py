@@ -9,7 +9,7 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, listed_topics
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, TF_TYPES
 from paint_deposition.files.recordings.transforms import PART_POSE_TYPE, part_pose_topics
 from paint_deposition.motion.trajectory import Trajectory
@@ -70,30 +70,30 @@ def _other_motion(bag: Bag) -> str:
 def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]:
     """The poses of a topic as recorded, when they were logged (N,) int64 [ns], and its name.
 
-    Raises RecordingError for poses in several frames, of several bodies or all with one stamp.
+    Poses in several frames are said to be in the most frequent one, and ``frames`` has that of
+    each. Raises RecordingError for several bodies, or if all poses have one stamp.
     """
     topic = choose_pose_topic(bag, name)
     number = _element(name or '')[1]
     stamps, log_times, rows = [], [], []
-    frames: Counter[tuple[str, str]] = Counter()
+    frames: list[str] = []
+    bodies: Counter[str] = Counter()
     for _, log_time_ns, message in bag.decoded([topic.name]):
         pose = POSES[topic.type](message)
         if topic.type == ARRAY_TYPE:
             pose = _one_of(pose, number, topic.name)
-        p, q = (getattr(pose, name) for name in _fields(pose))
         stamps.append(stamp_ns(message.header))
         log_times.append(log_time_ns)
-        rows.append((p.x, p.y, p.z, q.x, q.y, q.z, q.w))
-        body = message.child_frame_id if topic.type == PART_POSE_TYPE else ''
-        frames[message.header.frame_id.lstrip('/'), body] += 1
+        rows.append(np.concatenate(pose_of(pose)))
+        frames.append(message.header.frame_id.lstrip('/'))
+        bodies[message.child_frame_id if topic.type == PART_POSE_TYPE else ''] += 1
     if len(rows) != topic.message_count:
         raise RecordingError(
             f'{bag.path} lists {topic.message_count} messages on {topic.name} and holds '
             f'{len(rows)}; run: paint recover {bag.path}'
         )
-    if len(frames) > 1:
-        named = ((' to '.join(filter(None, its)), count) for its, count in sorted(frames.items()))
-        found = ', '.join(f"'{frame}' ({count})" for frame, count in named)
+    if len(bodies) > 1:
+        found = ', '.join(f"'{body}' ({count})" for body, count in sorted(bodies.items()))
         raise RecordingError(f'{topic.name} in {bag.path} mixes frames {found}; record one frame')
     if len(stamps) > 1 and len(set(stamps)) == 1:
         raise RecordingError(
@@ -102,14 +102,12 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
         )
     values = np.array(rows, dtype=float)
     positions, quaternions = map(np.ascontiguousarray, np.split(values, [3], axis=1))
-    ((frame_id, _),) = frames
-    trajectory = Trajectory(np.array(stamps, np.int64), positions, quaternions, frame_id)
+    ((frame_id, most),) = Counter(frames).most_common(1)
+    trajectory = Trajectory(
+        np.array(stamps, np.int64), positions, quaternions, frame_id,
+        frames=tuple(frames) if most < len(frames) else (),
+    )  # fmt: skip
     return trajectory, np.array(log_times, np.int64), topic.name
-
-
-def _fields(pose: Any) -> tuple[str, str]:
-    is_pose = hasattr(pose, 'position')
-    return ('position', 'orientation') if is_pose else ('translation', 'rotation')
 
 
 def _one_of(poses: Sequence[Any], number: int | None, topic: str) -> Any:

@@ -9,11 +9,12 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
-from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
+from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.signals import Signal
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import numbered
-from paint_deposition.motion.trigger import ONLY_BRUSH, SPRAYS_NOTHING, relative_flow
+from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # Fields of AtomizerState that are summarised while the gun sprays.
@@ -28,6 +29,7 @@ class RecordedTrigger:
     stamps_ns: np.ndarray  # (M,) int64 times of the changes; log times if ``by_log_time``
     flow: np.ndarray  # (M,) relative flow from then on
     brush: np.ndarray  # (M,) int64 brush from then on; empty if it is not recorded
+    log_times_ns: np.ndarray  # (M,) int64 when they came, in this order
     # (M, 4) as in a trajectory; empty if none are recorded.
     set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     # Median of each setting while the gun sprays.
@@ -66,11 +68,11 @@ def read_trigger(bag: Bag, name: str) -> RecordedTrigger:
     topic = bag.find(signal.topic) if signal else None
     if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
         return _states(bag, choose_state_topic(bag, name))
-    rows = sorted(_signal_values(bag, topic, signal), key=lambda row: row[0])
+    rows = list(_signal_values(bag, topic, signal))
     known = [row for row in rows if math.isfinite(row[1])]
     if not known:
         raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
-    stamps, values, _ = map(np.array, zip(*known, strict=True))
+    stamps, values, logged, _ = map(np.array, zip(*known, strict=True))
     note = (
         f'trigger {topic.name}{signal.path} is {values.min():.4g} to {values.max():.4g}: the gun '
         f'is on where it is {"below" if signal.below else "above"} {signal.level:g}'
@@ -79,40 +81,40 @@ def read_trigger(bag: Bag, name: str) -> RecordedTrigger:
         note += f'; {left_out} values that are no number are left out'
     on, by_log = signal.is_on(values), not all(stamped for *_, stamped in rows)
     flow = on.astype(float)
-    return RecordedTrigger(stamps, flow, numbered([]), by_log_time=by_log, notes=(note,))
+    return RecordedTrigger(stamps, flow, numbered([]), logged, by_log_time=by_log, notes=(note,))
 
 
 def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
     """The changes on a topic of AtomizerState or Bool; without a brush, the only one."""
-    changes: list[tuple[int, float, int, tuple[float, ...]]] = []
+    changes: list[TriggerChange] = []
+    logged: list[int] = []
     settings: dict[str, list[float]] = {}
-    without_flow = 0
+    without_flow, refused = 0, []
     for _, log_time_ns, message in bag.decoded([topic.name]):
         if topic.type == BOOL_TYPE:
-            flow = relative_flow(bool(message.data))
-            changes.append((log_time_ns, flow, ONLY_BRUSH, (0.0,) * 4))
-            continue
-        stamp = stamp_ns(message.header)
-        if stamp == 0:
-            raise RecordingError(
-                f'{topic.name} in {bag.path} has a state without a stamp; '
-                'let the publisher stamp each state'
-            )
-        flow = relative_flow(message.spraying, message.flow)
-        without_flow += bool(message.spraying) and flow == 0.0
-        brush = int(getattr(message, 'brush', ONLY_BRUSH))
-        changes.append((stamp, flow, brush, set_points_of(message)))
-        for name in SETTINGS:
+            change = TriggerChange(log_time_ns, relative_flow(bool(message.data)))
+        else:
+            try:
+                change = trigger_change(message)
+            except RecordingError as error:
+                refused.append(str(error))
+                continue
+            without_flow += bool(message.spraying) and change.flow == 0.0
+        changes.append(change)
+        logged.append(log_time_ns)
+        for name in SETTINGS if change.flow > 0.0 else ():
             value = getattr(message, name, np.nan)
-            if message.spraying and np.isfinite(value):
+            if np.isfinite(value):
                 settings.setdefault(name, []).append(value)
-    changes.sort(key=lambda change: change[0])
-    set_points = np.array([points for *_, points in changes])
+    if refused:
+        bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
+    set_points = np.array([change.set_points or (0.0,) * 4 for change in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return RecordedTrigger(
-        np.array([stamp for stamp, *_ in changes], dtype=np.int64),
-        np.array([flow for _, flow, *_ in changes], dtype=float),
-        numbered([brush for _, _, brush, _ in changes]),
+        np.array([change.stamp_ns for change in changes], dtype=np.int64),
+        np.array([change.flow for change in changes], dtype=float),
+        numbered([change.brush for change in changes]),
+        np.array(logged, dtype=np.int64),
         set_points if set_points.any() else np.empty((0, 4)),
         {name: float(np.median(values)) for name, values in settings.items()},
         topic.type == BOOL_TYPE,
@@ -120,14 +122,16 @@ def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
     )
 
 
-def _signal_values(bag: Bag, topic: BagTopic, signal: Signal) -> Iterator[tuple[int, float, bool]]:
-    """(time, value, whether the time is a header stamp) of each message."""
+def _signal_values(
+    bag: Bag, topic: BagTopic, signal: Signal
+) -> Iterator[tuple[int, float, int, bool]]:
+    """(time, value, log time, whether the time is a header stamp) of each message."""
     for _, log_time_ns, message in bag.decoded([topic.name]):
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         value = signal.value(message)
         if value is None:
             raise RecordingError(_missing_field(bag, topic, message, signal.path))
-        yield stamp or log_time_ns, value, bool(stamp)
+        yield stamp or log_time_ns, value, log_time_ns, bool(stamp)
 
 
 def _missing_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:

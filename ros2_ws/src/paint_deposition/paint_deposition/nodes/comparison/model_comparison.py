@@ -9,7 +9,7 @@ from geometry_msgs.msg import Point
 from paint_msgs.msg import ComparisonStats
 from visualization_msgs.msg import Marker, MarkerArray
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
 from paint_deposition.inference.comparison.residual_field import interpolation_matrix, reached
@@ -30,6 +30,7 @@ from paint_deposition.nodes.runtime.parameters import (
     fixed_while_configured,
     thickness_parameter,
 )
+from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -88,6 +89,7 @@ class ModelComparison(PaintingNode):
     def _read_part(self) -> None:
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
+        self._is_read = False
         self._readings = read_readings(self.values['measurements_file'])
         self.get_logger().info(self._readings.understood)
         self._noise = gauge_noise(self._readings)
@@ -96,13 +98,24 @@ class ModelComparison(PaintingNode):
         return self._experiment.points
 
     def _set_surface(self, surface: Surface) -> None:
-        self._experiment = Experiment.of('live', surface, SprayPath.empty(), self._readings)
+        try:
+            self._experiment = self._experiment_on(surface)
+        except ReadingsError:
+            # Until the gun tells which side of an open sheet is outward, readings with normals do.
+            if self._is_read:
+                raise
+            surface = turned(surface)
+            self._experiment = self._experiment_on(surface)
+        self._is_read = True
         super()._set_surface(surface)
         for doubt in readings_in_doubt(surface, self._readings, np.zeros(len(self._readings))):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
+
+    def _experiment_on(self, surface: Surface) -> Experiment:
+        return Experiment.of('live', surface, SprayPath.empty(), self._readings)
 
     def _spread_colours(self) -> None:
         at = slice(len(self._experiment))

@@ -2,23 +2,24 @@
 
 import math
 import time
-from collections import Counter
-from collections.abc import Callable
+from collections import Counter, deque
+from collections.abc import Callable, Mapping
 from functools import partial
+from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 
-from paint_deposition.errors import PaintError, RecordingError
-from paint_deposition.files.recordings.headers import set_points_of, stamp_ns
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
-from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
+from paint_deposition.motion.trigger import SPRAYS_NOTHING
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
 
@@ -30,6 +31,12 @@ PROGRESS_PERIOD_S = 0.2
 # No robot announces a state so long before the pose at which it holds.
 AHEAD_NS = 1_000_000_000
 AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
+# Of what a peer names: so many different ones are told apart, and so many characters of each.
+MOST_NAMES, LONGEST_NAME = 20, 200
+OTHERS, STATES_REFUSED = 'others', 'states refused'
+# Hours of poses: more do not wait for a part.
+MOST_HELD = 2_000_000
+NOT_HELD = 'messages dropped, since too many waited for the part'
 NO_FLOW = 'states that spray with flow 0'
 
 
@@ -82,19 +89,22 @@ class AtomizerInput:
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._early: tuple[int, int] | None = None
         self._flushed_s = -math.inf
+        # What was taken from the queues, and when it was sent.
+        self._new_poses: list[tuple[PoseStamped, int]] = []
+        self._new_states: list[tuple[AtomizerState, int]] = []
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
-        self.reset_counts()
         depth = node.values['pose_queue_depth']
         subscribe = partial(AdaptiveSubscription, node, depth=depth)
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, self._take_pose),
+            subscribe(PoseStamped, self._pose_topic, self._note_pose),
             # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, self._take_state, latched=True),
+            subscribe(AtomizerState, self._state_topic, self._note_state, latched=True),
         ]
+        self.reset_counts()
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
@@ -108,14 +118,18 @@ class AtomizerInput:
 
     @property
     def messages_lost(self) -> int:
-        """Messages that the middleware reported as lost."""
-        return sum(topic.lost for topic in self._topics)
+        """Messages that the middleware has lost since the last reset."""
+        return sum(topic.lost for topic in self._topics) - self._lost_before
+
+    @property
+    def received_ns(self) -> int:
+        """Stamp of the newest pose received, 0 before the first."""
+        return stamp_ns(self._newest.header) if self._newest is not None else 0
 
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
         self.reset_counts()
-        if self._newest is not None:
-            self.newest_ns = stamp_ns(self._newest.header)
+        self.newest_ns = self.received_ns
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
@@ -128,6 +142,7 @@ class AtomizerInput:
         self.anomalies: Counter[str] = Counter()
         self.state_errors: set[str] = set()
         self.unpainted = 0
+        self._lost_before = sum(topic.lost for topic in self._topics)
         self.intervals = Intervals()
         self.jumps = Jumps()
 
@@ -154,9 +169,20 @@ class AtomizerInput:
             self._process(message, 0)
         self.flush()
 
+    def drop_held(self, until_ns: int) -> None:
+        """Drop kept poses up to the newest with this stamp, and those before it."""
+        held = self._held or []
+        stamps = [stamp_ns(k.header) if isinstance(k, PoseStamped) else -1 for k in held]
+        if until_ns in stamps:
+            end = len(stamps) - stamps[::-1].index(until_ns)
+            held[:end] = [k for k in held[:end] if isinstance(k, AtomizerState)]
+
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
-            self._held.append(message)
+            if len(self._held) < MOST_HELD:
+                self._held.append(message)
+            else:
+                self.anomalies[NOT_HELD] += 1
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:
@@ -166,15 +192,25 @@ class AtomizerInput:
 
     def take_pending(self) -> None:
         """Take all messages in the queues and pass them on."""
-        self._frame.take_pending()
-        for topic in self._topics:
-            topic.take_pending()
+        self._drain()
         self.flush()
 
-    def _take(self) -> None:
+    def _drain(self) -> None:
+        """Process what is in the queues, each state before the first pose that was sent later."""
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
+        poses, self._new_poses = self._new_poses, []
+        states, self._new_states = deque(self._new_states), []
+        for pose, sent_ns in poses:
+            while states and states[0][1] < sent_ns:
+                self._take_state(*states.popleft())
+            self._take_pose(pose, sent_ns)
+        for state in states:
+            self._take_state(*state)
+
+    def _take(self) -> None:
+        self._drain()
         waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
         if waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
@@ -188,21 +224,32 @@ class AtomizerInput:
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
         self._poses.clear()
         self.newest_ns = int(stamps[-1])
-        self.intervals.add(stamps)
-        self.speed.add(stamps, positions)
+        batch = PoseBatch(stamps, positions, quaternions)
+        moved = batch.select(np.flatnonzero(batch.finite))
         jumped = self.jumps.count
-        self.jumps.add(stamps, positions)
+        self.intervals.add(stamps)
+        if len(moved):
+            self.speed.add(moved.stamps_ns, moved.positions_m)
+            self.jumps.add(moved.stamps_ns, moved.positions_m)
         if self.jumps.count and not jumped:
             self._node.get_logger().error(
                 f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
-        self._on_poses(PoseBatch(stamps, positions, quaternions))
+        self._on_poses(batch)
+
+    def _note_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
+        self._new_poses.append((message, info['source_timestamp']))
+
+    def _note_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
+        self._new_states.append((message, info['source_timestamp']))
 
     # --- poses
 
     def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
         self.poses_received += 1
+        if len(message.header.frame_id) > LONGEST_NAME:
+            message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
         self._newest, self.sent_ns = message, sent_ns
         if self._early and sent_ns > self._early[1]:
             if self._early[0] - stamp_ns(message.header) > AHEAD_NS:
@@ -216,8 +263,7 @@ class AtomizerInput:
     def _transform(self, message: PoseStamped) -> None:
         frame_id = message.header.frame_id
         stamp = stamp_ns(message.header)
-        p, q = message.pose.position, message.pose.orientation
-        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+        pose = pose_of(message.pose)
         if self._frame.is_own(frame_id):
             self.anomalies['poses without a frame'] += not frame_id
         else:
@@ -226,6 +272,8 @@ class AtomizerInput:
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
+        if frame_id not in self.refused_frames and len(self.refused_frames) >= MOST_NAMES:
+            frame_id = OTHERS
         self.refusal = str(missing)
         self.refused_s = time.monotonic()
         if frame_id not in self.refused_frames:
@@ -246,23 +294,20 @@ class AtomizerInput:
         self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:
-        stamp = stamp_ns(message.header)
         try:
-            if stamp == 0:
-                raise RecordingError('atomizer state without a stamp: stamp each state')
-            flow = relative_flow(message.spraying, message.flow)
-            self._on_state(TriggerChange(stamp, flow, message.brush, set_points_of(message)))
+            change = trigger_change(message)
+            self._on_state(change)
         except PaintError as error:
-            if str(error) not in self.state_errors:
+            if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
-            self.state_errors.add(str(error))
-            self.anomalies['states refused'] += 1
+                self.state_errors.add(str(error))
+            self.anomalies[STATES_REFUSED] += 1
             return
-        if message.spraying and flow == 0.0:
+        if message.spraying and change.flow == 0.0:
             if not self.anomalies[NO_FLOW]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
             self.anomalies[NO_FLOW] += 1
-        self.spraying = flow > 0.0
+        self.spraying = change.flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 
     def _report_progress(self) -> None:

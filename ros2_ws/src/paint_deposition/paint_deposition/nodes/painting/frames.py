@@ -12,8 +12,8 @@ from rclpy.publisher import Publisher
 from paint_deposition.files.recordings.headers import transforms_of
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
 
@@ -55,11 +55,11 @@ class PartFrame:
         for topic in self._topics:
             topic.take_pending()
 
-    def _take_static(self, message: Any, _sent_ns: int) -> None:
+    def _take_static(self, message: Any, _info: Any) -> None:
         for child, parent, _, pose in transforms_of(message):
             self._tree.fix(child, parent, pose)
 
-    def _take(self, message: Any, _sent_ns: int) -> None:
+    def _take(self, message: Any, _info: Any) -> None:
         for transform in transforms_of(message):
             self._tree.add(*transform)
 

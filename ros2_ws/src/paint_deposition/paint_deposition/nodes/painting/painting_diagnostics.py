@@ -37,7 +37,10 @@ def poses_status(node: PaintingNode, number: int) -> Status:
     source, film = node.inputs[number], node.film.guns[number]
     counts, rhythm_ns = film.counts, source.intervals.typical_ns
     counted = {words: getattr(counts, name) for name, words in COUNT_LABELS.items()}
-    counted |= {'steps faster than a robot': source.jumps.count, **source.anomalies}
+    counted |= {
+        'steps faster than a robot': source.jumps.count, **source.anomalies,
+        'messages lost by the middleware': source.messages_lost,
+    }  # fmt: skip
     programmed = source.programmed_m_per_s
     gun = _gun_text(film)
     values: dict[str, object] = {
@@ -52,7 +55,6 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
         'poses not painted while inactive': source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
-        'messages lost by the middleware': source.messages_lost,
         'gun': gun,
     }
     if not node.active and source.unpainted:

@@ -13,8 +13,8 @@ from rclpy.timer import Timer
 from paint_deposition.effects.user_effects import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
-from paint_deposition.film.live_film import BEFORE_ALL_NS
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.trigger import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.outward_side import OutwardSide
@@ -262,7 +262,12 @@ class PaintingNode(ManagedNode, ABC):
             self._adopt_repainted(self.repainting)
         oriented = self._outward_side.orient(self.surface, self.film.guns)
         if oriented is not self.surface:
-            self._turn_inside_out(oriented)
+            try:
+                self._turn_inside_out(oriented)
+            except PaintError as error:  # readings that were taken on its other side, say
+                self._outward_side = OutwardSide(0)
+                self.model_problem = f'the gun paints the other side of the part: {error}'
+                self.get_logger().error(self.model_problem)
 
     def _adopt_repainted(self, repainting: Repainting) -> None:
         self.repainting = None

@@ -11,9 +11,12 @@ from pathlib import Path
 from paint_msgs.msg import Part
 from paint_msgs.srv import ChangePart
 from rclpy.callback_groups import CallbackGroup
+from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
 from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import (
@@ -23,6 +26,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
     warm_up,
     zones_on,
 )
+from paint_deposition.nodes.painting.recorded_part import RecordedPart, read_recorded_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
@@ -32,6 +36,10 @@ from paint_deposition.nodes.runtime.parameters import require_file_name
 LATE_S = 0.05
 # With several guns, poses of the others may still be on their way when those of one are there.
 SETTLE_S = 0.03
+# For so long a change, and a reset, wait for a subscriber of the part that has stalled.
+HEARD_S, RESET_HEARD_S = 3.0, 1.0
+# A recorder has on the disk what it took before this time.
+RECORDED_S = 1.2
 # Prepared parts beside the one in the cell; a large one takes some 100 MB.
 MAX_KEPT_PARTS = 4
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
@@ -139,23 +147,41 @@ class PartChange:
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
-        began_s, since_ns = time.monotonic(), self._newest_ns()
+        began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
         save = None
         self.waiting = True
         try:
             if len(node.inputs) > 1:
-                node.hold(max(source.sent_ns for source in node.inputs))
+                node.hold(following.last_sent_ns)
                 await self._settled()
             node.hold()
+            # So do those that wait for their transform, which comes or is given up.
+            while any(len(source.tf_queue) for source in node.inputs):
+                await self._settled()
+            # The message of the part is latched, and the next one takes its place.
+            heard_s = time.monotonic() + HEARD_S
+            while not self._is_heard() and time.monotonic() < heard_s:
+                await self._settled()
+            if not self._is_heard():
+                notes.append('a subscriber of part has stalled, and may miss a part')
+            node.catch_up()
+            since_ns = self._newest_ns()
             version = mesh_version(following.mesh_file)
             ready = None if request.coat else await self._ready(version)
-            if node.film.counts.received:
+            run = await self._recorded(request.resume) if request.resume else None
+            if node.film.counts.received and run is None:
                 save = self._film_writer()
             if ready is not None:
+                log = [[*gun.log.events()] for gun in node.film.guns]
                 node.change_part(version[0], ready)
                 self._version = version
+                if run is not None:
+                    notes.append(self._resume(run, log))
+            if run is not None and run.part is not None and run.part.run == following.run:
+                following = run.part  # as it was announced: its recorder goes on with its run
+                since_ns = stamp_ns(run.part.header)
             self.part, self._since = following, datetime.now(timezone.utc)
             self._run, self._resets = following.run, 0
             self._publish(since_ns, request.part_pose)
@@ -180,6 +206,8 @@ class PartChange:
             PaintError: the request is inconsistent, or the run already exists.
         """
         require_file_name('serial', request.serial)
+        if request.resume and (request.coat or not request.serial):
+            raise PaintError('resume: give the serial number of the part, and its first coat')
         pose = list(request.part_pose)
         if wrong := self._node.PARAMETERS['part_pose'].error_for(pose):
             raise PaintError(f'part_pose {wrong}')
@@ -207,22 +235,46 @@ class PartChange:
                 'coat on it, or give the serial number of the next part'
             )
         folder = self._folder(following.run)
-        if folder.exists():
+        if folder.exists() and not request.resume:
             raise PaintError(
                 f'{folder} already exists: a part has one run for each coat, and none is '
                 'overwritten; give another serial, or move the folder away'
             )
         return following
 
+    async def _recorded(self, path: str) -> RecordedPart:
+        """What a run holds of the part so far, once all that was received is in its file."""
+        await self._settled(RECORDED_S)
+        names, frame_id = self._node.gun_names, self._node.frame.frame_id
+        return await self._node.result_of(
+            self._reading.submit(read_recorded_part, Path(path).expanduser(), names, frame_id)
+        )
+
+    def _resume(self, run: RecordedPart, log: list[list[TriggerChange | PoseBatch]]) -> str:
+        """Paint what a run holds, and what came since if it ends before that."""
+        node = self._node
+        for motion, film, source, later in zip(
+            run.motions, node.film.guns, node.inputs, log, strict=True
+        ):
+            film.forget_trigger()
+            film.replay(events_of(motion))
+            stamps = motion.stamps_ns
+            if not source.received_ns or source.received_ns in stamps:
+                source.drop_held(int(stamps[-1]) if len(stamps) else 0)
+            else:
+                film.replay(later)
+        poses = sum(map(len, run.motions))
+        return f'{poses} poses of its recording are painted'
+
     async def _ready(self, version: Version) -> PreparedPart:
         """The part of this mesh, once it is read."""
         read = self._prepared(version)
         return read.result() if read.done() else await self._node.result_of(read)
 
-    async def _settled(self) -> None:
+    async def _settled(self, duration_s: float = SETTLE_S) -> None:
         """Wait for messages that were sent before now."""
         settled: Future[None] = Future()
-        threading.Timer(SETTLE_S, settled.set_result, [None]).start()
+        threading.Timer(duration_s, settled.set_result, [None]).start()
         await self._node.result_of(settled)
 
     def begin_again(self) -> None:
@@ -230,7 +282,18 @@ class PartChange:
         self._resets += 1
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
+        self.part.last_sent_ns = self._last_sent_ns
+        self._is_heard(RESET_HEARD_S)
         self._publish(self._newest_ns(), ())
+
+    def _is_heard(self, within_s: float = 0.0) -> bool:
+        """Whether all subscribers have the newest message of the part."""
+        return self._publisher.wait_for_all_acked(Duration(seconds=within_s))
+
+    @property
+    def _last_sent_ns(self) -> int:
+        """When the newest pose of any gun was sent, 0 before the first."""
+        return max(source.sent_ns for source in self._node.inputs)
 
     def _newest_ns(self) -> int:
         """Stamp of the newest pose of the part in the cell; without any the time now."""

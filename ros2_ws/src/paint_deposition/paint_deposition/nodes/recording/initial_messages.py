@@ -1,17 +1,20 @@
 """The messages with which a run begins: what is in force, and what came for its part already."""
 
 import math
+from bisect import bisect_right
 from collections import deque
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from geometry_msgs.msg import TransformStamped
-from paint_msgs.msg import Part
+from paint_msgs.msg import AtomizerState, Part
 from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 
-from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
+from paint_deposition.film.live_film import STREAM_RESTART_NS
+from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.nodes.recording.recorder_parameters import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
@@ -37,6 +40,9 @@ class InitialMessages:
     Args:
         guns: topic of the states by that of the poses, of each gun.
         part_pose: topic of the part's pose.
+
+    Attributes:
+        begin_ns: log time of the first message of the run.
     """
 
     def __init__(self, guns: Mapping[str, str], part_pose: str) -> None:
@@ -47,11 +53,11 @@ class InitialMessages:
         self._states_of = {topic: gun[1] for gun in guns.items() for topic in gun}
         # The last pose of each gun that was forgotten.
         self._forgotten = {poses: Recorded(poses, b'', 0, 0) for poses in guns}
-        self._begin_ns = 0
+        self.begin_ns = 0
         # Topics of states that this run does not have yet.
         self._due: set[str] = set()
-        self._placed: list[Recorded] = []
-        self._transforms: deque[Recorded] = deque()
+        self._placed: deque[Recorded] = deque(maxlen=REMEMBERED_MESSAGES)
+        self._transforms: deque[Recorded] = deque(maxlen=REMEMBERED_MESSAGES)
         self._lasting: dict[object, Recorded] = {}
 
     def add(self, topic: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> list[Recorded]:
@@ -59,8 +65,16 @@ class InitialMessages:
         message = Recorded(topic, cdr, log_time_ns, sent_ns)
         if topic in self._motion:
             message = message._replace(stamp_ns=header_stamp_ns(cdr))
+            if topic in self._guns:
+                states = self._states_in_force(message)
+                self._motion[topic].append(message)
+                return states
+            try:
+                trigger_change(deserialize_message(cdr, AtomizerState))
+            except RecordingError:  # whoever paints refuses it, too
+                return []
             states = self._states_in_force(message)
-            self._motion[topic].append(message)
+            self._remember_state(message)
             return states
         if topic == self._part_pose:
             self._placed.append(message)
@@ -76,7 +90,7 @@ class InitialMessages:
             self._replace(cdr, message)
         return []
 
-    def begin_part(self, part: Part, sent_ns: int) -> dict[str, int]:
+    def begin_part(self, part: Part, sent_ns: int) -> tuple[int, dict[str, int]]:
         """Forget what only the parts before needed.
 
         Args:
@@ -85,25 +99,33 @@ class InitialMessages:
             sent_ns: when it did.
 
         Returns:
-            The number of messages by topic that were recorded before, and belong to this part.
+            When the last message of the part before was sent [ns], and the number of messages by
+            topic that were recorded before, and belong to this part.
         """
         last_ns = stamp_ns(part.header)
         # Other guns may stamp by other clocks, and stamps start anew where a bag is replayed.
         known = [p for gun in self._guns for p in (self._forgotten[gun], *self._motion[gun])]
         # Without the last pose, its stamp may be of a clock ahead; what followed is kept.
         unknown_ns = min(last_ns, sent_ns)
-        cut_ns = max((p.sent_ns for p in known if p.stamp_ns == last_ns), default=unknown_ns)
+        cut_ns = part.last_sent_ns or max(
+            (p.sent_ns for p in known if p.stamp_ns == last_ns), default=unknown_ns
+        )
         early = {poses: self._forget_motion(poses, cut_ns) for poses in self._guns}
         # A simulator says where a part stands after it has said that the part is there.
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
-        before = self._placed[: len(self._placed) - len(later)][-1:]
+        before = [*self._placed][: len(self._placed) - len(later)][-1:]
         stays = not later and before and _pose(before[0]) == _values(part.part_pose)
-        self._placed = before if stays else later
-        return {topic: n for topic, n in {**early, self._part_pose: len(later)}.items() if n}
+        self._placed = deque(before if stays else later, REMEMBERED_MESSAGES)
+        early[self._part_pose] = len(later)
+        return cut_ns, {topic: count for topic, count in early.items() if count}
+
+    def add_late(self, topic: str, cdr: bytes, sent_ns: int) -> None:
+        """Note a pose of the part before that comes after this part was announced."""
+        self._forgotten[topic] = Recorded(topic, b'', 0, sent_ns, header_stamp_ns(cdr))
 
     def end_motion(self) -> None:
         """Forget the poses, which no run needs any more, and where the part stood before."""
-        self._placed = self._placed[-1:]
+        self._placed = deque([*self._placed][-1:], REMEMBERED_MESSAGES)
         for poses in self._guns:
             self._forget_motion(poses, math.inf)
 
@@ -112,13 +134,27 @@ class InitialMessages:
         self._due = set(self._guns.values())
         lasting = [*self._lasting.values(), *self._transforms, *self._placed]
         early = [pose for poses in self._guns for pose in self._motion[poses]]
-        self._begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
+        self.begin_ns = min((pose.log_time_ns for pose in early), default=log_time_ns)
         states = [state for pose in early for state in self._states_in_force(pose)]
-        return [m._replace(log_time_ns=self._begin_ns) for m in lasting] + states + early
+        return [m._replace(log_time_ns=self.begin_ns) for m in lasting] + states + early
+
+    def _remember_state(self, state: Recorded) -> None:
+        """In the order of the stamps, as a film has them; all anew where a stream restarted."""
+        states = self._motion[state.topic]
+        (poses,) = (poses for poses, its in self._guns.items() if its == state.topic)
+        newest = (self._motion[poses] or [self._forgotten[poses]])[-1]
+        if newest.stamp_ns - state.stamp_ns > STREAM_RESTART_NS:
+            states.clear()
+        if len(states) == REMEMBERED_MESSAGES:
+            states.popleft()
+        row = bisect_right(states, state.stamp_ns, key=lambda other: other.stamp_ns)
+        states.insert(row, state)
 
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)
         self._lasting[key] = message
+        if len(self._lasting) > REMEMBERED_MESSAGES:
+            del self._lasting[next(iter(self._lasting))]
 
     def _states_in_force(self, first: Recorded) -> list[Recorded]:
         """The states of a gun before its first message in a run, unless its stream restarted."""
@@ -130,7 +166,7 @@ class InitialMessages:
         if states and first.stamp_ns < states[0].stamp_ns:
             states.clear()
         # Not at the time of the first message: one received before it may be taken after it.
-        return [state._replace(log_time_ns=self._begin_ns) for state in states]
+        return [state._replace(log_time_ns=self.begin_ns) for state in states]
 
     def _forget_motion(self, poses: str, until_ns: float) -> int:
         """Forget poses sent until then, and superseded states; the number of later poses."""
@@ -153,4 +189,4 @@ def _pose(message: Recorded) -> list[float]:
 
 def _values(part_pose: Sequence[float]) -> list[float]:
     """The pose as it is published, none if it is not known."""
-    return list(Rigid.of(part_pose).values) if len(part_pose) else []
+    return list(Rigid.of(part_pose).values) if is_pose(part_pose) else []

@@ -1,6 +1,7 @@
 """The name of a part's run, and what is kept with it."""
 
 import itertools
+import os
 import time
 from pathlib import Path
 
@@ -16,7 +17,7 @@ def part_data(part: Part, model_file: str) -> dict[str, str]:
     if part.part_pose:
         data['part_pose'] = ' '.join(map(str, part.part_pose))
     # The mesh file of a simulator on another machine may not exist here.
-    mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
+    mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
     return provenance(mesh_file, model_file) | data
 
 

@@ -7,7 +7,6 @@ from typing import Any
 from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
-from rclpy.subscription import Subscription
 from rosbags.interfaces import (
     Qos,
     QosDurability,
@@ -18,7 +17,13 @@ from rosbags.interfaces import (
 )
 
 from paint_deposition.files.recordings.mcap_run import RunTopic
-from paint_deposition.nodes.runtime.messages import SequenceNumbers, header_stamp_ns, message_class
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
+from paint_deposition.nodes.runtime.messages import (
+    MOST_PUBLISHERS,
+    SequenceNumbers,
+    header_stamp_ns,
+    message_class,
+)
 
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
@@ -72,12 +77,11 @@ class RecordedTopic:
         self._sequence = SequenceNumbers()
         self.reset_counts(begun_ns)
         self._log_time_ns = 0
-        self.profile: QoSProfile | None = None
         self._node = node
         self._message_class = message_class(run_topic.type)
         self._take = take
         self._max_gap_ns = max_gap_ns
-        self._subscription: Subscription | None = None
+        self._subscription: AdaptiveSubscription | None = None
 
     def reset_counts(self, begun_ns: int) -> None:
         """Set the counts of the run, which began then, to zero."""
@@ -105,34 +109,27 @@ class RecordedTopic:
         before = f', {self.unheard} {UNHEARD}' if self.unheard else ''
         return f'{self.missed} missed{before}'
 
-    def subscribe(self, profile: QoSProfile) -> None:
-        """Subscribe with this quality of service, instead of the one before if any."""
-        self._end()
-        self.profile = profile
-        self._subscription = self._node.create_subscription(
-            self._message_class, self.name, self._on_message, profile, raw=True
-        )
+    def subscribe(self, depth: int) -> None:
+        """Subscribe, or match the quality of service to that of the publishers."""
+        if self._subscription is not None:
+            self._subscription.match_qos()
+            return
+        self._subscription = AdaptiveSubscription(
+            self._node, self._message_class, self.name, self._on_message, depth=depth,
+            latched=True, raw=True, polled=False,
+        )  # fmt: skip
 
     def unsubscribe(self) -> None:
         """Take what is in the queue; what is sent until the next subscription is not missed."""
-        self._end()
-        self.profile = None
-        self._sequence.forget()
-
-    def _end(self) -> None:
         if self._subscription is not None:
-            self.drain()
-            self._node.destroy_subscription(self._subscription)
+            self._subscription.destroy()
             self._subscription = None
+        self._sequence.forget()
 
     def drain(self) -> None:
         """Take all messages in the queue, without the executor."""
-        if self._subscription is None:
-            return
-        handle = self._subscription.handle
-        with handle:
-            while taken := handle.take_message(self._message_class, True):
-                self._on_message(*taken)
+        if self._subscription is not None:
+            self._subscription.take_pending()
 
     def _on_message(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
@@ -149,7 +146,7 @@ class RecordedTopic:
             self.unnumbered += 1
             return
         gid, sent_ns = gid['data'], info['source_timestamp']
-        if self._sequence.take(gid, number):
+        if self._sequence.take(gid, number) and len(self._beginnings) < MOST_PUBLISHERS:
             waited_ns = info['received_timestamp'] - self._begun_ns
             self._beginnings[gid] = Beginning(number, sent_ns, waited_ns)
         if gid in self._beginnings:

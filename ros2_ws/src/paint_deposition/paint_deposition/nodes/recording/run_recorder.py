@@ -36,9 +36,7 @@ from paint_deposition.nodes.runtime.topics import (
     PART_TOPIC,
     PROGRESS,
     PROGRESS_TOPIC,
-    compatible_qos,
     gun_topic,
-    incompatible_policies,
 )
 
 DISCOVERY_PERIOD_S = 0.1
@@ -50,6 +48,9 @@ QUEUE_DEPTH = 100
 LOW_DISK_BYTES = 1_000_000_000
 # The answer of a process that ends at once may be lost, and its client would wait for ever.
 ANSWER_S = 1.0
+# The run of a part that has left takes poses that were sent for it until none has come so long, or
+# so long after each gun's first pose for the next part: a publisher keeps the order.
+LATE_S, FOLLOWED_S = 2.0, 0.3
 
 
 class RunRecorder(ManagedNode):
@@ -79,6 +80,7 @@ class RunRecorder(ManagedNode):
         }  # fmt: skip
         self._initial_messages = InitialMessages(motion, self.resolve_topic_name(PART_POSE))
         # Also while no run is recorded, since they stay in force.
+        self._motion = {*motion, *motion.values()}
         self._always_heard = {PARAMETER_EVENTS, *motion.values()}
         self._topics: dict[str, RecordedTopic] = {}
         self._error: RecordingError | None = None
@@ -98,6 +100,12 @@ class RunRecorder(ManagedNode):
         # Run and stamp of the part, as it was announced.
         self._part: tuple[str, int] | None = None
         self._refused: set[str] = set()
+        # The run of the part that has left, while poses of it may come; until when, and when the
+        # last of them was sent. Poses that came even later.
+        self._leaving: RunWriter | None = None
+        self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
+        # Poses of these topics have not come since it left.
+        self._behind: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
         self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
@@ -121,13 +129,16 @@ class RunRecorder(ManagedNode):
         return RunWriter(folder, custom_data, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
-        if self.runs and not self.run.complete:
-            self.run.abandon()
+        for run in (self.run, self._leaving) if self.runs else ():
+            if run is not None and not run.complete:
+                run.abandon()
         super().destroy_node()
 
     # --- discovery
 
     def _discover(self) -> None:
+        if time.monotonic() > self._leaves_s:
+            self._guarded(self._end_of_leaving)
         for name in self._wanted:
             publishers = self.get_publishers_info_by_topic(name)
             if publishers and name not in self._refused and self._error is None:
@@ -143,7 +154,6 @@ class RunRecorder(ManagedNode):
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
         depth = POSE_QUEUE_DEPTH if is_pose or name == TF else QUEUE_DEPTH
-        profile = compatible_qos([publisher.qos_profile for publisher in publishers], depth)
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
@@ -152,8 +162,7 @@ class RunRecorder(ManagedNode):
             topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
             self._topics[name] = topic
-        if topic.profile is None or incompatible_policies(profile, topic.profile):
-            topic.subscribe(profile)
+        topic.subscribe(depth)
 
     # --- writing
 
@@ -163,11 +172,45 @@ class RunRecorder(ManagedNode):
             return
         if name == self._part_topic:
             self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
+        elif sent_ns <= self._left_ns and name in self._motion:
+            self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
+            if name in self._progress:
+                return
+        elif self._leaving is not None and name in self._behind:
+            self._behind.discard(name)
+            self._leave_soon()
+        elif self._leaving is not None and name == TF in self._leaving.counts:
+            self._guarded(self._leaving.write, name, cdr, log_time_ns, sent_ns)
         for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
             self._guarded(self.run.write, *first[:4])
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self._topics[name].messages % POSES_PER_REPORT == 0:
             self._report_progress()
+
+    def _write_late(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
+        """Write what was sent for the part that has left into its run, before what was not."""
+        if name in self._progress:
+            self._initial_messages.add_late(name, cdr, sent_ns)
+        if self._leaving is None:
+            self._too_late += 1
+            return
+        if name not in self._leaving.counts:
+            self._leaving.add_topic(self._topics[name].run_topic)
+        before_ns = self._initial_messages.begin_ns - 1
+        self._leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
+        self._leaving.keep_another(name)
+        self._leaves_s = time.monotonic() + LATE_S
+
+    def _leave_soon(self) -> None:
+        if not self._behind:
+            self._leaves_s = min(self._leaves_s, time.monotonic() + FOLLOWED_S)
+
+    def _end_of_leaving(self) -> None:
+        """Complete the run of the part that has left."""
+        leaving, self._leaving = self._leaving, None
+        if leaving is not None:
+            leaving.finish()
+            self.get_logger().info(_summary(leaving, self._lost_of_leaving))
 
     def _change_part(self, part: Part, log_time_ns: int, sent_ns: int) -> None:
         """Complete the run of the previous part, and begin that of the new one."""
@@ -180,14 +223,18 @@ class RunRecorder(ManagedNode):
         try:
             name = unused_name(self._folder, part.run or self._own_name)
             new_run = self._create_run(name, part_data(part, self.values['model_file']))
+            self._end_of_leaving()
             for recorded in self._topics.values():
                 if recorded.name != self._part_topic:
                     recorded.drain()
             # Some messages were sent for this part, and are in the run before, too.
-            early = self._initial_messages.begin_part(part, sent_ns)
+            self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
             self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
-            self.run.finish()
-            self.get_logger().info(self.summary())
+            self._leaving, self._lost_of_leaving = self.run, self._losses
+            self._leaves_s = time.monotonic() + LATE_S
+            self._behind = {name for name in self._progress if self.run.counts.get(name)}
+            self._behind -= early.keys()
+            self._leave_soon()
             self._begin_run(new_run, log_time_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
@@ -245,6 +292,7 @@ class RunRecorder(ManagedNode):
         self._initial_messages.end_motion()
         if self._error is not None:
             return
+        self._guarded(self._end_of_leaving)
         self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
         never = [name for name in self._wanted if name not in self._topics]
@@ -253,17 +301,20 @@ class RunRecorder(ManagedNode):
 
     def summary(self) -> str:
         """One line on what was recorded and what was lost."""
+        return _summary(self.run, self._losses)
+
+    @property
+    def _losses(self) -> str:
         topics = self._topics.values()
         missed = sum(topic.missed for topic in topics)
-        state = 'complete' if self.run.complete else 'INCOMPLETE'
         lost = f', {missed} missed' if missed else ''
         unheard = [f'{topic.unheard} of {topic.name}' for topic in topics if topic.unheard]
         lost += f', {" and ".join(unheard)} {UNHEARD}' if unheard else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
-        gaps = sum(topic.gaps for topic in topics)
-        messages = self.run.message_count
-        return f'{messages} messages{lost}, {gaps} gaps, file {state}: {self.run.folder}'
+        if self._too_late:
+            lost += f', {self._too_late} poses and states came too late for the run before'
+        return f'{lost}, {sum(topic.gaps for topic in topics)} gaps'
 
     def _diagnostic_tasks(self) -> Mapping[str, Task]:
         return {'recording': self._status}
@@ -294,6 +345,11 @@ class RunRecorder(ManagedNode):
             return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
         if free < LOW_DISK_BYTES:
             return Status(WARN, 'the disk is almost full', values)
-        if any(topic.missed for topic in topics):
-            return Status(WARN, 'messages were missed', values)
+        if self._too_late or any(topic.missed for topic in topics):
+            return Status(WARN, f'messages were missed{self._losses}', values)
         return Status(OK, 'recording', values)
+
+
+def _summary(run: RunWriter, losses: str) -> str:
+    state = 'complete' if run.complete else 'INCOMPLETE'
+    return f'{run.message_count} messages{losses}, file {state}: {run.folder}'

@@ -25,10 +25,11 @@ from paint_deposition.nodes.robot.robot_poses import (
     PublishedPoses,
     TfPoses,
 )
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.messages import header, message_class
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH, compatible_qos
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -116,7 +117,8 @@ class AtomizerSource(PaintNode):
         self._clock_offset_s = 0.0
         self._motion = self._create_motion()
         self._problems: dict[str, str] = {}  # by topic
-        self._discovery_timer = self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
+        self._heard: list[AdaptiveSubscription] = []
+        self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
         Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
 
     def _validate(self, values: Mapping[str, Any]) -> None:
@@ -187,11 +189,15 @@ class AtomizerSource(PaintNode):
                     reason = f'{topic} comes as {kind}, which is not installed: source it'
                     self._problems[topic] = reason
                     continue
-                profile = compatible_qos([info.qos_profile for info in found], QUEUE_DEPTH)
-                self.create_subscription(message, topic, partial(take, topic), profile)
+                self._heard.append(
+                    AdaptiveSubscription(
+                        self, message, topic, partial(take, topic), depth=QUEUE_DEPTH,
+                        latched=True, polled=False,
+                    )
+                )  # fmt: skip
                 del self._missing[topic]
-        if not self._missing:
-            self._discovery_timer.cancel()
+        for subscription in self._heard:
+            subscription.match_qos()
 
     def _on_signal_message(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
         """Take trigger, flow, brush and speed, which may be fields of one message."""

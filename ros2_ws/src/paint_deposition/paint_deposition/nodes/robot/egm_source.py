@@ -18,11 +18,16 @@ from paint_deposition.nodes.runtime.topics import POSE_DEPTH
 
 SILENT_S = 2.0
 POLL_S = 0.2
+# Another sender is reported for so long [ns].
+OTHER_NS = 10_000_000_000
 LARGEST_PACKET = 65_536
 
 SOURCE = fixed_while_running(
     'the stream is read with it; restart the node',
     address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
+    robot_address=NodeParameter(
+        '', 'Address of the robot; empty: of the first that sends positions [IP]'
+    ),
     port=NodeParameter(6510, "UDP port of the robot's UDPUC device [-]", (1, 65535)),
     frame_id=NodeParameter(
         'base_link', 'Name of the correction frame that EGMActPose or EGMStreamStart has [name]'
@@ -63,8 +68,6 @@ class EgmSource(PaintNode):
         self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
-        self._sender = ''
-        self._others: set[str] = set()
         self._heard_s = time.monotonic()
         Diagnostics(self, {'robot': self._status})
         self._stopped = threading.Event()
@@ -115,10 +118,9 @@ class EgmSource(PaintNode):
             except TimeoutError:
                 continue
             arrived_ns = time.time_ns()
-            self._sender = self._sender or sender
-            if sender != self._sender:
-                self._others.add(sender)
-            elif sample := self.stream.take(packet, arrived_ns):
+            if self.values['robot_address'] not in ('', sender):
+                self.stream.invalid += 1
+            elif sample := self.stream.take(packet, arrived_ns, sender):
                 self._heard_s = time.monotonic()
                 self._publish(sample)
 
@@ -140,18 +142,16 @@ class EgmSource(PaintNode):
         stream, values = self.stream, self.values
         own = 'not sent' if stream.own_lag_ns is None else f'{1e-6 * stream.own_lag_ns:.1f}'
         figures = {
-            'robot': self._sender or 'none yet', 'packets': stream.received,
+            'robot': stream.sender or 'none yet', 'packets': stream.received,
             'packets lost': stream.lost, 'packets repeated': stream.repeated,
             'packets that are no EgmRobot': stream.invalid,
             'lag taken out [ms]': f'{1e3 * values["lag_s"]:.1f}',
             'last packet later than the fastest [ms]': f'{1e-6 * stream.late_ns:.1f}',
             "from the controller's own time to arrival [ms]": own,
         }  # fmt: skip
-        if self._others:
-            found = ', '.join(sorted(self._others))
-            return Status(
-                ERROR, f'{found} sends, too: give each robot a port and a node of its own', figures
-            )
+        if time.time_ns() - stream.other_ns < OTHER_NS:
+            remedy = 'give each robot a port and a node of its own, or robot_address'
+            return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
         if time.monotonic() - self._heard_s > SILENT_S:
             return Status(
                 WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '

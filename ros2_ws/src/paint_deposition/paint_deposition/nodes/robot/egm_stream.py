@@ -28,6 +28,8 @@ MESSAGES = {
 REMEMBERED = 2500
 # A number that goes back further, or after so long, is of a stream that was started again.
 RESTART = 1000
+# A robot that has sent nothing for so long leaves the port to another [ns].
+SILENT_NS = 2_000_000_000
 
 
 @cache
@@ -80,8 +82,12 @@ class EgmStream:
     fastest of late, so that a late packet does not delay its position; ``lag_ns`` is the age of a
     position when its packet leaves.
 
+    The first to send a whole EgmRobot is the robot, until it is silent.
+
     Attributes:
         received, lost, repeated, invalid: packets; lost ones by the gaps of their numbers.
+        sender: address of the robot, '' before the first packet; other: of another that sends,
+            too, the last of them at ``other_ns``.
         late_ns: how much later than the fastest way the last packet came.
         own_lag_ns: from the controller's own time of the last position to its arrival; None where
             it was not sent. It is a lag only if both clocks are set.
@@ -91,23 +97,39 @@ class EgmStream:
         self.lag_ns = lag_ns
         self.received = self.lost = self.repeated = self.invalid = self.late_ns = 0
         self.own_lag_ns: int | None = None
+        self.sender = self.other = ''
+        self.other_ns = self._heard_ns = self._sent_ns = 0
         self._newest: int | None = None
         self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
 
-    def take(self, packet: bytes, arrived_ns: int) -> EgmSample | None:
-        """The position in a packet; None for one that is invalid, repeated or out of order."""
+    def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> EgmSample | None:
+        """The position in a packet; None for one that is not the robot's, invalid, repeated or
+        out of order.
+        """
         from google.protobuf.message import DecodeError
 
         try:
             robot = egm_message().FromString(packet)
         except DecodeError:
+            robot = None
+        if robot is None or not _is_whole(robot):
             self.invalid += 1
             return None
+        if sender != self.sender:
+            if self.sender and arrived_ns - self._heard_ns < SILENT_NS:
+                self.other, self.other_ns = sender, arrived_ns
+                return None
+            self.sender, self._newest = sender, None
+            self._ways_ns.clear()
+        self._heard_ns = arrived_ns
         self.received += 1
         if not self._is_next(robot.header.seqno):
             self.repeated += 1
             return None
         sent_ns = robot.header.tm * 1_000_000
+        if sent_ns < self._sent_ns:  # the clock was set back, or its 32 bits have run over
+            self._ways_ns.clear()
+        self._sent_ns = sent_ns
         self._ways_ns.append(arrived_ns - sent_ns)
         fastest_ns = min(self._ways_ns)
         self.late_ns = arrived_ns - sent_ns - fastest_ns
@@ -136,3 +158,15 @@ class EgmStream:
         self.lost += step - 1
         self._newest = number
         return True
+
+
+def _is_whole(robot: Any) -> bool:
+    """Whether a packet has number and time, and a place or joints that are finite."""
+    if not (robot.header.HasField('seqno') and robot.header.HasField('tm')):
+        return False
+    place, joints = robot.feedBack.cartesian, [*robot.feedBack.joints.joints]
+    of_place = [(place.pos, axis) for axis in 'xyz'] + [(place.orient, f'u{k}') for k in range(4)]
+    has_place = all(kind.HasField(name) for kind, name in of_place)
+    numbers = [*joints, *robot.feedBack.externalJoints.joints]
+    numbers += [getattr(kind, name) for kind, name in of_place]
+    return (has_place or len(joints) > 0) and bool(np.isfinite(numbers).all())

@@ -76,4 +76,11 @@ class _Values:
 
             since = own.replace(tzinfo=own.tzinfo or timezone.utc)
             own_ns = round(since.timestamp() * 1e6) * 1000
-        self._source.take(self._signals[node.nodeid], float(value), own_ns)
+        signal, status = self._signals[node.nodeid], data.monitored_item.Value.StatusCode
+        if status is not None and not status.is_good():
+            self._source.refuse(signal, f'is {status.name}')
+            return
+        try:
+            self._source.take(signal, float(value), own_ns)
+        except (TypeError, ValueError):
+            self._source.refuse(signal, f'is no number but {value!s:.60}')

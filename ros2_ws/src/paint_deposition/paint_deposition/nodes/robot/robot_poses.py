@@ -42,6 +42,8 @@ class JointPoses:
         try:
             found = self._robot.recorded_joints(positions_by_name, self._topic)
             values = np.array([[found[name] for name in self._robot.moving_joints]])
+            if not np.isfinite(values).all():
+                raise RecordingError(f'{self._topic} has joints that are not finite')
             positions, quaternions = self._robot.poses(self._robot.in_si(values, self._topic))
         except RecordingError as error:
             self._incomplete, self._refusal = self._incomplete + 1, str(error)

@@ -58,16 +58,21 @@ class RwsSource(SignalSource):
         cookies = request.HTTPCookieProcessor()
         opener = request.build_opener(cookies, request.HTTPDigestAuthHandler(logins))
         body = urlencode(wanted, doseq=True).encode()
-        with opener.open(f'{url}/subscription', body, TIMEOUT_S) as answer:
-            events, first = answer.headers['Location'], answer.read()
-        kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
-        more = {'Cookie': kept}
-        with connect(events, subprotocols=[PROTOCOL], additional_headers=more) as socket:  # type: ignore[list-item]
-            self.connected()
-            self._take_all(first)
-            while not stopped():
-                with suppress(TimeoutError):
-                    self._take_all(socket.recv(POLL_S))
+        try:
+            with opener.open(f'{url}/subscription', body, TIMEOUT_S) as answer:
+                events, first = answer.headers['Location'], answer.read()
+            kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
+            more = {'Cookie': kept}
+            with connect(events, subprotocols=[PROTOCOL], additional_headers=more) as socket:  # type: ignore[list-item]
+                self.connected()
+                self._take_all(first)
+                while not stopped():
+                    with suppress(TimeoutError):
+                        self._take_all(socket.recv(POLL_S))
+        finally:
+            # A controller has few sessions, and keeps those that are not closed.
+            with suppress(OSError):
+                opener.open(f'{url}/logout', None, TIMEOUT_S).close()
 
     def _take_all(self, event: str | bytes) -> None:
         for path, value in signal_values(event):

@@ -14,7 +14,7 @@ from rclpy.qos import qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns
 from paint_deposition.motion.stream_figures import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
@@ -100,7 +100,11 @@ class SignalSource(PaintNode):
         self._received: dict[str, float] = {}
         self._published = ''
         self._newest_ns = 0
-        self._problem = 'not connected yet'
+        # Of the connection, and of each signal.
+        self._problem, self._problems = 'not connected yet', dict.fromkeys(self.signals, '')
+        # Signals of which nothing came since the connection was made.
+        self._silent: set[str] = set()
+        self._lock = threading.Lock()
         self._lags_s: deque[float] = deque(maxlen=REMEMBERED)
         self._starts = StartsOfMotion()
         self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
@@ -133,6 +137,7 @@ class SignalSource(PaintNode):
 
     def _keep_following(self) -> None:
         while not self._stopped.is_set():
+            self._silent = {*self.signals}
             try:
                 self.follow(self._stopped.is_set)
             except Exception as error:  # whatever a network and its libraries bring
@@ -146,26 +151,31 @@ class SignalSource(PaintNode):
 
     def take(self, signal: str, value: float, own_ns: int | None = None) -> None:
         """Take the value of a signal that arrives now; ``own_ns`` is the server's time for it."""
-        kind, at_ns = self.signals[signal], own_ns
-        arrived_ns, self._problem = time.time_ns(), ''
-        # The first value may have been there for long.
-        if own_ns is not None and kind in self._received:
-            lag_s = 1e-9 * (arrived_ns - own_ns)
-            self._lags_s.append(lag_s)
-            if abs(lag_s) > MAX_CLOCK_OFFSET_S:
-                self._problem = (
-                    f'{signal} arrives {lag_s:.3g} s after its own time: set the clocks'
-                )
-                at_ns = None
+        kind, at_ns, arrived_ns = self.signals[signal], own_ns, time.time_ns()
         if not math.isfinite(value):
-            self._problem = f'{signal} is {value}; the gun stays as it was'
+            self.refuse(signal, f'is {value}')
             return
-        if at_ns is None:
-            at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
-        self._newest_ns = max(self._newest_ns, at_ns)
-        self._received[kind] = value
-        if not {*self.signals.values()} - self._received.keys():
-            self._publish(self._newest_ns)
+        with self._lock:
+            self._problem = self._problems[signal] = ''
+            # The first value may have been there for long.
+            if own_ns is not None and signal not in self._silent:
+                lag_s = 1e-9 * (arrived_ns - own_ns)
+                self._lags_s.append(lag_s)
+                if abs(lag_s) > MAX_CLOCK_OFFSET_S:
+                    late = f'{signal} arrives {lag_s:.3g} s after its own time: set the clocks'
+                    self._problems[signal], at_ns = late, None
+            self._silent.discard(signal)
+            if at_ns is None:
+                at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
+            self._newest_ns = max(self._newest_ns, at_ns)
+            self._received[kind] = value
+            if not {*self.signals.values()} - self._received.keys():
+                self._publish(self._newest_ns)
+
+    def refuse(self, signal: str, reason: str) -> None:
+        """Say why what came of a signal is no value."""
+        with self._lock:
+            self._problems[signal] = f'{signal} {reason}; the gun stays as it was'
 
     def _publish(self, at_ns: int) -> None:
         values, known = self.values, self._received
@@ -183,10 +193,14 @@ class SignalSource(PaintNode):
         self._publisher.publish(state)
 
     def _take_pose(self, pose: PoseStamped) -> None:
-        p = pose.pose.position
-        self._starts.add_pose(stamp_ns(pose.header), np.array([p.x, p.y, p.z]))
+        with self._lock:
+            self._starts.add_pose(stamp_ns(pose.header), pose_of(pose.pose)[0])
 
     def _status(self) -> Status:
+        with self._lock:
+            return self._status_now()
+
+    def _status_now(self) -> Status:
         received = {
             f'{kind}, {signal}': self._received.get(kind, 'not received')
             for signal, kind in self.signals.items()
@@ -199,8 +213,8 @@ class SignalSource(PaintNode):
             'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
             'opening after the start of motion [ms]': late,
         }
-        if self._problem:
-            return Status(ERROR, self._problem, values)
+        if problems := [each for each in (self._problem, *self._problems.values()) if each]:
+            return Status(ERROR, '; '.join(problems), values)
         missing = [name for name, value in received.items() if value == 'not received']
         if missing:
             return Status(WARN, f'not received: {"; ".join(missing)}', values)

@@ -14,8 +14,12 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
+from paint_deposition.files.recordings.headers import nanoseconds
+
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
+# Of one topic, those that have left included.
+MOST_PUBLISHERS = 1000
 # Three points and colours whose bytes occur nowhere else in a Marker.
 SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
 SAMPLE_COLOURS = np.array(
@@ -43,10 +47,9 @@ def white_marker(kind: int, namespace: str, number: int, frame_id: str) -> Marke
 
 
 def header_stamp_ns(cdr: bytes) -> int:
-    """Stamp of a serialised message that begins with a header [ns]."""
+    """``stamp_ns`` of a serialised message that begins with a header."""
     little_endian = cdr[1] & 1
-    sec, nanosec = struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET)
-    return sec * 1_000_000_000 + nanosec
+    return nanoseconds(*struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET))
 
 
 class SequenceNumbers:
@@ -57,12 +60,15 @@ class SequenceNumbers:
 
     def __init__(self) -> None:
         self.lost = 0
+        # The publisher heard last is last.
         self._newest: dict[bytes, int] = {}
 
     def take(self, publisher: bytes, number: int) -> bool:
         """Take the number of a message; whether it is the first of its publisher."""
-        before = self._newest.get(publisher)
+        before = self._newest.pop(publisher, None)
         self._newest[publisher] = number if before is None else max(number, before)
+        if len(self._newest) > MOST_PUBLISHERS:
+            del self._newest[next(iter(self._newest))]
         if before is not None:
             self.lost += max(number - before - 1, 0)
         return before is None

@@ -8,6 +8,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
 PART_TOPIC = 'part'
+TRUST_TOPIC = 'thickness/trust'
 
 # Two seconds of a 250 Hz robot. A queue of ten loses a fifth of the poses while a callback
 # builds one mesh marker, whatever the reliability: a full queue drops its oldest message.
@@ -35,15 +36,6 @@ def compatible_qos(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
         reliability=ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
         durability=DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
     )
-
-
-def incompatible_policies(offered: QoSProfile, wanted: QoSProfile) -> list[str]:
-    """The policies in which an offered QoS is weaker than the wanted one: a larger number."""
-    return [
-        name
-        for name in ('reliability', 'durability')
-        if getattr(offered, name) > getattr(wanted, name)
-    ]
 
 
 def node_name(info: TopicEndpointInfo) -> str:

@@ -5,23 +5,29 @@ import time
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.headers import (
+    pose_of,
+    stamp_ns,
+    transforms_of,
+    trigger_change,
+)
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.motion.trigger import relative_flow
-from paint_deposition.nodes.painting.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -40,6 +46,8 @@ from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
 # Poses are taken from their queue so often [s]; at 1 kHz half a second of them fits into it.
 TAKE_PERIOD_S = 0.05
 DEPTH = 500
+# The simulator speaks twice a second [s].
+TRUST_PERIOD_S, SILENT_S = 0.5, 2.0
 
 WEB_VIEW = dict(
     **fixed_while_running(
@@ -85,6 +93,7 @@ class WebView(PaintNode):
             (ThicknessField, 'thickness/field', self._take_field, results),
             (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
             (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+            (DiagnosticStatus, topics.TRUST_TOPIC, self._take_trust, topics.LATCHED),
         ):
             self.create_subscription(message, topic, take, profile)
         self._inputs = [
@@ -99,6 +108,7 @@ class WebView(PaintNode):
             )
         ]  # fmt: skip
         self.create_steady_timer(TAKE_PERIOD_S, self._take_motion)
+        self.create_steady_timer(TRUST_PERIOD_S, self._show_trust)
         self._diagnostics = Diagnostics(self, {'page': self._status})
 
     def _load_files(self) -> None:
@@ -113,6 +123,8 @@ class WebView(PaintNode):
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
         self._rmse_um = float('nan')
+        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
+        self._doubts, self._trusted_s = '', time.monotonic()
         self._problem = ''
         self._sent = 0, time.monotonic()
         self._show_part(self.values['mesh_file'])
@@ -182,6 +194,15 @@ class WebView(PaintNode):
     def _take_comparison(self, stats: ComparisonStats) -> None:
         self._rmse_um = stats.rmse_um
 
+    def _take_trust(self, trust: DiagnosticStatus) -> None:
+        self._doubts = '' if trust.level == OK else trust.message
+        self._trusted_s = time.monotonic()
+
+    def _show_trust(self) -> None:
+        silent_s = time.monotonic() - self._trusted_s
+        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > SILENT_S else ''
+        self.scene.tell('trust', doubts=silent or self._doubts)
+
     def _say(self, problem: str) -> None:
         """Tell what keeps the film from being shown; '' is nothing."""
         if problem:
@@ -199,19 +220,18 @@ class WebView(PaintNode):
             waiting.process(time.monotonic())
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
-        t, q = placed.transform.translation, placed.transform.rotation
-        self._frame.take_part_pose(placed.header.frame_id, [t.x, t.y, t.z, q.x, q.y, q.z, q.w])
+        for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
+            self._frame.take_part_pose(parent, pose)
 
-    def _take_state(self, gun: str, state: AtomizerState, _sent_ns: int) -> None:
+    def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
         with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
-            self._flow[gun] = relative_flow(state.spraying, state.flow)
+            self._flow[gun] = trigger_change(state).flow
 
-    def _take_pose(self, gun: str, message: PoseStamped, _sent_ns: int) -> None:
+    def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
         self._waiting[gun].add(message, time.monotonic())
 
     def _move_gun(self, gun: str, message: PoseStamped) -> None:
-        p, q = message.pose.position, message.pose.orientation
-        pose = np.array([p.x, p.y, p.z]), np.array([q.x, q.y, q.z, q.w])
+        pose = pose_of(message.pose)
         frame_id, stamp = message.header.frame_id, stamp_ns(message.header)
         if not self._frame.is_own(frame_id):
             pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)

@@ -1,6 +1,7 @@
 """What the live page shows of a part, and what a browser still lacks of it."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from threading import Lock
@@ -30,8 +31,10 @@ def frame(kind: str, arrays: Arrays = None, **values: Any) -> bytes:
     """A message to the page: the length of its head (uint32), the head as JSON, the arrays."""
     arrays = arrays or {}
     listed = [[name, array.dtype.name, array.size] for name, array in arrays.items()]
-    # JSON knows no NaN; the page takes null for it.
-    plain = {k: None if isinstance(v, float) and v != v else v for k, v in values.items()}
+    # JSON knows no NaN and no infinity; the page takes null for them.
+    plain = {
+        k: None if isinstance(v, float) and not math.isfinite(v) else v for k, v in values.items()
+    }
     head = json.dumps({'kind': kind, **plain, 'arrays': listed}, allow_nan=False).encode()
     return b''.join(
         [len(head).to_bytes(4, 'little'), head, *(a.tobytes() for a in arrays.values())]

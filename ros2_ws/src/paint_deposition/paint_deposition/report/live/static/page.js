@@ -70,6 +70,10 @@ const receive = {
     document.title = `${words} – film`;
   },
   replay({ paused }) { find('replay').firstElementChild.textContent = paused ? 'go on' : 'pause'; },
+  trust({ doubts }) {
+    state.doubts = doubts;
+    showLink();
+  },
   message({ text: words }) {
     find('message').textContent = words;
     find('message').hidden = !words;
@@ -79,10 +83,16 @@ const receive = {
 const send = connect(
   (message) => receive[message.kind](message),
   (there) => {
-    find('link').textContent = there ? 'connected' : 'no connection – trying again';
-    find('link').classList.toggle('off', !there);
+    state.there = there;
+    showLink();
   },
 );
+
+function showLink() {
+  const { there, doubts } = state;
+  find('link').textContent = !there ? 'no connection – trying again' : doubts ? `in doubt: ${doubts}` : 'connected';
+  find('link').classList.toggle('off', !there || Boolean(doubts));
+}
 
 // --- choices
 

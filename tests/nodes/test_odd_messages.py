@@ -1,0 +1,132 @@
+"""No message of the right type ends a node, whatever it holds, nor spoils what comes after it."""
+
+import os
+import random
+import time
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.node import Node
+from std_msgs.msg import Float64
+from std_srvs.srv import Trigger
+
+from nodes.cell import offline_um, parameters, two_passes, write_panel
+from nodes.odd_messages import Peer, odd_message
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
+from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
+from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
+from paint_deposition.nodes.viewing.web_view import WebView
+from robot_arm import urdf
+
+MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
+MOTION = two_passes()
+
+
+class IdleSource(SignalSource):
+    """A source of signals whose controller says nothing."""
+
+    PARAMETERS = SIGNALS
+
+    def follow(self, stopped) -> None:
+        while not stopped():
+            time.sleep(0.01)
+
+
+@pytest.fixture
+def nodes(tmp_path):
+    """How each kind of node is made that subscribes to anything."""
+    mesh = {'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.1}
+    readings = tmp_path / 'readings.csv'
+    readings.write_text('x_m,y_m,z_m,thickness_um\n' + '0.0,0.0,0.1,20\n0.1,0.0,0.1,21\n' * 3)
+    bag = str(write_pose_bag(tmp_path / 'pass', MOTION))
+    arm = tmp_path / 'arm.urdf'
+    arm.write_text(urdf())
+    signal = {'trigger': 'gun', 'flow': 'flow'}
+    films = {'output_directory': str(tmp_path / 'films')}
+    return {
+        'simulator': (DepositionSimulator, mesh | films),
+        'comparison': (ModelComparison, mesh | {'measurements_file': str(readings)}),
+        'web_view': (WebView, mesh | {'port': 0}),
+        'recorder': (RunRecorder, {'output_directory': str(tmp_path / 'runs'), 'name': 'run'}),
+        'joints': (AtomizerSource, {'urdf_file': str(arm), **signal}),
+        'tf': (AtomizerSource, {'base_link': 'base', 'tip_link': 'tool0', **signal}),
+        'trigger': (AtomizerSource, signal),
+        'signals': (lambda **o: IdleSource('signal_source', **o), {'trigger': 'gun'}),
+        'player': (BagPlayer, {'bag': bag, 'rate': 0.0, 'loop': True, 'publish_clock': False}),
+    }
+
+
+@pytest.fixture
+def made(nodes, ros_context, spin):
+    """`made(name)`: that node, running."""
+    alive = []
+
+    def made(name: str):
+        kind, values = nodes[name]
+        alive.append(kind(context=ros_context, parameter_overrides=parameters(**values)))
+        spin(alive[-1])
+        return alive[-1]
+
+    yield made
+    for node in alive:
+        node.close()
+
+
+@pytest.mark.parametrize(
+    'name', ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger',
+             'signals', 'player'],
+)  # fmt: skip
+def test_no_message_of_the_right_type_ends_a_node(
+    name, made, ros_context, spin, executor, wait_until
+):
+    if name == 'tf':
+        pytest.importorskip('tf2_msgs')
+    peer_node = Node('peer', context=ros_context)
+    signals = [peer_node.create_publisher(Float64, topic, 10) for topic in ('gun', 'flow')]
+    poses = peer_node.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    node = made(name)
+    spin(peer_node)
+    rng = random.Random(sum(map(ord, name)))
+    if name in ('joints', 'tf', 'trigger'):
+        wait_until(lambda: all(s.get_subscription_count() for s in signals), what='signals')
+    if name == 'recorder':
+        poses.publish(PoseStamped())
+        wait_until(lambda: len(node._topics) > 0, what='a recorded topic')
+    peer = Peer(peer_node)
+    others = [made('web_view')] if name == 'recorder' else []
+    peer.send([node, *others], rng)
+    wait_until(lambda: peer.is_heard, what='discovery')
+    for _ in range(MESSAGES):
+        peer.send([node, *others], rng)
+        for _ in range(10):
+            executor.spin_once(timeout_sec=0.0)
+    until_s = time.monotonic() + 1.5  # diagnostics, statistics and all other timers
+    wait_until(lambda: time.monotonic() > until_s)
+    for _ in range(3):  # what timers and services show of it
+        node._diagnostics.publish() if hasattr(node, '_diagnostics') else None
+    assert not node.finished.done(), node.finished.exception()
+
+
+def test_odd_messages_spoil_no_film(made, robot, executor, wait_until, ros_context, spin, call):
+    """After a reset the film is as without them."""
+    node = made('simulator')
+    driver = robot(node)
+    rng = random.Random(33)
+    for _ in range(MESSAGES):
+        for publisher in (driver.pose_publisher, driver.state_publisher):
+            publisher.publish(odd_message(publisher.msg_type, rng))
+    sent = MESSAGES
+    counted = node.inputs[0]
+    wait_until(lambda: counted.poses_received == sent and counted.states_received == sent)
+    driver.send_state(MOTION.stamps_ns[0], 0.0)
+    wait_until(lambda: counted.states_received == sent + 1)
+    call(driver, Trigger, '/deposition_simulator/reset', Trigger.Request())
+    driver.send(MOTION)
+    wait_until(lambda: node.film.counts.received >= len(MOTION))
+    node.catch_up()
+    assert np.array_equal(node.film.snapshot().film_um, offline_um(node, MOTION))
