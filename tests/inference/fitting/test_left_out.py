@@ -1,0 +1,110 @@
+"""The error on parts left out is that of really refitting without them."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import paint_deposition as pd
+from inference.fitting.panels import gauged
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.inference.diagnosis.verdict import Step
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
+from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, random_effects
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.residuals import root_mean_square
+
+BASE = DepositionModel()
+ORDERS = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8), (1.3, 0.5))
+# By how much more paint each part got than the model says.
+LEVELS = (1.03, 0.97, 1.04, 0.96)
+MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
+
+
+def levelled(truth: DepositionModel, count: int) -> Campaign:
+    """So many panels, each with passes of its own and more or less paint than the others."""
+    found = []
+    panels = gauged(truth, seed=4, orders=ORDERS[:count]).experiments
+    for panel, level in zip(panels, LEVELS, strict=False):
+        readings = replace(panel.readings, thickness_um=level * panel.readings.thickness_um)
+        found.append(panel.with_readings(readings))
+    return Campaign(tuple(found))
+
+
+def without(campaign: Campaign, number: int) -> Campaign:
+    kept = [one for k, one in enumerate(campaign.experiments) if k != number]
+    return Campaign(tuple(kept))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ('truth', 'count'), [(BASE, 4), (MISSING, 3)], ids=['clean', 'an effect missing']
+)
+def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth, count):
+    campaign = levelled(truth, count)
+    study, fit = clean_and_fit(campaign, BASE, starts=6)
+    owner, folds = study.campaign.experiment_of, study.folds()
+    found_um, anew_um = [], []
+    for number, part in enumerate(campaign.experiments):
+        out = owner == number
+        left_um = (study.measured_um - study.predicted_without_um(fit, out))[out]
+        model = pd.refit(without(campaign, number), None, BASE).model
+        other_um = pd.compare(Campaign((part,)), model).points.residual_um
+        assert root_mean_square(left_um) == pytest.approx(root_mean_square(other_um), rel=0.05)
+        found_um.append(left_um)
+        anew_um.append(other_um)
+    step = Step.of(study, '', fit)
+    assert np.array_equal(folds, owner)
+    assert step.holdout_rmse_um == pytest.approx(root_mean_square(np.concatenate(found_um)))
+    assert step.holdout_rmse_um == pytest.approx(
+        root_mean_square(np.concatenate(anew_um)), rel=0.03
+    )
+    # The level of a part is not known beforehand.
+    assert step.holdout_rmse_um > step.rmse_um
+
+
+@pytest.fixture(scope='module')
+def study_and_fit():
+    return clean_and_fit(levelled(MISSING, 3), BASE)
+
+
+def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
+    """However wrong they are: neither by themselves nor by the level of their part."""
+    study, fit = study_and_fit
+    out = study.campaign.experiment_of == 1
+    part = study.campaign.experiments[1]
+    wrong = replace(part.readings, thickness_um=part.readings.thickness_um + 100.0)
+    experiments = [*study.campaign.experiments]
+    experiments[1] = part.with_readings(wrong)
+    other = replace(study, campaign=Campaign(tuple(experiments)))
+    assert (other.measured_um[out] > study.measured_um[out] + 99.0).all()
+    first, second = (one.predicted_without_um(fit, out) for one in (study, other))
+    assert second == pytest.approx(first, rel=1e-4, abs=1e-3)
+
+
+def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):
+    """What is learned beside the model from the other parts is predicted on the last."""
+    study, fit = study_and_fit
+    out = study.campaign.experiment_of == 2
+    predict = study.forward.predict_um
+    edge_um = predict(fit.model.with_effect(MISSING.effects[0])) - predict(fit.model)
+    free = (edge_um / study.sigma_um)[:, np.newaxis]
+    without_it, with_it = (
+        root_mean_square((study.measured_um - study.predicted_without_um(fit, out, each))[out])
+        for each in (None, free)
+    )
+    assert with_it < 0.6 * without_it
+
+
+def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves(study_and_fit):
+    study, _ = study_and_fit
+    used = study.campaign.experiment_of != 1
+    level, _ = random_effects(study.campaign, study.measured_um, study.sigma_um, used)
+    assert not level.mixing[1].any()
+    assert not level.columns[~used].any()
+    others = level.mixing[np.ix_([0, 2], [0, 2])]
+    assert others == pytest.approx(100.0 * LEVEL_SHARE * np.array([[0.5, -0.5], [-0.5, 0.5]]))
+    # One that is left has nothing that it could differ from.
+    alone = study.campaign.experiment_of == 0
+    assert random_effects(study.campaign, study.measured_um, study.sigma_um, alone) == ()
