@@ -16,17 +16,17 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 BASE = DepositionModel()
-ORDERS = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8), (1.3, 0.5))
-# By how much more paint each part got than the model says.
-LEVELS = (1.03, 0.97, 1.04, 0.96)
+# Heights of the passes on each panel [m], and how much more paint it got than the model says.
+PASSES_M = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8))
+LEVELS = (1.03, 0.97, 1.04)
 MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
 
 
-def levelled(truth: DepositionModel, count: int) -> Campaign:
-    """So many panels, each with passes of its own and more or less paint than the others."""
+def levelled(truth: DepositionModel) -> Campaign:
+    """Panels, each with passes of its own and more or less paint than the others."""
     found = []
-    panels = gauged(truth, seed=4, orders=ORDERS[:count]).experiments
-    for panel, level in zip(panels, LEVELS, strict=False):
+    panels = gauged(truth, seed=4, orders=PASSES_M).experiments
+    for panel, level in zip(panels, LEVELS, strict=True):
         readings = replace(panel.readings, thickness_um=level * panel.readings.thickness_um)
         found.append(panel.with_readings(readings))
     return Campaign(tuple(found))
@@ -38,27 +38,26 @@ def without(campaign: Campaign, number: int) -> Campaign:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ('truth', 'count'), [(BASE, 4), (MISSING, 3)], ids=['clean', 'an effect missing']
-)
-def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth, count):
-    campaign = levelled(truth, count)
+@pytest.mark.parametrize('truth', [BASE, MISSING], ids=['clean', 'an effect missing'])
+def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth):
+    """Also where the model misses much, so that the fit without a part is far from that with it."""
+    campaign = levelled(truth)
     study, fit = clean_and_fit(campaign, BASE, starts=6)
-    owner, folds = study.campaign.experiment_of, study.folds()
+    owner = study.campaign.experiment_of
     found_um, anew_um = [], []
     for number, part in enumerate(campaign.experiments):
         out = owner == number
         left_um = (study.measured_um - study.predicted_without_um(fit, out))[out]
         model = pd.refit(without(campaign, number), None, BASE).model
         other_um = pd.compare(Campaign((part,)), model).points.residual_um
-        assert root_mean_square(left_um) == pytest.approx(root_mean_square(other_um), rel=0.05)
+        assert root_mean_square(left_um) == pytest.approx(root_mean_square(other_um), rel=0.03)
         found_um.append(left_um)
         anew_um.append(other_um)
     step = Step.of(study, '', fit)
-    assert np.array_equal(folds, owner)
+    assert np.array_equal(study.folds(), owner)
     assert step.holdout_rmse_um == pytest.approx(root_mean_square(np.concatenate(found_um)))
     assert step.holdout_rmse_um == pytest.approx(
-        root_mean_square(np.concatenate(anew_um)), rel=0.03
+        root_mean_square(np.concatenate(anew_um)), rel=0.02
     )
     # The level of a part is not known beforehand.
     assert step.holdout_rmse_um > step.rmse_um
@@ -66,7 +65,7 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
 
 @pytest.fixture(scope='module')
 def study_and_fit():
-    return clean_and_fit(levelled(MISSING, 3), BASE)
+    return clean_and_fit(levelled(MISSING), BASE)
 
 
 def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
