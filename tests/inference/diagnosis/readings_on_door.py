@@ -1,10 +1,12 @@
-"""Readings without noise on the sample door and on a panel."""
+"""Readings without noise on the sample door and on a panel, and fits that know the model."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from booth import door, painted, panel, path_of, serpentine
+from booth import MODEL, door, painted, panel, path_of, serpentine
+from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -51,3 +53,14 @@ def plate_with_a_back() -> Experiment:
         normals=np.vstack([part.readings.normals, -part.readings.normals[0]]),
     )
     return Experiment.of('plate', plate, part.path, readings)
+
+
+def at_model(study: Study, model=MODEL) -> Fit:
+    """A fit that has found this model."""
+    parameters = FreeParameters.of(model, *model.effects)
+    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
+    residual = (study.measured_um - predicted_um) / study.sigma_um
+    jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
+    return Fit(
+        parameters, vector, model, predicted_um, residual, jacobian, True, study.nuisance
+    )  # fmt: skip

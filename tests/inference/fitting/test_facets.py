@@ -79,7 +79,7 @@ def test_a_fine_mesh_has_none():
 
 
 def test_levels_of_parts_are_told_beside_their_facets():
-    """Two parts that differ by 3 % either way, on a mesh whose facets cost more than the gauge's noise."""
+    """Two parts 3 % off either way, on a mesh whose facets cost more than the gauge's noise."""
     parts = []
     for seed, (name, level) in enumerate((('thick', 1.03), ('thin', 0.97))):
         part = measured(COARSE_M, seed=seed)

@@ -11,7 +11,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, random_effects
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.residuals import root_mean_square
 
@@ -40,7 +39,7 @@ def without(campaign: Campaign, number: int) -> Campaign:
 @pytest.mark.slow
 @pytest.mark.parametrize('truth', [BASE, MISSING], ids=['clean', 'an effect missing'])
 def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth):
-    """Also where the model misses much, so that the fit without a part is far from that with it."""
+    """Also where the model misses much: then the fit without a part is far from that with it."""
     campaign = levelled(truth)
     study, fit = clean_and_fit(campaign, BASE, starts=6)
     owner = study.campaign.experiment_of
@@ -94,16 +93,3 @@ def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):
         for each in (None, free)
     )
     assert with_it < 0.6 * without_it
-
-
-def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves(study_and_fit):
-    study, _ = study_and_fit
-    used = study.campaign.experiment_of != 1
-    level, _ = random_effects(study.campaign, study.measured_um, study.sigma_um, used)
-    assert not level.mixing[1].any()
-    assert not level.columns[~used].any()
-    others = level.mixing[np.ix_([0, 2], [0, 2])]
-    assert others == pytest.approx(100.0 * LEVEL_SHARE * np.array([[0.5, -0.5], [-0.5, 0.5]]))
-    # One that is left has nothing that it could differ from.
-    alone = study.campaign.experiment_of == 0
-    assert random_effects(study.campaign, study.measured_um, study.sigma_um, alone) == ()
