@@ -16,6 +16,13 @@ from paint_deposition.part.surface import Surface
 PASSES_M = {'door': (0.75, 0.45), 'panel': (0.05, -0.1)}
 LEAST_UM = 1.0
 
+# A door of the virtual paint shop, and one with a shielded valley.
+DOOR = {
+    'experiments': ('door',), 'readings': 60, 'repeats': 20, 'style': 'random',
+    'parcels': 2_000_000, 'amplitude': None,
+}  # fmt: skip
+SHIELDED = DOOR | {'seed': 3, 'truth': 'faraday_shielding', 'amplitude': 0.35}
+
 
 def measured(surface: Surface, name: str, count: int = 24, **options) -> Experiment:
     """An experiment with readings at places that got some paint."""

@@ -1,13 +1,17 @@
-"""A law over a covariate, learned because the user asked for it."""
+"""An effect, or a law over a covariate, that is added because the user asked for it."""
 
 import numpy as np
 import pytest
 
+from inference.diagnosis.readings_on_door import SHIELDED
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.air_drift import AirDrift
+from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -15,6 +19,34 @@ from paint_deposition.report.writers.fitted_model import write_fitted
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope='module')
+def shielded(tmp_path_factory):
+    return small_campaign(tmp_path_factory.mktemp('shielded'), **SHIELDED)
+
+
+@pytest.fixture(scope='module')
+def refitted(shielded):
+    """The model of the shielded door with what it lacks, added because somebody asked for it."""
+    return refit(shielded, DepositionModel(), FaradayShielding)
+
+
+def test_refit_adds_what_was_asked_for_and_weighs_it(shielded, refitted):
+    assert refitted.accepted == ('faraday_shielding',)
+    assert refitted.classes[0].probability > 0.9
+    assert refitted.history[1].holdout_rmse_um < 0.7 * refitted.history[0].holdout_rmse_um
+    after = refit(shielded, refitted.model, AirDrift)
+    assert [effect.id for effect in after.model.effects] == ['faraday_shielding', 'air_drift']
+    # What does not act is not sure, and predicts no better.
+    assert after.verdict == 'none_missing'
+    assert after.classes[0].probability < SURE
+    assert after.history[1].holdout_rmse_um > 0.98 * after.history[0].holdout_rmse_um
+    with pytest.raises(ModelError, match='faraday_shielding is in the model already'):
+        refit(shielded, refitted.model, FaradayShielding)
+    # With nothing added the model is kept and tested.
+    assert refit(shielded, refitted.model, None).verdict == 'none_missing'
+    assert refit(shielded, DepositionModel(), None).verdict == 'unknown_effect'
 
 
 HIDDEN = LEARNED['time_s'](low=0.0, high=40.0, learned=(-0.15, 0.0, 0.08, 0.12, 0.13))
