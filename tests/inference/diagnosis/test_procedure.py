@@ -19,7 +19,7 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.files.json_files import json_text
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
+from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.readings.campaign import Campaign
@@ -166,33 +166,24 @@ def test_no_probability_is_printed_as_certain(probability, text):
     assert percent(probability) == text
 
 
-def test_the_file_says_what_others_rely_on(found, nothing_found):
-    place = Place(np.array([0.1, 0.2, 0.3]), 'door', 'tells them apart')
-    spray = Spray('the same passes at half the flow', ('air_drift', 'tcp_tilt'), 4.2, 0.6)
+def test_the_file_says_what_was_found(found, nothing_found):
     content = json.loads(json_text(found.to_dict()))
-    assert content['verdict'] == 'effect_missing'
-    assert isinstance(content['p_value'], float)
-    assert content['accepted'] == list(found.accepted)
     one = content['classes'][0]
-    assert set(one) >= {'members', 'probability', 'best', 'parameters', 'holdout_rmse_um'}
-    assert one['members'][0] == one['best'] == found.accepted[0]
-    (interval,) = one['parameters'].values()
-    assert set(interval) == {'value', 'low', 'high'}
-    assert set(one['holdout_rmse_um']) == {'before', 'after'}
-    assert set(content['rmse_um']) == {
-        'before', 'after', 'holdout_before', 'holdout_after', 'noise_floor', 'left_out',
-    }  # fmt: skip
-    assert content['unknown'] is None
+    assert content['accepted'] == [one['best']] == [one['members'][0]] == list(found.accepted)
     assert set(content['not_testable']) <= set(EFFECTS)
-    for region in content['regions']:
-        assert set(region) == {'description', 'experiment', 'readings', 'mean_residual_um'}
     assert content['regions'][0]['mean_residual_um'] < 0.0  # too little paint in the valley
-    assert set(content['next']) == {'measure', 'spray'}
+    errors = {
+        'before': found.history[0].holdout_rmse_um,
+        'after': found.history[1].holdout_rmse_um,
+    }
+    assert one['holdout_rmse_um'] == errors
+    assert {when: content['rmse_um'][f'holdout_{when}'] for when in errors} == errors
+    assert content['rmse_um']['left_out'] == 'points'
+    assert nothing_found.to_dict()['classes'] == []
+    place = Place(np.array([0.1, 0.2, 0.3]), 'door', 'tells them apart')
     assert place.to_dict() == {
         'experiment': 'door', 'x_m': 0.1, 'y_m': 0.2, 'z_m': 0.3, 'why': 'tells them apart',
     }  # fmt: skip
-    assert spray.to_dict()['separates'] == ['air_drift', 'tcp_tilt']
-    assert nothing_found.to_dict()['classes'] == []
 
 
 # Small panels that the model itself painted, and a library of three effects: a diagnosis is cheap

@@ -4,17 +4,16 @@ import numpy as np
 import pytest
 
 from inference.diagnosis.readings_on_door import SHIELDED
+from inference.fitting.panels import ORDERS, gauged
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
-from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.report.writers.fitted_model import write_fitted
 from small_campaign import small_campaign
 
@@ -49,29 +48,13 @@ def test_refit_adds_what_was_asked_for_and_weighs_it(shielded, refitted):
     assert refit(shielded, DepositionModel(), None).verdict == 'unknown_effect'
 
 
-HIDDEN = LEARNED['time_s'](low=0.0, high=40.0, learned=(-0.15, 0.0, 0.08, 0.12, 0.13))
-NOISE_UM = 0.4
-
-
-def measured(experiment: Experiment, random: np.random.Generator) -> Experiment:
-    """The experiment with readings of a film painted under the hidden law."""
-    surface = experiment.surface
-    painted = FilmIntegrator(surface.points(), DepositionModel(effects=(HIDDEN,)), 'double')
-    painted.add(experiment.path)
-    at = random.choice(np.flatnonzero(painted.gauge_um > 0.3 * painted.gauge_um.max()), 70, False)
-    film_um = painted.gauge_um[at] + random.normal(0.0, NOISE_UM, len(at))
-    sigma_um = np.full(len(at), NOISE_UM)
-    normals = surface.normals[at]
-    readings = Readings.of(surface.vertices_m[at], film_um, sigma_um=sigma_um, normals=normals)
-    return experiment.with_readings(readings)
+HIDDEN = LEARNED['time_s'](low=0.0, high=70.0, learned=(-0.15, 0.0, 0.08, 0.12, 0.13))
 
 
 @pytest.fixture(scope='module')
-def campaign(tmp_path_factory):
-    """Panel and door, painted with a flow that rises and levels off."""
-    random = np.random.default_rng(3)
-    parts = small_campaign(tmp_path_factory.mktemp('campaign')).experiments
-    return Campaign(tuple(measured(part, random) for part in parts))
+def campaign() -> Campaign:
+    """Panels painted with a flow that rises and levels off."""
+    return gauged(DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
 
 
 @pytest.fixture(scope='module')
@@ -88,14 +71,9 @@ def test_the_law_is_learned_and_counts_as_no_named_effect(done):
     assert found.parameters == {}
     assert 'over the time since the motion began' in done.reason
     assert done.unknown is not None
-
-
-def test_the_error_falls_also_on_points_left_out(done):
     before, after = done.history
     assert after.rmse_um < 0.8 * before.rmse_um
-    assert after.holdout_rmse_um < 0.9 * before.holdout_rmse_um
-    assert after.holdout_rmse_um > after.rmse_um
-    assert done.to_dict()['rmse_um']['holdout_after'] == after.holdout_rmse_um
+    assert after.rmse_um < after.holdout_rmse_um < 0.9 * before.holdout_rmse_um
 
 
 def test_the_band_holds_the_hidden_law_up_to_a_constant(done):

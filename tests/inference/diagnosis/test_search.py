@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scipy.special import softmax
+from scipy.special import logsumexp, softmax
 
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import gauged
@@ -79,7 +79,10 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     assert 0.6 * EDGE.gain < best.effects['edge_build'].gain < 1.1 * EDGE.gain
     drift = best.effects['flow_drift'].drift_per_pass
     assert 0.5 * DRIFT.drift_per_pass < drift < 1.1 * DRIFT.drift_per_pass
+    # Amplitudes far from the typical ones are less unlikely than one size says.
     assert best.log_prior == pytest.approx(2.0 * log_odds(PRIOR_EFFECT))
+    weights = [one.log_weight for one in best.weighed if not one.sizes.is_beyond_nature]
+    assert best.log_evidence > logsumexp(weights) - 1.0
     # One size of the discrepancy bears nearly all the weight of this set.
     everything = np.ones(len(best.state.study), dtype=bool)
     assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=0.8)
