@@ -59,9 +59,9 @@ def test_what_nature_leaves_over_is_as_large_as_sprays_differ(diagnosed):
     """Sprays of one setting differ by some per cent of the peak, over centimetres."""
     found = diagnosed(ONE, heights_in=(40,))
     assert named(found) == []
-    assert 0.002 < found.remainder.part_share < 0.05
-    assert 0.005 < found.remainder.length_m < 0.1
-    assert np.isfinite(found.remainder.footprint_of_peak)
+    assert 0.002 < found.discrepancy.part_share < 0.05
+    assert 0.005 < found.discrepancy.length_m < 0.1
+    assert np.isfinite(found.discrepancy.footprint_of_peak)
 
 
 @pytest.mark.parametrize(

@@ -49,8 +49,8 @@ def test_a_planted_misfit_is_found_and_told(study):
     assert found.readings == door.means.repeats[found.rows - np.argmax(on_door)].sum()
 
 
-@pytest.mark.parametrize(('side', 'half'), [(1.0, 'right half'), (-1.0, 'left half')])
-def test_left_and_right_are_the_guns(study, side, half):
+@pytest.mark.parametrize(('side', 'from_left'), [(1.0, 98), (-1.0, 0)])
+def test_left_is_the_guns(study, side, from_left):
     """The gun looks at this door along -y with z up: its right is -x."""
     door = study.campaign.experiments[1]
     looking = door.path.rotation[:, :, 2].mean(axis=0)
@@ -59,7 +59,8 @@ def test_left_and_right_are_the_guns(study, side, half):
     aside = side * (study.campaign.positions_m @ right)
     rows = np.flatnonzero((study.campaign.experiment_of == 1) & (aside > 0.2))
     found = regions(study, planted(study, rows, -5.0))[0]
-    assert half in found.description
+    assert f' at {from_left} to ' in found.description
+    assert found.description.partition(', ')[0].endswith(' % of the width from the left')
     assert 'µm high' in found.description
 
 

@@ -1,14 +1,17 @@
 """Fits of models that are exactly linear, to compare closed forms with direct ones."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.smooth_laws import Basis, RandomLaw
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -119,7 +122,17 @@ def deviation(fit: Fit) -> np.ndarray:
     return fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
 
 
-def bounds(sides) -> tuple[np.ndarray, np.ndarray]:
-    """Bounds of amplitudes with these signs, ten typical sizes wide."""
-    sides = np.array(sides, dtype=float)
-    return np.where(sides > 0, 0.0, -10.0), np.where(sides < 0, 0.0, 10.0)
+def explanation_of(
+    effect: Effect, *columns: np.ndarray, sides: Sequence[int], share: float = 1.0
+) -> Explanation:
+    """An effect by the directions (P,) of its first amplitudes, which are ten sizes wide."""
+    known = np.array(sides, dtype=float)
+    low, high = np.where(known > 0, 0.0, -10.0), np.where(known < 0, 0.0, 10.0)
+    names = type(effect).amplitudes()[: len(columns)]
+    law = Sensitivity(effect, names, np.column_stack(columns), low, high)
+    return Explanation(effect.id, law.columns, law.sides, share, law)
+
+
+def unknown(columns: np.ndarray, share: float = 1.0) -> Explanation:
+    """A law of any form by its directions (P, n)."""
+    return Explanation(UNKNOWN, columns, np.zeros(columns.shape[1]), share)

@@ -1,10 +1,12 @@
-"""Readings without noise on the sample door and on a panel."""
+"""Readings without noise on the sample door and on a panel, and fits that know the model."""
 
 from dataclasses import replace
 
 import numpy as np
 
-from booth import door, painted, panel, path_of, serpentine
+from booth import MODEL, door, painted, panel, path_of, serpentine
+from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -13,6 +15,13 @@ from paint_deposition.part.surface import Surface
 # Two passes of few sub-steps, over the door's arch and edges and over the panel.
 PASSES_M = {'door': (0.75, 0.45), 'panel': (0.05, -0.1)}
 LEAST_UM = 1.0
+
+# A door of the virtual paint shop, and one with a shielded valley.
+DOOR = {
+    'experiments': ('door',), 'readings': 60, 'repeats': 20, 'style': 'random',
+    'parcels': 2_000_000, 'amplitude': None,
+}  # fmt: skip
+SHIELDED = DOOR | {'seed': 3, 'truth': 'faraday_shielding', 'amplitude': 0.35}
 
 
 def measured(surface: Surface, name: str, count: int = 24, **options) -> Experiment:
@@ -51,3 +60,14 @@ def plate_with_a_back() -> Experiment:
         normals=np.vstack([part.readings.normals, -part.readings.normals[0]]),
     )
     return Experiment.of('plate', plate, part.path, readings)
+
+
+def at_model(study: Study, model=MODEL) -> Fit:
+    """A fit that has found this model."""
+    parameters = FreeParameters.of(model, *model.effects)
+    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
+    residual = (study.measured_um - predicted_um) / study.sigma_um
+    jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
+    return Fit(
+        parameters, vector, model, predicted_um, residual, jacobian, True, study.nuisance
+    )  # fmt: skip

@@ -16,12 +16,15 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.inference.diagnosis.explanations import (
     LAW_ERROR,
+    OTHER_ERROR,
+    OTHER_LAW,
     UNKNOWN,
     law_errors,
     neutral_shapes,
     nonparametric_laws_of,
     of_effects,
     of_footprint,
+    other_laws,
 )
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
@@ -34,12 +37,14 @@ def study() -> Study:
     return study_of(on_door())
 
 
-def errors(study: Study, *effects: Effect, kept: tuple[str, ...] | None = None) -> np.ndarray:
+def errors(
+    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=law_errors
+) -> np.ndarray:
     """(P, n) of a model with these effects, of which all or some are kept."""
     model = MODEL.model_copy(update={'effects': effects})
     fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=model)
     ids = [effect.id for effect in effects] if kept is None else kept
-    return law_errors(study, fit, frozenset(ids), fit.model)
+    return of(study, fit, frozenset(ids), fit.model)
 
 
 def change_um(study: Study, effect: Effect) -> np.ndarray:
@@ -61,31 +66,40 @@ def test_without_effects_no_law_is_off(study):
 
 @pytest.mark.parametrize('effect', [OversprayFog(fog_um=3.0), AirDrift(shift_down_m=0.02)])
 def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(study, effect):
-    """Over no covariate, and over two."""
-    expected = LAW_ERROR * np.abs(change_um(study, effect)) / study.sigma_um
+    """Over the conditions that the effect names, over all others, and of a law of another form."""
+    share = np.abs(change_um(study, effect)) / study.sigma_um
+    expected = np.hypot(LAW_ERROR, OTHER_ERROR) * share
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
+    other_form = size(errors(study, effect, of=other_laws))
+    assert other_form == pytest.approx(OTHER_LAW * share, rel=0.03)
 
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)
 def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
-    assert errors(study, effect.typical()).shape == (len(study), 0)
+    for of in (law_errors, other_laws):
+        assert errors(study, effect.typical(), of=of).shape == (len(study), 0)
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
 
 
 def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(study):
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
-    relative = change_um(study, EDGE) / study.forward.predict_um(MODEL.with_effect(EDGE))
-    film_um = study.forward.predict_um(MODEL)
-    found = size(errors(study, EDGE)) * study.sigma_um / film_um
-    assert found.max() < 1.1 * LAW_ERROR * np.abs(relative).max()
+    change = change_um(study, EDGE)
+    relative = change / study.forward.predict_um(MODEL.with_effect(EDGE))
+    over_others = OTHER_ERROR * change / study.sigma_um
+    own = np.sqrt(size(errors(study, EDGE)) ** 2 - (0.97 * over_others) ** 2)
+    found = own * study.sigma_um / study.forward.predict_um(MODEL)
+    assert found.max() < 1.2 * LAW_ERROR * np.abs(relative).max()
     assert found.min() > 0.5 * LAW_ERROR * np.quantile(np.abs(relative), 0.95)
 
 
-def test_errors_of_several_effects_stand_side_by_side(study):
+def test_errors_of_several_effects_are_independent(study):
     fog = FogGradient(fog_um=2.0)
-    both, kept = errors(study, fog, EDGE), errors(study, fog, EDGE, kept=('edge_build',))
-    assert both.shape[1] == errors(study, fog).shape[1] + errors(study, EDGE).shape[1]
-    np.testing.assert_allclose(both[:, -kept.shape[1] :], kept)
+    both, *each = (
+        columns @ columns.T
+        for kept in (None, ('fog_gradient',), ('edge_build',))
+        for columns in [errors(study, fog, EDGE, kept=kept)]
+    )
+    np.testing.assert_allclose(both, sum(each), atol=1e-9 * both.max())
 
 
 def test_an_effect_that_was_switched_off_has_no_error_on_that_part(study):

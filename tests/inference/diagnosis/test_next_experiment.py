@@ -164,7 +164,7 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     alone = EffectClass(('air_drift',), 0.6, 'air_drift')
     group = replace(alone, members=('air_drift', 'tcp_offset', 'tcp_tilt'))
     other = EffectClass(('fog_gradient',), 0.3, 'fog_gradient')
-    unknown = Unknown('tool_x_m', 0.01, {}, '')
+    unknown = Unknown('tool_x_m', 0.01, {}, '', (), '', 0.0, 0.0)
     for diagnosis, expected in (
         (diagnosed(study, fit, group, other), ('air_drift', 'tcp_offset', 'tcp_tilt')),
         (diagnosed(study, fit, alone, other), ('air_drift', 'fog_gradient')),
@@ -186,18 +186,3 @@ def test_all_errors_of_the_figures_are_of_one_residual(study, fit):
     assert found['experiments'] == [{'name': study.campaign.experiments[0].name} | errors]
     assert found['rmse_um']['before'] == step.rmse_um
     assert found['rmse_um']['left_out'] in ('experiments', 'points')
-
-
-def test_a_part_without_voltage_has_a_level_of_its_own(study):
-    (usual,) = study.campaign.experiments
-    off = replace(BY_KEY['voltage_off'].made(usual), name='off')
-    both = Study.of(Campaign((usual, off)))
-    (level, *_) = both.random_effects
-    first, other = level.columns.T
-    assert not first.any()  # there is no other part that it could differ from
-    rows = both.campaign.experiment_of == 1
-    np.testing.assert_allclose(other, np.where(rows, 0.3 * both.measured_um / both.sigma_um, 0.0))
-    double = both.residuals(both.measured_um * np.where(rows, 2.0, 1.0))
-    np.testing.assert_allclose(double.predicted_um, both.measured_um, rtol=0.02)
-    assert both.has(EFFECTS['edge_build']).tolist() == [True] * len(usual) + [False] * len(off)
-    assert both.has(EFFECTS['sag']).all()

@@ -6,7 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scipy.special import logsumexp, softmax
 
+from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import gauged
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -17,13 +19,11 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.inference.diagnosis.model_space import (
     COARSENED,
     PRIOR_EFFECT,
-    PRIOR_UNKNOWN,
     SURE,
     log_odds,
 )
-from paint_deposition.inference.diagnosis.search import SAME, EffectSet, Search, SearchStage
+from paint_deposition.inference.diagnosis.search import SAME, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState
-from paint_deposition.inference.fitting.least_squares import Fit, derivatives
 from paint_deposition.inference.readings.campaign import Campaign
 
 pytestmark = pytest.mark.slow
@@ -41,7 +41,7 @@ class Twin(EdgeBuild):
 
 def searching(campaign: Campaign, library: Iterable[type[Effect]]) -> Search:
     known = {effect.id: effect for effect in library}
-    return Search(DiagnosisState(campaign, BASE, known, seed=0, progress=lambda line: None))
+    return Search(DiagnosisState.begin(campaign, BASE, known, seed=0))
 
 
 @pytest.fixture(scope='module')
@@ -68,7 +68,7 @@ def test_the_set_found_is_the_one_planted(search, stages):
     assert stages[-1].here.names == PLANTED
     for stage, following in pairwise(stages):
         assert stage.chosen().names == following.here.names
-        assert following.here.log_weight_alone > stage.here.log_weight_alone
+        assert following.here.log_weight > stage.here.log_weight
     assert stages[-1].chosen() is stages[-1].here
 
 
@@ -80,12 +80,25 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     drift = best.effects['flow_drift'].drift_per_pass
     assert 0.5 * DRIFT.drift_per_pass < drift < 1.1 * DRIFT.drift_per_pass
     # Amplitudes far from the typical ones are less unlikely than one size says.
-    assert best.log_prior >= 2.0 * log_odds(PRIOR_EFFECT) - 1.0
+    assert best.log_prior == pytest.approx(2.0 * log_odds(PRIOR_EFFECT))
+    weights = [one.log_weight for one in best.weighed if not one.sizes.is_beyond_nature]
+    assert best.log_evidence > logsumexp(weights) - 1.0
     # One size of the discrepancy bears nearly all the weight of this set.
-    everything = np.ones(len(best.run.study), dtype=bool)
-    assert best.log_weight_of(everything) == pytest.approx(best.log_weight_alone, abs=1.5)
-    # Something unknown beside it adds to it.
-    assert best.log_weight >= best.log_weight_alone
+    everything = np.ones(len(best.state.study), dtype=bool)
+    assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=0.8)
+
+
+def test_something_unknown_beside_a_set_competes_with_it(stages):
+    """It is improbable before the readings, and weighs more where an effect is missing."""
+    gains = []
+    for stage in stages:
+        here = stage.here
+        assert here.log_weight == pytest.approx(here.log_evidence / COARSENED + here.log_prior)
+        gains.append(here.log_weight_unknown - here.log_weight)
+    assert gains[-1] < 0.0
+    assert gains[0] > gains[-1]
+    assert stages[0].here.p_value_of_causes < 0.05 < stages[-1].here.p_value
+    assert stages[0].here.p_value <= stages[0].here.p_value_of_causes
 
 
 def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
@@ -94,11 +107,12 @@ def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
     for name, (members, probability) in groups.items():
         assert members == (name,)
         assert probability > SURE
+        # Against the set without it, as it is or with something unknown beside it.
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
         weights = [search.with_effect(others, rival).log_weight for rival in rivals]
-        odds = np.sum(np.exp((np.array(weights) - others.log_weight) / COARSENED))
-        assert probability == pytest.approx((1.0 - PRIOR_UNKNOWN) * odds / (1.0 + odds))
+        without = others.log_weight, others.log_weight_unknown
+        assert probability == pytest.approx(softmax([*weights, *without])[:-2].sum())
 
 
 def test_effects_that_look_alike_share_one_group():
@@ -113,7 +127,7 @@ def test_effects_that_look_alike_share_one_group():
 def test_an_effect_that_does_not_stand_is_taken_out_of_the_set(search, stages):
     one_more = search.with_effect(stages[-1].here, 'air_drift')
     assert one_more.names == {*PLANTED, 'air_drift'}
-    assert one_more.log_weight_alone < stages[-1].here.log_weight_alone
+    assert one_more.log_weight < stages[-1].here.log_weight
     trial, groups = search.groups(one_more)
     assert trial.names == groups.keys() == PLANTED
 
@@ -123,41 +137,18 @@ def test_nothing_is_added_where_nothing_acts(clean):
     assert stage.here is clean.nothing
     assert clean.groups(stage.here) == (clean.nothing, {})
     # The readings left over by a fold do not call for more either.
-    rows = np.arange(len(clean.run.study)) % 4 > 0
+    rows = np.arange(len(clean.state.study)) % 4 > 0
     assert stage.chosen(rows) is stage.here
-
-
-def misled(search: Search) -> EffectSet:
-    """A fit without effects that has come to rest in a wrong pattern."""
-    state = search.run
-    wrong = search.nothing.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
-    model = search.nothing.fit.model.model_copy(update={'planar': wrong})
-    study, parameters = state.study, search.nothing.fit.parameters
-    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
-    fit = Fit(
-        parameters, vector, model, predicted_um,
-        (study.measured_um - predicted_um) / study.sigma_um,
-        derivatives(study.forward, parameters, vector, study.sigma_um),
-        True, study.nuisance, search.nothing.fit.discrepancy,
-    )  # fmt: skip
-    return replace(search.nothing, fit=fit)
-
-
-def replace_state(
-    search: Search, nothing: EffectSet, trials: dict, tried: set
-) -> tuple[dict, set]:
-    """Let a search begin again from other trials; those that it had."""
-    had = search._trials, search._tried
-    search.nothing, search._trials, search._tried = nothing, trials, tried
-    return had
 
 
 def test_what_only_led_to_a_better_pattern_is_no_effect(clean):
     """Beside a wrong pattern any effect helps whose refit finds the right one."""
-    good, bad = clean.nothing, misled(clean)
-    anew = replace_state(clean, bad, {frozenset(): bad}, set())
-    stages = clean.stages()
-    replace_state(clean, good, *anew)
+    good = clean.nothing
+    wrong = good.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
+    state = clean.state
+    fit = at_model(state.study, good.fit.model.model_copy(update={'planar': wrong}))
+    search = Search(replace(state, fit=fit))
+    assert search.nothing.log_evidence < good.log_evidence - 10.0
+    stages = search.stages()
     assert stages[-1].here.names == frozenset()
-    assert stages[-1].here.log_weight == pytest.approx(good.log_weight, abs=SAME)
-    assert bad.log_weight < good.log_weight - 10.0
+    assert stages[-1].here.log_evidence == pytest.approx(good.log_evidence, abs=2.0 * SAME)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-from inference.diagnosis.linear import bounds, linear_fit, null_of
-from paint_deposition.effects.base import Effect
+from inference.diagnosis.linear import explanation_of as law
+from inference.diagnosis.linear import linear_fit, null_of, unknown
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space, testability
-from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
+from paint_deposition.inference.diagnosis.explanations import Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 from paint_deposition.inference.diagnosis.testability import LEVEL, POWER
@@ -19,13 +19,6 @@ READINGS = 60
 RUNS = 200
 # Probability that a correct power fails the test with other seeds.
 CHANCE = 0.005
-
-
-def law(effect: Effect, column: np.ndarray, side: int) -> Explanation:
-    low, high = bounds([side])
-    names = type(effect).amplitudes()[:1]
-    of_law = Sensitivity(effect, names, column[:, np.newaxis], low, high)
-    return Explanation(effect.id, of_law.columns, of_law.sides, 1.0, of_law)
 
 
 @pytest.fixture
@@ -40,13 +33,10 @@ def found() -> list[Explanation]:
     random = np.random.default_rng(5)
     alike = random.normal(size=READINGS)
     return [
-        law(AirDrift(), 0.8 * random.normal(size=READINGS), 0),
-        law(EdgeBuild(), 0.7 * alike, 1),
-        law(FaradayShielding(), 0.9 * alike + 0.8 * random.normal(size=READINGS), 1),
-        *(
-            Explanation(UNKNOWN, 0.3 * random.normal(size=(READINGS, count)), np.zeros(count), 0.5)
-            for count in (6, 4)
-        ),
+        law(AirDrift(), 0.8 * random.normal(size=READINGS), sides=(0,)),
+        law(EdgeBuild(), 0.7 * alike, sides=(1,)),
+        law(FaradayShielding(), 0.9 * alike + 0.8 * random.normal(size=READINGS), sides=(1,)),
+        *(unknown(0.3 * random.normal(size=(READINGS, count)), 0.5) for count in (6, 4)),
     ]
 
 
@@ -85,5 +75,5 @@ def test_what_nature_leaves_over_makes_less_detectable(null, found, discrepancy)
 def test_what_hides_in_the_pattern_is_not_testable(null):
     """A direction that the pattern takes up whole shows nothing, however strong."""
     hidden = null.columns[:, 0] / np.linalg.norm(null.columns[:, 0])
-    space = EffectEvidence(null, [law(EdgeBuild(), hidden, 1)], np.inf)
+    space = EffectEvidence(null, [law(EdgeBuild(), hidden, sides=(1,))], np.inf)
     assert testability.testability(space, seed=0) == (('edge_build',), {})

@@ -1,10 +1,13 @@
 """Facets of a coarse mesh in the noise of the inference."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from booth import MODEL, painted, path_of, serpentine
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
+from paint_deposition.inference.fitting.random_effects import amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -24,19 +27,22 @@ def fold(edge_m: float) -> Surface:
     return Surface.from_triangles(*triangulated(depth, edge_m, HALF_M, jitter=0.2), 0.008)
 
 
-def study(edge_m: float, sigma_um: float = 0.1, count: int = 120) -> Study:
-    """Readings on the fine part, diagnosed on one with edges of this length."""
+def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int = 3) -> Experiment:
+    """Readings on the fine part, set beside one with edges of this length."""
     fine = fold(FINE_M)
     film_um = painted(fine, PATH).raw_um
-    rng = np.random.default_rng(3)
+    rng = np.random.default_rng(seed)
     at = rng.choice(np.flatnonzero(film_um > 1.0), count, replace=False)
     noisy_um = film_um[at] + sigma_um * rng.normal(size=count)
     readings = Readings.of(
         fine.vertices_m[at], noisy_um, normals=fine.normals[at],
         sigma_um=np.full(count, sigma_um),
     )  # fmt: skip
-    experiment = Experiment.of('fold', fold(edge_m), PATH, readings)
-    return clean_and_fit(Campaign((experiment,)), MODEL)[0]
+    return Experiment.of('fold', fold(edge_m), PATH, readings)
+
+
+def study(edge_m: float) -> Study:
+    return clean_and_fit(Campaign((measured(edge_m),)), MODEL)[0]
 
 
 @pytest.fixture(scope='module')
@@ -44,12 +50,14 @@ def coarse() -> Study:
     return study(COARSE_M)
 
 
-def test_facets_are_told_of_and_are_a_direction_of_the_noise(coarse):
+def test_facets_are_told_of_and_are_noise(coarse):
     assert any('The mesh of fold is coarser' in note for note in coarse.notes)
-    assert coarse.nuisance.shape == (len(coarse), 1)
+    assert coarse.nuisance.shape == (len(coarse), 0)
+    without = replace(coarse, facet_um=None)
+    assert coarse.sigma_um == pytest.approx(np.hypot(without.sigma_um, coarse.facet_um))
 
 
-def test_the_direction_explains_what_the_facets_cost(coarse):
+def test_the_noise_is_what_the_facets_cost(coarse):
     """The model is the true one: what is left of the readings is noise and facets."""
     left_um = coarse.measured_um - coarse.forward.predict_um(MODEL)
     amount = left_um @ coarse.facet_um / (coarse.facet_um @ coarse.facet_um)
@@ -61,10 +69,27 @@ def test_points_keep_their_facets_when_others_are_left_out(coarse):
     kept = np.arange(len(coarse)) % 3 > 0
     some = coarse.of_points(kept)
     np.testing.assert_array_equal(some.facet_um, coarse.facet_um[kept])
-    np.testing.assert_array_equal(some.nuisance, coarse.nuisance[kept])
+    np.testing.assert_array_equal(some.sigma_um, coarse.sigma_um[kept])
 
 
 def test_a_fine_mesh_has_none():
     fine = study(FINE_M)
-    assert fine.nuisance.shape[1] == 0
+    assert fine.facet_um is None
     assert not any('coarser' in note for note in fine.notes)
+
+
+def test_levels_of_parts_are_told_beside_their_facets():
+    """Two parts 3 % off either way, on a mesh whose facets cost more than the gauge's noise."""
+    parts = []
+    for seed, (name, level) in enumerate((('thick', 1.03), ('thin', 0.97))):
+        part = measured(COARSE_M, seed=seed)
+        changed = replace(part.readings, thickness_um=level * part.readings.thickness_um)
+        parts.append(replace(part.with_readings(changed), name=name))
+    found, fit = clean_and_fit(Campaign(tuple(parts)), MODEL)
+    assert np.abs(found.facet_um).max() > 3.0 * found.gauge_um.max()
+    by_name = {(a.kind, a.of): a for a in amounts(fit, found.random_effects)}
+    for name, level in (('thick', 3.0), ('thin', -3.0)):
+        amount = by_name['part level', name]
+        assert amount.value == pytest.approx(level, abs=3.0 * amount.sd)
+        assert amount.sd < 0.7
+        assert amount.is_notable

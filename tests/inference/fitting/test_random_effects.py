@@ -7,8 +7,15 @@ import pytest
 
 from inference.diagnosis.linear import fit_linear
 from inference.fitting.panels import painted_by, passes
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM, amounts
+from paint_deposition.inference.fitting.random_effects import (
+    LEVEL_SHARE,
+    OTHER_LEVEL_SHARE,
+    SESSION_UM,
+    amounts,
+    random_effects,
+)
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.coordinates import PATTERN
@@ -67,6 +74,35 @@ def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
     assert level.names == ('left', 'right', 'roof')
     assert zero.names == ('Monday', 'roof')
     assert study.nuisance.shape == (len(study), 5)
+
+
+def test_a_part_without_voltage_has_a_level_of_its_own():
+    usual = part('usual')
+    off = replace(part('off'), switched_off=frozenset(['voltage']))
+    study = Study.of(Campaign((usual, off)))
+    level, _ = study.random_effects
+    first, other = level.columns.T
+    assert not first.any()  # there is no other part that it could differ from
+    rows = study.campaign.experiment_of == 1
+    share = OTHER_LEVEL_SHARE * study.measured_um / study.sigma_um
+    np.testing.assert_allclose(other, np.where(rows, share, 0.0))
+    double = study.residuals(study.measured_um * np.where(rows, 2.0, 1.0))
+    np.testing.assert_allclose(double.predicted_um, study.measured_um, rtol=0.02)
+    assert study.has(EFFECTS['edge_build']).tolist() == (~rows).tolist()
+    assert study.has(EFFECTS['sag']).all()
+
+
+def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
+    study = Study.of(Campaign((part('left'), part('roof'), part('right'))))
+    owner = study.campaign.experiment_of
+    level, zero = random_effects(study.campaign, study.measured_um, study.sigma_um, owner != 1)
+    others = np.array([[0.5, 0.0, -0.5], [0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]])
+    assert level.mixing == pytest.approx(100.0 * LEVEL_SHARE * others)
+    assert not level.columns[owner == 1].any()
+    # Its readings without a name of their session were taken in one of their own.
+    assert zero.mixing == pytest.approx(SESSION_UM * others)
+    # One that is left has nothing that it could differ from.
+    assert random_effects(study.campaign, study.measured_um, study.sigma_um, owner == 0) == ()
 
 
 def test_two_sessions_on_one_part_differ_by_their_zero():

@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from booth import MODEL
-from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
+from inference.diagnosis.readings_on_door import (
+    at_model,
+    on_door,
+    on_panel,
+    plate_with_a_back,
+    study_of,
+)
 from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.discrepancy import (
@@ -20,23 +26,10 @@ from paint_deposition.inference.diagnosis.discrepancy import (
 )
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
 from paint_deposition.inference.diagnosis.sprays import MENU
-from paint_deposition.inference.fitting.least_squares import Fit, derivatives
-from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
 # Parts of the study: a door, and a panel twice.
 DOOR, FIRST, SECOND = range(3)
-
-
-def at_model(study: Study, model=MODEL) -> Fit:
-    """A fit that has found this model."""
-    parameters = FreeParameters.of(model, *model.effects)
-    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
-    residual = (study.measured_um - predicted_um) / study.sigma_um
-    jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
-    return Fit(
-        parameters, vector, model, predicted_um, residual, jacobian, True, study.nuisance
-    )  # fmt: skip
 
 
 @pytest.fixture(scope='module')

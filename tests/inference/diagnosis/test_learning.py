@@ -1,0 +1,164 @@
+"""Laws learned from readings, and the error on readings without which all of it was found."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from inference.diagnosis.linear import linear_fit, null_of, smooth_curves
+from inference.diagnosis.readings_on_door import at_model
+from inference.fitting.panels import ORDERS, gauged
+from paint_deposition.effects.catalogue import LEARNED
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.effects.library.flow_drift import FlowDrift
+from paint_deposition.inference.comparison.comparison import compare
+from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
+from paint_deposition.inference.diagnosis.gaussian import NullModel
+from paint_deposition.inference.diagnosis.learning import (
+    MOST_LAWS,
+    LeftOut,
+    NullModels,
+    choose_laws,
+    locate_unexplained,
+)
+from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.diagnosis.search import EffectSet, Search, SearchStage
+from paint_deposition.inference.diagnosis.state import DiagnosisState
+from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.residuals import root_mean_square
+
+POINTS, KNOTS = 80, 8
+WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
+CURVE = smooth_curves(np.linspace(0.0, KNOTS - 1.0, POINTS), KNOTS, 0.5)
+CHANGE = CURVE.change_um
+WAVY = Explanation(UNKNOWN, CHANGE, np.zeros(CHANGE.shape[1]), 1.0, random=CURVE)
+
+
+def nulls(change: np.ndarray, **others: np.ndarray) -> NullModels:
+    """Beside noise that a change (P,) has moved; for some kinds of law more (P, n) may vary."""
+    base = null_of(linear_fit(np.random.default_rng(0), POINTS))
+    null = NullModel.of(base.columns, base.raw + change)
+    beside = {kind: null.beside(columns) for kind, columns in others.items()}
+    kinds = ('footprint', 'correction', 'place', 'nonparametric_laws')
+    return NullModels(**{kind: beside.get(kind, null) for kind in kinds})
+
+
+def test_a_law_is_learned_once_where_there_is_one():
+    assert choose_laws(nulls(0.0 * WAVE), [WAVY], np.inf) == []
+    ((number, size),) = choose_laws(nulls(WAVE), [replace(WAVY, columns=0.0 * CHANGE), WAVY,
+                                                  WAVY], np.inf)  # fmt: skip
+    assert number in (1, 2)
+    assert size > 1.0
+    assert choose_laws(nulls(WAVE), [replace(WAVY, random=None)], np.inf) == []
+
+
+def test_a_law_must_say_more_than_what_may_vary_already():
+    """Than any footprint could; but a correction of a law need not say more than its errors."""
+    hidden = nulls(WAVE, nonparametric_laws=3.0 * CHANGE)
+    assert choose_laws(hidden, [WAVY], np.inf) == []
+    assert len(choose_laws(hidden, [replace(WAVY, corrects='edge_build')], np.inf)) == 1
+    assert choose_laws(nulls(WAVE).beside(3.0 * CHANGE), [WAVY], np.inf) == []
+
+
+# Three panels of which the passes were painted in three orders.
+
+BASE = DepositionModel()
+THREE = (*ORDERS, (0.7, 0.3, 1.5, 1.1))
+EDGE = EdgeBuild(gain=0.8, length_m=0.1)
+RISING = LEARNED['time_s'](low=0.0, high=70.0, learned=(-0.2, 0.05, 0.12, 0.15, 0.15))
+
+
+def begun(campaign: Campaign, *library) -> DiagnosisState:
+    return DiagnosisState.begin(campaign, BASE, {e.id: e for e in library}, seed=0)
+
+
+@pytest.fixture(scope='module')
+def rising() -> Campaign:
+    """Panels painted by a flow that rises and levels off, which no effect of the library does."""
+    return gauged(BASE.with_effect(RISING), seed=2, orders=THREE)
+
+
+@pytest.fixture(scope='module')
+def nothing(rising) -> EffectSet:
+    """What is known of them before anything is learned."""
+    return Search(begun(rising)).nothing
+
+
+def over_time(found: EffectSet) -> list[Explanation]:
+    return [law for law in found.state.nonparametric_laws if law.learns == 'time_s']
+
+
+@pytest.mark.slow
+def test_what_no_law_explains_is_learned_without_the_parts_left_out(nothing, rising):
+    """The error is that of learning the law from the other parts and predicting the last."""
+    left_out = LeftOut([SearchStage(nothing, [])], over_time(nothing))
+    without, *with_laws = left_out.errors_um()
+    noise_um = nothing.state.study.noise_floor_um
+    assert without > 1.7 * noise_um
+    assert with_laws[0] < 1.3 * noise_um
+    assert len(with_laws) == MOST_LAWS
+    # No second law is learned over one covariate, and none over one that is left out.
+    assert with_laws[1] == with_laws[0]
+    kept_out = left_out.errors_um(frozenset(['time_s']))
+    assert kept_out == pytest.approx([without] * (1 + MOST_LAWS))
+    anew = []
+    for part in rising.experiments:
+        others = Campaign(tuple(one for one in rising.experiments if one is not part))
+        learned = refit(others, BASE, LEARNED['time_s']).model
+        anew.append(compare(Study.of(Campaign((part,))), learned).points.residual_um)
+    assert with_laws[0] == pytest.approx(root_mean_square(np.concatenate(anew)), rel=0.15)
+
+
+@pytest.mark.slow
+def test_a_fold_that_calls_for_another_set_goes_no_further():
+    """Only one part had the voltage that the effect needs: from the others it is not known."""
+    one, *others = gauged(BASE, seed=0, orders=THREE).experiments
+    with_edge = gauged(BASE.with_effect(EDGE), seed=0, orders=THREE[:1]).experiments[0]
+    off = frozenset(['voltage'])
+    parts = replace(with_edge, name=one.name), *(replace(e, switched_off=off) for e in others)
+    state = begun(Campaign(parts), EdgeBuild, FlowDrift)
+    study, stages = state.study, Search(state).stages()
+    first, last = stages[0].here, stages[-1].here
+    assert last.names == {'edge_build'}
+    found_um = LeftOut(stages, []).errors_um()
+    folds = study.folds()
+    sets = [first if fold == 0 else last for fold in range(len(parts))]
+    assert [stages[0].chosen(folds != k).names for k in range(3)] == [one.names for one in sets]
+    predicted_um = np.empty(len(study))
+    for fold, one in enumerate(sets):
+        out = folds == fold
+        predicted_um[out] = study.predicted_without_um(one.fit, out)[out]
+    expected = root_mean_square(study.measured_um - predicted_um)
+    assert found_um == pytest.approx([expected] * (1 + MOST_LAWS))
+
+
+@pytest.mark.slow
+def test_the_unexplained_is_told_by_its_place_its_size_and_the_part_that_it_began_on():
+    first, *later = gauged(BASE, seed=1, columns=5, orders=THREE).experiments
+    changed = []
+    for panel in later:
+        x, _, z = panel.readings.positions_m.T
+        more_um = np.where((x > 0.3) & (z > 1.5), 6.0, 0.0)
+        readings = replace(panel.readings, thickness_um=panel.readings.thickness_um + more_um)
+        changed.append(panel.with_readings(readings))
+    state = begun(Campaign((first, *changed)))
+    fit, nothing = at_model(state.study, BASE), Search(state).nothing
+    unknown = locate_unexplained(state.study, fit, nothing, seed=0)
+    assert unknown.parts == ('panel 2', 'panel 3')
+    assert unknown.since == 'panel 2'
+    # The place that is told also holds some neighbours.
+    assert 3.0 < unknown.mean_residual_um < 6.5
+    assert unknown.share > 0.1
+    assert unknown.p_value < 0.05
+    assert set(unknown.curve) == {unknown.covariate, 'residual_um'}
+    assert 'more than the model says, since panel 2; it shows most against' in str(unknown)
+    assert str(unknown).startswith('At the upper third')
+    # On all parts it has no beginning; where no place stands out only the condition is told.
+    on_all = replace(unknown, parts=('panel 1', *unknown.parts), since='', mean_residual_um=-6.0)
+    assert 'less than the model says, on panel 1, panel 2, panel 3; it' in str(on_all)
+    nowhere = replace(unknown, parts=(), where='no single place stands out')
+    assert str(nowhere) == (
+        f'It shows most against {unknown.covariate}; no single place stands out.'
+    )
