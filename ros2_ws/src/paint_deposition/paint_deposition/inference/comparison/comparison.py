@@ -24,6 +24,8 @@ FEWEST = 2
 MOST_REGIONS = 6
 # A region that is wider than this share of its part has no place across it [%].
 MOST_OF_WIDTH = 60.0
+# Readings within this width have none [m].
+LEAST_WIDTH_M = 0.05
 # Significance level: the probability that noise alone gives a part any region.
 SIGNIFICANCE = 0.02
 DRAWS = 1000
@@ -118,7 +120,7 @@ def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) 
     across = values['across_m']
     share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
     left, right = 100.0 * np.quantile(share, [0.1, 0.9])
-    if right - left > MOST_OF_WIDTH:
+    if right - left > MOST_OF_WIDTH or np.ptp(across[rows]) < LEAST_WIDTH_M:
         return vertical
     return f'{vertical} at {left:.0f} to {right:.0f} % of the width from the left'
 

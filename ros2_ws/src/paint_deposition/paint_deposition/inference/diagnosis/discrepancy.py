@@ -203,10 +203,8 @@ class ModelDiscrepancy:
         ]
 
     def usual(self, sizes: DiscrepancyHyperparameters) -> DiscrepancyHyperparameters:
-        """The same with settings and parts that differ no more than those of usual sprays."""
-        return replace(
-            sizes, setting=min(sizes.setting, MOST_USUAL), part=min(sizes.part, MOST_USUAL)
-        )
+        """The same with settings and parts that differ by as much as usual sprays do at most."""
+        return replace(sizes, setting=MOST_USUAL, part=MOST_USUAL if sizes.part else 0.0)
 
     def covariance(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
