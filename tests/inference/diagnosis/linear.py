@@ -96,7 +96,7 @@ def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
 
 
 def no_discrepancy(count: int) -> ModelDiscrepancy:
-    """Nothing that nature leaves over at so many readings."""
+    """No discrepancy at so many readings."""
     none = np.zeros((count, count))
     lengths_m = (0.02, 0.05, 0.1)
     fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
