@@ -15,6 +15,7 @@ import tempfile
 import time
 import warnings
 from collections.abc import Sequence
+from dataclasses import fields
 from pathlib import Path
 
 import click
@@ -31,6 +32,7 @@ from benchmarks.records import add, kept  # noqa: E402
 from benchmarks.scores import failures, reliability_diagram, table  # noqa: E402
 
 import paint_deposition as pd  # noqa: E402
+from paint_deposition.inference.diagnosis.discrepancy import PRIOR  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
 from worlds.record import KINDS, Painted  # noqa: E402
@@ -80,10 +82,13 @@ def painted(task: Task) -> Painted:
 
 
 def set_constants(settings: str) -> None:
-    """Give constants of the inference other values, as in 'SURE=0.9 FOOTPRINTS=(0.1,0.3)'."""
+    """Give constants of the inference other values, as in 'SURE=0.9 PRIOR.sides=0.04'."""
     importlib.import_module('paint_deposition.inference.diagnosis.procedure')
     for setting in settings.split():
         name, _, value = setting.partition('=')
+        if name in (f'PRIOR.{field.name}' for field in fields(PRIOR)):
+            object.__setattr__(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
+            continue
         owners = [
             module
             for key, module in sys.modules.items()

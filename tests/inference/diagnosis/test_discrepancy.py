@@ -17,10 +17,7 @@ from paint_deposition.effects.learned.footprint import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
 from paint_deposition.inference.diagnosis.discrepancy import (
     FINE_RADII,
-    FOOTPRINTS,
-    LENGTHS,
-    SIDEWAYS,
-    TAILS,
+    PRIOR,
     ModelDiscrepancy,
     painted_alike,
 )
@@ -78,7 +75,7 @@ def test_choices_are_as_probable_as_one(discrepancy, alone):
     assert (best.setting, best.part) == (0.02, 0.01)
 
 
-@pytest.mark.parametrize('k', range(len(LENGTHS)))
+@pytest.mark.parametrize('k', range(len(PRIOR.lengths)))
 def test_parts_painted_alike_share_the_setting_and_differ_by_the_part(study, discrepancy, k):
     """They were measured at the same places."""
     settings, parts = discrepancy.settings[k], discrepancy.parts[k]
@@ -133,13 +130,13 @@ def test_the_footprint_deviates_by_a_share_of_its_peak_and_by_no_more_than_its_f
     alone, knots_m
 ):
     flux = mean_flux(knots_m)
-    for size, of_peak in zip(FOOTPRINTS, alone[1].footprint.of_peak, strict=True):
+    for size, of_peak in zip(PRIOR.footprints, alone[1].footprint.of_peak, strict=True):
         # The pattern hardly moves the second harmonics.
         sd = np.sqrt(np.sum(of_peak.reshape(FINE_RADII, WAVES, -1)[:, 3:] ** 2, axis=2))
         expected = np.minimum(size, flux)[:, np.newaxis]
         assert sd == pytest.approx(np.repeat(expected, 2, axis=1), rel=0.05, abs=0.15 * size)
         assert sd[flux.argmax()] == pytest.approx(size, rel=0.05)
-    assert flux[-1] < min(FOOTPRINTS)
+    assert flux[-1] < min(PRIOR.footprints)
 
 
 def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
@@ -151,7 +148,9 @@ def test_the_tails_of_a_footprint_may_be_those_of_another_power(alone, knots_m):
     for k, power in enumerate(((1.0 + step, 1.0), (1.0, 1.0 + step))):
         change = (mean_flux(knots_m, power) - mean_flux(knots_m)) / step
         most = mean_flux(knots_m)
-        assert tails[:, 0, k] == pytest.approx(np.clip(TAILS * change, -most, most), abs=2e-3)
+        assert tails[:, 0, k] == pytest.approx(
+            np.clip(PRIOR.tails * change, -most, most), abs=2e-3
+        )
 
 
 def test_the_footprint_changes_the_readings_by_what_no_pattern_does(alone):
@@ -177,7 +176,7 @@ def test_the_spray_wanders_sideways_by_a_share_of_its_width(alone):
     seen = values > 1e-6 * values[-1]
     assert seen.sum() == 2
     for name in ('offset_x_m', 'offset_y_m'):
-        offset = TcpOffset(**{name: SIDEWAYS * width_m})
+        offset = TcpOffset(**{name: PRIOR.sideways * width_m})
         change = study.forward.predict_um(MODEL.with_effect(offset))
         change = (change - study.forward.predict_um(MODEL)) / study.sigma_um
         along = vectors[:, seen].T @ change

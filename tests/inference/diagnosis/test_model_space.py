@@ -21,8 +21,7 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.inference.diagnosis import model_space
 from paint_deposition.inference.diagnosis.discrepancy import (
-    BEYOND_NATURE,
-    MOST_USUAL,
+    PRIOR,
     DiscrepancyHyperparameters,
     Footprints,
     ModelDiscrepancy,
@@ -49,7 +48,7 @@ CHANCE = 0.01
 PLACE, FILM = np.linspace(0.0, 3.0, READINGS), 40.0
 SMALL, USUAL, LARGE, BEYOND = (
     DiscrepancyHyperparameters(share, 0.0, 1, 2, 0.0)
-    for share in (0.006, MOST_USUAL, 0.06, BEYOND_NATURE)
+    for share in (0.006, PRIOR.most_usual, 0.06, PRIOR.beyond_nature)
 )
 # A change that neighbours share, and one that they do not, of one length.
 WAVE = np.sin(2.0 * PLACE)
@@ -254,7 +253,7 @@ def test_something_outside_the_library_is_unknown(plain, found, discrepancy):
     # So is a setting that differs by more than nature's do, even if nothing is looked for.
     random = np.random.default_rng(3).normal(size=READINGS)
     beyond = np.linalg.cholesky(discrepancy.settings[1] + 1e-6 * np.eye(READINGS)) @ random
-    there = shifted(plain, BEYOND_NATURE * beyond)
+    there = shifted(plain, PRIOR.beyond_nature * beyond)
     alone = space_of(there, [], discrepancy, SMALL, BEYOND)
     assert probability(alone, UNKNOWN) > 0.95
     assert alone.p_value(seed=0) < 0.01

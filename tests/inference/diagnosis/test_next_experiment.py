@@ -8,7 +8,7 @@ import pytest
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.inference.diagnosis.discrepancy import FOOTPRINT_LENGTHS
+from paint_deposition.inference.diagnosis.discrepancy import PRIOR
 from paint_deposition.inference.diagnosis.explanations import FACTOR
 from paint_deposition.inference.diagnosis.next_experiment import (
     EDGE_MARGIN_M,
@@ -88,7 +88,7 @@ def test_another_footprint_competes_as_the_law_that_would_be_learned(study, fit)
     # Its amplitudes are not free: what they need of their prior is separation, too.
     assert predicted.precision == pytest.approx(1.0 / 9.0)
     basis = footprint_along(study.rays(fit.model), fit.model.patterns)
-    random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0] * RADII)
+    random = basis.random(FACTOR, PRIOR.footprint_lengths[0] * RADII)
     law = random.learned(1e-3 * predicted.amounts)
     film_um = [
         Forward(study.campaign, (law,)).predict_um(

@@ -30,30 +30,47 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
-# The footprint deviates by one of these shares of its peak, as a standard deviation, at any place.
-# What readings allow a footprint to show as well is no effect; how far it goes they tell, too.
-# But its two sides are alike: in measured sprays they differ by 0.5 to 2 % of the peak.
-FOOTPRINTS, SIDES = (0.02, 0.06, 0.2), 0.02
-# Sizes that are considered for settings and single parts, as shares of the part's thickest film,
-# and the prior of each: its median, and the factor that is one standard deviation. They fall with
-# the root of the film: sprays of flat fans differ by 0.5 to 5 % of the peak, a third as much where
-# the film is a twentieth.
-SETTINGS, USUAL_SETTING = (0.006, 0.02, 0.06), (0.02, 2.0)
-PARTS, USUAL_PART = (0.003, 0.01, 0.03), (0.012, 2.0)
-# Most by which the film of usual sprays differs, as a standard deviation.
-MOST_USUAL = 0.02
-# A setting that differs by this share of its thickest film: no nature does, something unknown.
-BEYOND_NATURE = 0.15
-# Lengths of correlation: of settings and parts in root mean square radii of the pattern, of the
-# footprint in shares of its radius, which has so many knots; a fan ends sharply.
-LENGTHS, FOOTPRINT_LENGTHS, FINE_RADII = (0.1, 0.2, 0.6), (0.1, 0.3), 20
-# The tails of a footprint are those of Gaussians to a power that differs from 1 by so much.
-TAILS = 0.5
-# The flux is off by this share of itself at the most, as a standard deviation.
-MOST_OF_FLUX = 1.0
-# The pattern differs between settings by this share of what it differs between jobs, and it moves
-# sideways by this share of its root mean square radius: the measured sprays by 0.01 to 0.03.
-OF_JOBS, SIDEWAYS = 1.0 / 3.0, 0.02
+
+@dataclass(frozen=True)
+class DiscrepancyPrior:
+    """What is believed of the discrepancy before the readings.
+
+    The sources are sprays of two flat-fan nozzles at three heights, each measured several times
+    (sprays of one setting differ by 0.5 to 5 % of the peak, a third as much where the film is a
+    twentieth of it), and 40 panels of clearcoat. Shares are standard deviations.
+    """
+
+    # Shares of its peak by which the footprint may deviate at any place. What readings allow a
+    # footprint to show as well is no effect; they also tell how far it goes.
+    footprints: tuple[float, ...] = (0.02, 0.06, 0.2)
+    # The same for the difference between its two sides: 0.5 to 2 % were measured.
+    sides: float = 0.02
+    # Power of the Gaussians' exponents in the tails: off from 1 by so much.
+    tails: float = 0.5
+    # Most of itself by which the flux is off.
+    most_of_flux: float = 1.0
+    # Sizes of fields, as shares of the part's thickest film, and the prior of each: its median,
+    # and the factor that is one standard deviation. They fall with the root of the film.
+    settings: tuple[float, ...] = (0.006, 0.02, 0.06)
+    usual_setting: tuple[float, float] = (0.02, 2.0)
+    parts: tuple[float, ...] = (0.003, 0.01, 0.03)
+    usual_part: tuple[float, float] = (0.012, 2.0)
+    # Most by which usual sprays differ, and what no nature does: something unknown.
+    most_usual: float = 0.02
+    beyond_nature: float = 0.15
+    # Lengths of correlation: of fields in root mean square radii of the pattern, of the footprint
+    # in shares of its radius; a fan ends sharply.
+    lengths: tuple[float, ...] = (0.1, 0.2, 0.6)
+    footprint_lengths: tuple[float, ...] = (0.1, 0.3)
+    # The pattern differs between settings by this share of what it differs between jobs, and moves
+    # sideways by this share of its root mean square radius: 0.01 to 0.03 were measured.
+    of_jobs: float = 1.0 / 3.0
+    sideways: float = 0.02
+
+
+PRIOR = DiscrepancyPrior()
+# Knots along the radius of a footprint.
+FINE_RADII = 20
 # Distance between parts that share no field, and step of the pattern's sideways move [m].
 FAR_M, STEP_M = 1e6, 1e-3
 # Paths that keep within this distance [m], angle [rad] and share of the time are the same.
@@ -68,7 +85,7 @@ class DiscrepancyHyperparameters:
     # Shares of the thickest film; the latter 0 where no parts were painted alike.
     setting: float
     part: float
-    # Numbers among LENGTHS and FOOTPRINTS.
+    # Numbers among the lengths and footprints of the prior.
     length: int
     footprint: int
     log_prior: float  # of this choice, among those of nature or among those beyond it
@@ -76,7 +93,7 @@ class DiscrepancyHyperparameters:
     @property
     def is_beyond_nature(self) -> bool:
         """Whether so much can only be something unknown."""
-        return self.setting >= BEYOND_NATURE
+        return self.setting >= PRIOR.beyond_nature
 
 
 @dataclass(frozen=True)
@@ -111,8 +128,8 @@ class Footprints:
         flux, tails = _flux_and_tails(fit.model.patterns, reach_m, radii)
         at_knots = np.repeat(flux, WAVES)[:, np.newaxis]
         fields = np.hstack([
-            basis.random(len(FOOTPRINT_LENGTHS) ** -0.5, length * radii).at_knots
-            for length in FOOTPRINT_LENGTHS
+            basis.random(len(PRIOR.footprint_lengths) ** -0.5, length * radii).at_knots
+            for length in PRIOR.footprint_lengths
         ])  # fmt: skip
         of_film = basis.film_um / study.sigma_um[:, np.newaxis]
         # Both are of the flux alone: effects would bend the one and not the other.
@@ -120,14 +137,14 @@ class Footprints:
         terms = study.forward.terms(fit.model.model_copy(update={'effects': ()}))
         pattern = terms.derivatives_um() @ bare / study.sigma_um[:, np.newaxis]
         columns, laws = [], []
-        for size in FOOTPRINTS:
-            of_wave = np.where(HARMONICS % 2, min(size, SIDES), size)
+        for size in PRIOR.footprints:
+            of_wave = np.where(HARMONICS % 2, min(size, PRIOR.sides), size)
             off = np.tile(of_wave, radii)[:, np.newaxis]
-            free = np.minimum(off / at_knots, MOST_OF_FLUX) * fields
+            free = np.minimum(off / at_knots, PRIOR.most_of_flux) * fields
             beside, followed = beside_pattern(basis, free, pattern, study, fit)
             change = of_film @ free - pattern @ followed
-            columns.append(np.hstack([of_film @ (TAILS * tails), change]))
-            laws.append(RandomLaw(basis, np.hstack([TAILS * tails, beside])))
+            columns.append(np.hstack([of_film @ (PRIOR.tails * tails), change]))
+            laws.append(RandomLaw(basis, np.hstack([PRIOR.tails * tails, beside])))
         radius_m = np.linspace(0.0, reach_m, radii)
         return Footprints(tuple(columns), tuple(laws), radius_m, flux)
 
@@ -158,7 +175,7 @@ class ModelDiscrepancy:
         scale = np.sqrt(film * thickest[owner]) / study.sigma_um
         group = painted_alike(campaign.experiments)
         repeated, setting_of = (np.bincount(group)[group] > 1)[owner], group[owner]
-        lengths_m = tuple(length * _width_m(model) for length in LENGTHS)
+        lengths_m = tuple(length * _width_m(model) for length in PRIOR.lengths)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
             places = np.column_stack([campaign.positions_m, FAR_M * of])
@@ -181,17 +198,16 @@ class ModelDiscrepancy:
 
     def choices(self) -> list[DiscrepancyHyperparameters]:
         """All choices of the hyperparameters; the prior of those of nature sums to one."""
-        parts = PARTS if self.is_repeated else (0.0,)
+        settings = {size: _log_prior(size, *PRIOR.usual_setting) for size in PRIOR.settings}
+        settings[PRIOR.beyond_nature] = 0.0
+        parts = {0.0: 0.0}
+        if self.is_repeated:
+            parts = {size: _log_prior(size, *PRIOR.usual_part) for size in PRIOR.parts}
+        kinds = range(len(PRIOR.lengths)), range(len(PRIOR.footprints))
         found = [
-            DiscrepancyHyperparameters(
-                setting, part, length, footprint,
-                (_log_prior(setting, *USUAL_SETTING) if setting < BEYOND_NATURE else 0.0)
-                + (_log_prior(part, *USUAL_PART) if part else 0.0),
-            )
-            for setting, part, length, footprint in product(
-                (*SETTINGS, BEYOND_NATURE), parts, range(len(LENGTHS)), range(len(FOOTPRINTS))
-            )
-        ]  # fmt: skip
+            DiscrepancyHyperparameters(setting, part, *kind, settings[setting] + parts[part])
+            for setting, part, kind in product(settings, parts, product(*kinds))
+        ]
         total = {
             beyond: np.logaddexp.reduce(
                 [s.log_prior for s in found if s.is_beyond_nature == beyond]
@@ -204,7 +220,9 @@ class ModelDiscrepancy:
 
     def usual(self, sizes: DiscrepancyHyperparameters) -> DiscrepancyHyperparameters:
         """The same with settings and parts that differ by as much as usual sprays do at most."""
-        return replace(sizes, setting=MOST_USUAL, part=MOST_USUAL if sizes.part else 0.0)
+        return replace(
+            sizes, setting=PRIOR.most_usual, part=PRIOR.most_usual if sizes.part else 0.0
+        )
 
     def covariance(self, sizes: DiscrepancyHyperparameters) -> np.ndarray:
         """(P, P) covariance of all that is left over."""
@@ -243,7 +261,9 @@ def _flux_and_tails(
         ])  # fmt: skip
         share = np.stack([ring, centre]) / (ring + centre)
         change = -share * u * np.log(np.maximum(u, 1e-9))
-        tails += np.clip(change, -MOST_OF_FLUX / TAILS, MOST_OF_FLUX / TAILS).T / len(patterns)
+        tails += np.clip(
+            change, -PRIOR.most_of_flux / PRIOR.tails, PRIOR.most_of_flux / PRIOR.tails
+        ).T / len(patterns)
     mean_over_angle = np.eye(WAVES)[:, :1]
     return flux, np.kron(tails, mean_over_angle)
 
@@ -251,11 +271,11 @@ def _flux_and_tails(
 def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:
     """(P, P) covariance of pattern and place of the spray between groups (P,) of parts."""
     own = (group[:, np.newaxis] == np.arange(group.max() + 1)).astype(float)
-    sideways_m = SIDEWAYS * _width_m(fit.model)
+    sideways_m = PRIOR.sideways * _width_m(fit.model)
     changes = sideways_m * _sideways(study, fit.model) / study.sigma_um[:, np.newaxis]
     if own.shape[1] > 1:  # with one setting, its pattern is the model's own
         pattern = fit.parameters.pattern
-        between = OF_JOBS * np.array([c.between_jobs for c in pattern.coordinates])
+        between = PRIOR.of_jobs * np.array([c.between_jobs for c in pattern.coordinates])
         between[[pattern.entries(row)[0] for row in range(pattern.count)]] = 0.0
         changes = np.hstack([changes, fit.jacobian[:, : len(pattern)] * between])
     return (own @ own.T) * (changes @ changes.T)

@@ -8,7 +8,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.discrepancy import FOOTPRINT_LENGTHS
+from paint_deposition.inference.diagnosis.discrepancy import PRIOR
 from paint_deposition.inference.diagnosis.explanations import (
     FACTOR,
     FOOTPRINT,
@@ -131,7 +131,7 @@ class Rivals:
         """What an explanation predicts, its amounts being 0."""
         if rival.name == FOOTPRINT:
             basis = footprint_along(rays, self.fit.model.patterns)
-            random = basis.random(FACTOR, FOOTPRINT_LENGTHS[0] * RADII)
+            random = basis.random(FACTOR, PRIOR.footprint_lengths[0] * RADII)
             return _shapeless(random.change_um / sigma_um[:, np.newaxis])
         values = (
             Covariate(same[0].name, np.concatenate([part.values for part in same]))
