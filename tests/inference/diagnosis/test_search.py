@@ -17,7 +17,6 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.inference.diagnosis.model_space import (
-    COARSENED,
     PRIOR_EFFECT,
     SURE,
     log_odds,
@@ -85,7 +84,7 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     assert best.log_evidence > logsumexp(weights) - 1.0
     # One size of the discrepancy bears nearly all the weight of this set.
     everything = np.ones(len(best.state.study), dtype=bool)
-    assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=0.8)
+    assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=1.5)
 
 
 def test_something_unknown_beside_a_set_competes_with_it(stages):
@@ -93,7 +92,7 @@ def test_something_unknown_beside_a_set_competes_with_it(stages):
     gains = []
     for stage in stages:
         here = stage.here
-        assert here.log_weight == pytest.approx(here.log_evidence / COARSENED + here.log_prior)
+        assert here.log_weight == pytest.approx(here.log_evidence + here.log_prior)
         gains.append(here.log_weight_unknown - here.log_weight)
     assert gains[-1] < 0.0
     assert gains[0] > gains[-1]
