@@ -320,8 +320,8 @@ def results_options(what: str, default: str | None = None) -> Callable[[Callable
     """A command takes ``Results``; their folder is to be named where there is no default."""
     text = (
         f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
-        'into it are removed; other files in it are kept, unless a result has their name. Nothing '
-        'is changed before all results are complete.'
+        'into it are removed; other files in it are kept as they are. Nothing is changed before '
+        'all results are complete.'
     )
     options = (
         click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
