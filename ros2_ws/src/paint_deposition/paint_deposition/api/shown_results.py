@@ -11,6 +11,7 @@ import trimesh
 
 from paint_deposition.api.inference import compare, compare_models
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import PaintError
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import model_of, read_model
@@ -43,8 +44,8 @@ def results_scenes(folder: Path) -> tuple[list[Scene], list[str]]:
         figures = _read(folder / DIAGNOSIS)
         after = ' + '.join(['after', *figures['accepted']])
         models = {
-            'before': read_model(folder / 'model_before.yaml'),
-            after: read_model(folder / 'model.yaml'),
+            'before': read_model(folder / 'model_before.yaml', load_unnamed_effect_file),
+            after: read_model(folder / 'model.yaml', load_unnamed_effect_file),
         }
     elif (folder / COMPARISON).is_file():
         figures = _read(folder / COMPARISON)

@@ -142,6 +142,18 @@ def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> li
     return list(given)
 
 
+def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> None:
+    if given:
+        from paint_deposition.effects.user_effects import effects_allowed
+
+        token = effects_allowed.set(True)
+        ctx.call_on_close(lambda: effects_allowed.reset(token))
+
+
+ALLOW_EFFECTS = click.option(
+    '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
+    help='Run the Python code of effect files that recordings, results or campaigns name, too.',
+)  # fmt: skip
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
     help='A longer interval between poses is a gap, in which the gun is off.',

@@ -46,6 +46,7 @@ NODE = 'import sys; from paint_deposition.nodes.executables import web_view; sys
 )
 @options.motion_options
 @options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
 def watch_command(
     run: Path | None,
     live: bool,
@@ -117,7 +118,7 @@ def _replay(
     source = checked(MotionSource, 'motion', motion, pd.PaintError)
     guns = read_gun_motions([run], source)
     files = [file for file in (model_file or named,) if file]
-    chosen = models_for(files, [run], [gun.name for gun in guns])
+    chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)
     show('refining the mesh')
     surface = pd.read_mesh(**part | {'path': Path(mesh)})
     replay = Replay(surface, guns, [model.model for model in chosen], **given)

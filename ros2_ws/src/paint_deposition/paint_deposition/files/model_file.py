@@ -11,7 +11,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.effects.user_effects import load_effect_file
+from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_source import file_name, needs_file, source_of
@@ -76,8 +76,9 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
     """The deposition model of a file with its name, uncertainty and history.
 
     What the file leaves out has its default. Effects given as ``file`` are looked for beside the
-    model file, and ``load_effect`` runs their code. Raises ModelError naming the file, the key,
-    its value and the remedy.
+    model file, and ``load_effect`` runs their code: give ``load_unnamed_effect_file`` for a path
+    that was found in other data. Raises ModelError naming the file, the key, its value and the
+    remedy.
     """
     path = Path(path)
     content = read_yaml(path, 'model', ModelError)
@@ -124,7 +125,8 @@ def model_of(values: Mapping[str, Any]) -> DepositionModel:
         brush['number']: {key: value for key, value in brush.items() if key not in about}
         for brush in values.get('brushes', ())
     }
-    return _model_file({**values, 'brushes': brushes or None}, load_effect_file).model
+    sections = {**values, 'brushes': brushes or None}
+    return _model_file(sections, load_unnamed_effect_file).model
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
