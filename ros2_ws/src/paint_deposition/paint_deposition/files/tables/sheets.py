@@ -21,6 +21,8 @@ ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': '
 # A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
 MOST_CELLS = 10_000_000
 XLSX_CELL = re.compile(rb'<c\s[^>]*?\br=["\']([A-Za-z]{1,3})(\d{1,7})')
+# What a spreadsheet would take for a formula, and no number: written with a ' before it.
+FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
 EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
 
 
@@ -156,4 +158,5 @@ def _sheet_of_parquet(content: bytes) -> Sheet:
 def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    return ' '.join(str(value).strip().splitlines())
+    text = ' '.join(str(value).strip().splitlines())
+    return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
