@@ -1,5 +1,6 @@
 """A head that claims more than its file holds is refused before memory is taken for it."""
 
+import os
 import resource
 import struct
 from collections.abc import Callable, Iterator
@@ -110,3 +111,14 @@ def test_ten_thousand_headings_are_not_all_shown(tmp_path):
         targets()['readings'].read(path)
     assert len(str(refused.value)) < 1000
     assert 'and 9980 more' in str(refused.value)
+
+
+@pytest.mark.parametrize('name', targets())
+def test_a_device_or_a_pipe_is_not_read(name, tmp_path):
+    target = targets()[name]
+    device, pipe = tmp_path / f'zero{target.suffix}', tmp_path / f'pipe{target.suffix}'
+    device.symlink_to('/dev/zero')
+    os.mkfifo(pipe)
+    for path in (device, pipe):
+        with pytest.raises(PaintError, match='is a device or a pipe; give a file'):
+            target.read(path)

@@ -13,6 +13,7 @@ from paint_deposition.api.inference import compare, compare_models
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import read_file
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import model_of, read_model
 from paint_deposition.files.provenance import model_digest, sha256
@@ -151,6 +152,6 @@ def _unchanged(file: dict[str, str]) -> bool:
 
 def _read(path: Path) -> dict[str, Any]:
     try:
-        return json.loads(path.read_text(encoding='utf-8'))
-    except ValueError as error:
+        return json.loads(read_file(path, PaintError, 200.0))
+    except (ValueError, RecursionError) as error:
         raise PaintError(f'{path} is no JSON: {error}; make the results again') from None

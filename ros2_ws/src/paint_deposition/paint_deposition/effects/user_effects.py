@@ -67,6 +67,8 @@ def read_effect_file(path: str | Path) -> type[Effect]:
         ModelError: the file cannot be read or run, its class is not sound, or its id is taken.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        raise ModelError(f'{path} is no file; give the file of an effect')
     try:
         source = path.read_bytes()
     except OSError as error:

@@ -1,10 +1,36 @@
-"""Files that appear whole or not at all, after a power cut too."""
+"""Files that are written whole or not at all, after a power cut too, and read with a limit."""
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from uuid import uuid4
+
+from paint_deposition.errors import PaintError
+
+# Of a file that is read as a whole [MB]: more is no mesh or table of this trade, or would fill the
+# memory. Of a text that a person edits.
+MOST_MB, MOST_TEXT_MB = 2000, 20
+
+
+def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> None:
+    """Raise ``refusal`` for what is there and is no regular file or folder, or is too large.
+
+    A device or a pipe would be read for ever.
+    """
+    path = Path(path)
+    if not path.exists() or path.is_dir():
+        return  # whoever reads it says so
+    if not path.is_file():
+        raise refusal(f'{path} is a device or a pipe; give a file')
+    if (size_mb := path.stat().st_size / 1e6) > most_mb:
+        raise refusal(f'{path} has {size_mb:.0f} MB; give a file of {most_mb:g} MB at most')
+
+
+def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:
+    """The content of a file that ``require_file`` takes. Raises OSError as Path.read_bytes."""
+    require_file(path, refusal, most_mb)
+    return Path(path).read_bytes()
 
 
 @contextmanager

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.errors import MeshError, did_you_mean, some
+from paint_deposition.files.atomic import require_file
 
 if TYPE_CHECKING:
     from trimesh import Scene
@@ -53,6 +54,7 @@ def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> 
     Raises MeshError, saying what to do, for what is no mesh, has no such body, or no colours
     although it should be ``coloured``.
     """
+    require_file(path, MeshError)
     kind = path.suffix.lower()
     if kind == '.stl' and (triangles := _binary_stl(path)):
         if coloured:

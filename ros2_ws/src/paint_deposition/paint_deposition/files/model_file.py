@@ -12,7 +12,7 @@ from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_source import file_name, needs_file, source_of
 from paint_deposition.files.model_text import LEARNED_ID, model_text
@@ -86,6 +86,12 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
         return _model_file(content, lambda name: load_effect(path.parent / name))
     except ModelError as error:
         raise ModelError(f'{path}: {error}') from None
+
+
+def model_source(path: Path) -> str:
+    """The text of a model file, whose effect files are not run. Raises ModelError for another."""
+    checked(_Sections, f'{path}: model', read_yaml(path, 'model', ModelError), ModelError)
+    return path.read_text(encoding='utf-8')
 
 
 def write_model(
@@ -168,7 +174,9 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
     between: list[tuple[int, dict[str, Any]]] = []
     for number, entry in section.items():
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
-            raise ModelError(f'brushes: {number!r} is not a brush number; give 1, 2 and so on')
+            raise ModelError(
+                f'brushes: {quoted(number)} is not a brush number; give 1, 2 and so on'
+            )
         given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
         at = given.model_dump(exclude={'planar'})
         if given.planar is None:
@@ -192,7 +200,7 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
     values = dict(entry)
     source = values.pop(chosen[0])
     if not isinstance(source, str):
-        raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
+        raise ModelError(f'{where}: {chosen[0]} is {quoted(source)}; expected text')
     if chosen == ['file']:
         cls = load(source)
     elif source == LEARNED_ID:
@@ -202,7 +210,8 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
         covariate = values.pop('covariate', None)
         if not isinstance(covariate, str):
             raise ModelError(
-                f'{where}: covariate is {covariate!r}; give that of the learned law, time_s say'
+                f'{where}: covariate is {quoted(covariate)}; give that of the learned law, as '
+                'time_s'
             )
         cls = learned_law(covariate)
         source = cls.id

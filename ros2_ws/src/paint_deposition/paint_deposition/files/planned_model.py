@@ -9,6 +9,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from paint_deposition.effects.user_effects import load_unnamed_effect_file
+from paint_deposition.errors import ModelError
+from paint_deposition.files.atomic import read_file
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.program import is_rapid
@@ -54,6 +56,6 @@ def _digest(motion: Path, folder: Path) -> str:
         plans = (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ()
         files, pattern = [folder / name for name in plans], IN_JSON
     for file in filter(Path.is_file, files):
-        found = pattern.search(file.read_text(encoding='utf-8', errors='replace'))
+        found = pattern.search(read_file(file, ModelError).decode('utf-8', errors='replace'))
         return found[1] if found else ''
     return ''

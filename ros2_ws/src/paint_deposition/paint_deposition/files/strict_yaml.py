@@ -6,7 +6,8 @@ from typing import Any
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import LONGEST_QUOTED, PaintError
+from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 
 
 def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
@@ -15,7 +16,8 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
     Raises ``refusal`` where the file cannot be read, is no YAML, or gives a key twice.
     """
     try:
-        return YAML(typ='safe', pure=True).load(path.read_text(encoding='utf-8'))
+        text = read_file(path, refusal, MOST_TEXT_MB).decode('utf-8')
+        return YAML(typ='safe', pure=True).load(text)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; give a {kind} YAML') from None
     except OSError as error:
@@ -29,5 +31,6 @@ def read_yaml(path: Path, kind: str, refusal: type[PaintError]) -> Any:
     except YAMLError as error:
         mark, problem = getattr(error, 'problem_mark', None), ' '.join(str(error).split())
         if mark is not None:
-            problem = f'line {mark.line + 1}: {getattr(error, "problem", error)}'
+            problem = str(getattr(error, 'problem', error)).split(' with value')[0]
+            problem = f'line {mark.line + 1}: {problem[:LONGEST_QUOTED]}'
         raise refusal(f'{path}: cannot be read as YAML ({problem})') from None

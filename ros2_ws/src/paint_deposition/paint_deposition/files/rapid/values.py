@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.functions import FUNCTIONS, OPERATORS, is_number
 from paint_deposition.files.rapid.parser import Declared, Module, Node, Routine
 
@@ -113,13 +113,13 @@ class Values:
         """The value of an expression that must be a number; ``what`` is for the message."""
         value = self.known(node)
         if not is_number(value):
-            self.fail(f'{what} is {value!r}; a number expected')
+            self.fail(f'{what} is {quoted(value)}; a number expected')
         return value
 
     def assign(self, reference: Any, value: Any) -> None:
         """Assign a copy of a value to a datum or a part of it."""
         if not isinstance(reference, Node) or reference.rule != 'reference':
-            self.fail(f'{reference!r} is no name to assign to')
+            self.fail(f'{quoted(reference)} is no name to assign to')
         name, *parts = reference.children
         value = copy.deepcopy(value) if isinstance(value, list) else value
         datum = self._find(name)
@@ -178,7 +178,7 @@ class Values:
         except ZeroDivisionError:
             self.fail('division by zero')
         except (ArithmeticError, IndexError, TypeError, ValueError) as error:
-            self.fail(f'{name} of {", ".join(map(repr, values))}: {error}')
+            self.fail(f'{name} of {", ".join(map(quoted, values))}: {error}')
 
     # --- data
 

@@ -4,6 +4,7 @@ Only the types of the topics that are read are parsed: a topic that rosbags does
 as service events, does not make the others unreadable.
 """
 
+import math
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -21,6 +22,7 @@ from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.atomic import require_file
 from paint_deposition.files.recordings import message_definitions as definitions
 
 # The key under which the custom data of a plan's bag names its trigger topic.
@@ -214,6 +216,8 @@ def _is_unfinished(path: Path) -> bool:
 def _require_bag(path: Path) -> None:
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
+    for file in path.iterdir() if path.is_dir() else [path]:
+        require_file(file, RecordingError, math.inf)
     if path.is_dir():
         names = [file.name.removesuffix('.zstd') for file in path.iterdir()]
         if not any(name.endswith(ROS2_SUFFIXES) for name in names):

@@ -1,5 +1,6 @@
 """Recovery of unfinished or damaged MCAP runs into a complete rosbag2 folder."""
 
+import math
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
@@ -21,6 +22,7 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.atomic import require_file
 from paint_deposition.files.recordings.bag_files import mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
@@ -72,6 +74,7 @@ def recover(
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path} does not exist')
+    require_file(path, RecordingError, math.inf)
     files = mcap_files(path)
     if not files:
         raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')

@@ -10,6 +10,7 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import read_file
 from paint_deposition.files.parquet import MAGIC, require_libraries
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
@@ -20,6 +21,7 @@ WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
 ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
 # A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
 MOST_CELLS = 10_000_000
+MOST_TABLE_MB = 500
 XLSX_CELL = re.compile(rb'<c\s[^>]*?\br=["\']([A-Za-z]{1,3})(\d{1,7})')
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
@@ -51,7 +53,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     A file that is neither raises ``refusal``.
     """
     try:
-        content = path.read_bytes()
+        content = read_file(path, refusal, MOST_TABLE_MB)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:

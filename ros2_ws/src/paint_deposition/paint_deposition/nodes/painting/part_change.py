@@ -119,8 +119,8 @@ class PartChange:
         try:
             await (self._prefetch if request.prepare else self._change)(request, response)
             response.success = True
-        except PaintError as error:
-            response.message = str(error)
+        except (PaintError, MemoryError) as error:
+            response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
         return response
@@ -267,6 +267,7 @@ class PartChange:
     def _prepare(self, mesh_file: str) -> PreparedPart:
         """Read the mesh and compile, in a thread of its own."""
         node = self._node
+        node.require_named_folder(mesh_file)
         surface = read_part(node.values, mesh_file)
         points = surface.points()
         film = unpainted_films(surface, points, node.models, node.values)

@@ -147,9 +147,10 @@ class WebView(PaintNode):
             self.scene.begin_again()
         else:
             try:
+                self.require_named_folder(part.mesh_file)
                 self._show_part(part.mesh_file)
-            except PaintError as error:
-                self._say(str(error))
+            except (PaintError, MemoryError) as error:
+                self._say(str(error) or 'not enough memory')
                 return
         serial = f'{part.serial}, ' if part.serial else ''
         self.scene.tell('about', text=serial + Path(part.mesh_file).name)
