@@ -6,7 +6,6 @@ import json
 import os
 import platform
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -103,8 +102,7 @@ def _libraries() -> Iterator[Finding]:
 
 
 def _ros() -> Iterator[Finding]:
-    command = [sys.executable, '-c', ASK_ROS]
-    asked = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    asked = subprocess.run(options.python(ASK_ROS), capture_output=True, text=True, timeout=60)
     if asked.returncode:
         said = asked.stderr.strip().splitlines() or [f'ended with exit code {asked.returncode}']
         yield Finding('ROS 2', said[-1], None, ROS_REMEDY)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
@@ -290,6 +291,12 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
         ),
     )  # fmt: skip
     return grouped(options, 'part')
+
+
+def python(code: str, *words: str) -> list[str]:
+    """The command of another Python that runs code, and takes no module from this folder for it."""
+    head = 'import sys; sys.path[:] = filter(None, sys.path); '
+    return [sys.executable, '-c', head + code, *words]
 
 
 def print_all(label: str, lines: Iterable[str]) -> None:

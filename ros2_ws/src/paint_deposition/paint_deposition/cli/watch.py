@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from threading import Event
@@ -20,7 +19,7 @@ from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
 
-NODE = 'import sys; from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
+NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
 
 
 @click.command('watch')
@@ -142,4 +141,5 @@ def _start_node(parameters: dict[str, object]) -> None:
     """Become the node `web_view`, which says what it needs."""
     words = [w for name, value in parameters.items() if value not in ('', None)
              for w in ('-p', f'{name}:={value}')]  # fmt: skip
-    os.execv(sys.executable, [sys.executable, '-c', NODE, '--ros-args', *words])
+    command = options.python(NODE, '--ros-args', *words)
+    os.execv(command[0], command)
