@@ -294,7 +294,7 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
 
 
 def python(code: str, *words: str) -> list[str]:
-    """The command of another Python that runs code, and takes no module from this folder for it."""
+    """The command of another Python that runs code and takes no module from this folder."""
     head = 'import sys; sys.path[:] = filter(None, sys.path); '
     return [sys.executable, '-c', head + code, *words]
 
