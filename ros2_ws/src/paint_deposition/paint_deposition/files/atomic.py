@@ -1,6 +1,7 @@
 """Files that are written whole or not at all, after a power cut too, and read with a limit."""
 
 import os
+import zipfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from paint_deposition.errors import PaintError
 # Of a file that is read as a whole [MB]: more is no mesh or table of this trade, or would fill the
 # memory. Of a text that a person edits.
 MOST_MB, MOST_TEXT_MB = 2000, 20
+MOST_EXPANDED_BYTES, BLOCK_BYTES = 1_000_000_000, 1 << 20
 
 
 def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> None:
@@ -25,6 +27,18 @@ def require_file(path: str | Path, refusal: type[PaintError], most_mb: float = M
         raise refusal(f'{path} is a device or a pipe; give a file')
     if (size_mb := path.stat().st_size / 1e6) > most_mb:
         raise refusal(f'{path} has {size_mb:.0f} MB; give a file of {most_mb:g} MB at most')
+
+
+def require_small_package(package: zipfile.ZipFile) -> None:
+    """Raise BadZipFile for one that is too large when it is expanded, or says it is smaller."""
+    left = MOST_EXPANDED_BYTES
+    for member in package.infolist():
+        left -= member.file_size
+        if left < 0:
+            raise zipfile.BadZipFile(f'it holds over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded')
+        with package.open(member) as content:  # the end is compared with what the head says
+            while content.read(BLOCK_BYTES):
+                pass
 
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:

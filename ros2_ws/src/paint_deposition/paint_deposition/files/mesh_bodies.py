@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
+import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -12,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.errors import MeshError, did_you_mean, some
-from paint_deposition.files.atomic import require_file
+from paint_deposition.files.atomic import require_file, require_small_package
 
 if TYPE_CHECKING:
     from trimesh import Scene
@@ -117,6 +119,12 @@ def _scene(path: Path, kind: str) -> Scene:
         options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
     else:
         source = str(path)
+    if kind == '.3mf':
+        try:
+            with zipfile.ZipFile(path) as package:
+                require_small_package(package)
+        except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError) as error:
+            raise MeshError(f'{path}: not readable as a mesh ({error}); export it again') from None
     if kind in ('.step', '.stp'):
         if importlib.util.find_spec(STEP_READER) is None:
             raise MeshError(

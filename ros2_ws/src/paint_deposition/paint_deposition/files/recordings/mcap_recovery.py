@@ -4,11 +4,10 @@ import math
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from io import BytesIO
 from pathlib import Path
 
-import lz4.frame
 import yaml
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -23,16 +22,15 @@ from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import require_file
-from paint_deposition.files.recordings.bag_files import mcap_files
+from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
-MAX_CHUNK_BYTES = 256 * 1024 * 1024
 HEAD_BYTES = 9  # opcode and length of a record
 # Exceptions of the readers on damaged data.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
-    OverflowError,
+    OverflowError, KeyError,
 )  # fmt: skip
 
 
@@ -144,14 +142,19 @@ def _records(
             reason = 'the end is missing' if cut else str(error)
             recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
             stream.seek(start)
-            yield from _truncated_chunk_records(stream.read(MAX_CHUNK_BYTES))
+            yield from _truncated_chunk_records(stream.read(MOST_CHUNK_BYTES))
 
 
 def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
     try:
-        if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-            raise ValueError('no recorder makes chunks of that size')
-        return breakup_chunk(chunk, validate_crc=True)
+        data = chunk.data
+        if chunk.compression:
+            data = expanded(
+                chunk.compression, data, min(chunk.uncompressed_size, MOST_CHUNK_BYTES)
+            )
+        if len(data) != chunk.uncompressed_size:
+            raise ValueError('a chunk has another size than it says')
+        return breakup_chunk(replace(chunk, compression='', data=data), validate_crc=True)
     except DAMAGE:
         recovery.damaged_chunks += 1
         return []
@@ -166,11 +169,7 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
         return
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(record[HEAD_BYTES:])))
-        data = chunk.data
-        if chunk.compression == 'zstd':
-            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        elif chunk.compression == 'lz4':
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+        data = expanded(chunk.compression, chunk.data) if chunk.compression else chunk.data
         reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
         yield from reader.records
     except DAMAGE:

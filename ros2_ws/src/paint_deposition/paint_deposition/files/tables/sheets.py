@@ -10,7 +10,7 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import read_file
+from paint_deposition.files.atomic import read_file, require_small_package
 from paint_deposition.files.parquet import MAGIC, require_libraries
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
@@ -22,7 +22,8 @@ ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': '
 # A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
 MOST_CELLS = 10_000_000
 MOST_TABLE_MB = 500
-XLSX_CELL = re.compile(rb'<c\s[^>]*?\br=["\']([A-Za-z]{1,3})(\d{1,7})')
+# The place of a cell, of a row, or of the end of the table.
+XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]{0,3})(\d{1,7})["\']')
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
 EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
@@ -127,6 +128,7 @@ def _refuse_far_cells(content: bytes) -> None:
     if not zipfile.is_zipfile(BytesIO(content)):
         return
     with zipfile.ZipFile(BytesIO(content)) as package:
+        require_small_package(package)
         for name in package.namelist():
             if not (name.startswith('xl/') and name.endswith('.xml')):
                 continue
