@@ -127,10 +127,13 @@ def model_of(values: Mapping[str, Any]) -> DepositionModel:
         ModelError: it has an effect of a user's own, whose file is not named there.
     """
     about = {'number', 'interpolated'}
-    brushes = {
-        brush['number']: {key: value for key, value in brush.items() if key not in about}
-        for brush in values.get('brushes', ())
-    }
+    try:
+        brushes = {
+            brush['number']: {key: value for key, value in brush.items() if key not in about}
+            for brush in values.get('brushes', ())
+        }
+    except (KeyError, TypeError, AttributeError):
+        raise ModelError('brushes is no list of brushes with their number') from None
     sections = {**values, 'brushes': brushes or None}
     return _model_file(sections, load_unnamed_effect_file).model
 

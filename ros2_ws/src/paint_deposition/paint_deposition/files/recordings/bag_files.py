@@ -219,7 +219,8 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
-    return _information(path).get('custom_data') or {}
+    told = _information(path).get('custom_data')
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
 
 def _information(path: Path) -> dict[str, Any]:
@@ -282,8 +283,11 @@ def _require_bag(path: Path) -> None:
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
     if path.is_dir():
         # A recorder that splits its bag and is killed has not named the last file yet.
-        listed = _information(path).get('relative_file_paths') or names
-        named = {Path(name).name.removesuffix('.zstd') for name in listed}
+        listed = _information(path).get('relative_file_paths')
+        named = {
+            Path(str(name)).name.removesuffix('.zstd')
+            for name in (listed if isinstance(listed, list) else names)
+        }
         there = {name for name in names if name.endswith(ROS2_SUFFIXES)}
         if others := ', '.join(sorted(there - named)):
             raise RecordingError(_unfinished(path, f'its metadata.yaml does not name {others}'))
