@@ -1,6 +1,7 @@
 """A finished film on disk: painted mesh, table, figures and picture."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -85,7 +86,7 @@ def write_film(
             raise PaintError(
                 f'{path} is there already; choose another name, or move the old file away'
             )
-    with writable(folder):
+    with writable(folder), _all_or_none([] if overwrite else paths):
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         films = {'thickness_um': film_um}
@@ -95,6 +96,17 @@ def write_film(
         _write_table(paths[1], columns, zones.names if zones else None)
         write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
+
+
+@contextmanager
+def _all_or_none(paths: list[Path]) -> Iterator[None]:
+    """Remove these files if one of them cannot be written."""
+    try:
+        yield
+    except OSError:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        raise
 
 
 def _write_table(path: Path, columns: Mapping[str, np.ndarray], names: np.ndarray | None) -> None:
