@@ -75,7 +75,9 @@ def _findings() -> Iterator[Finding]:
             yield from look()
         except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
             name = look.__name__.strip('_').replace('_', ' ')
-            remedy = 'pip install --force-reinstall paint_deposition'
+            remedy = (
+                'install it again: pip install --force-reinstall ./ros2_ws/src/paint_deposition'
+            )
             if 'cannot cache' in str(error):
                 remedy = 'set NUMBA_CACHE_DIR to a folder that can be written'
             yield Finding(name, f'{type(error).__name__}: {error}', False, remedy)
