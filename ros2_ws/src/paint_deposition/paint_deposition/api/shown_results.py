@@ -47,7 +47,7 @@ class _Figures(BaseModel):
     provenance: _MadeFrom
 
 
-class _Statistics(BaseModel):
+class _Statistics(BaseModel, allow_inf_nan=False):
     """Of a film, what is shown beside it."""
 
     mesh_file: str = ''

@@ -2,6 +2,7 @@
 
 import os
 import zipfile
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -36,9 +37,12 @@ def require_small_package(package: zipfile.ZipFile) -> None:
         left -= member.file_size
         if left < 0:
             raise zipfile.BadZipFile(f'it holds over {MOST_EXPANDED_BYTES / 1e6:g} MB, expanded')
-        with package.open(member) as content:  # the end is compared with what the head says
-            while content.read(BLOCK_BYTES):
-                pass
+        try:
+            with package.open(member) as content:  # the end is compared with what the head says
+                while content.read(BLOCK_BYTES):
+                    pass
+        except (EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
+            raise zipfile.BadZipFile(f'{member.filename}: {error or "it breaks off"}') from None
 
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:

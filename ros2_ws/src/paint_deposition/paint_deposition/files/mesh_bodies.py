@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import zipfile
-import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -123,7 +122,7 @@ def _scene(path: Path, kind: str) -> Scene:
         try:
             with zipfile.ZipFile(path) as package:
                 require_small_package(package)
-        except (zipfile.BadZipFile, zlib.error, RuntimeError, NotImplementedError) as error:
+        except zipfile.BadZipFile as error:
             raise MeshError(f'{path}: not readable as a mesh ({error}); export it again') from None
     if kind in ('.step', '.stp'):
         if importlib.util.find_spec(STEP_READER) is None:

@@ -4,9 +4,12 @@ import math
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from io import BytesIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from typing import IO, cast
 
 import yaml
 import zstandard
@@ -99,7 +102,7 @@ def _copy(
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     try:  # the summary repeats all channels, in case the chunk that defines one is damaged
-        with file.open('rb') as stream:
+        with _mapped(file) as stream:
             reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
             if summary := reader.get_summary():
                 schemas, channels = dict(summary.schemas), dict(summary.channels)
@@ -125,7 +128,7 @@ def _records(
 ) -> Iterator[McapRecord]:
     """The records up to the break, which is noted, including those in chunks."""
     size, start = file.stat().st_size, len(MCAP0_MAGIC)
-    with file.open('rb') as stream:
+    with _mapped(file) as stream:
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
@@ -143,6 +146,13 @@ def _records(
             recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
             stream.seek(start)
             yield from _truncated_chunk_records(stream.read(MOST_CHUNK_BYTES))
+
+
+@contextmanager
+def _mapped(file: Path) -> Iterator[IO[bytes]]:
+    """The file to read from: as mapped memory it gives what is there, and no more is asked for."""
+    with file.open('rb') as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as content:
+        yield cast(IO[bytes], content)
 
 
 def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
