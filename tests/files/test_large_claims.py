@@ -219,7 +219,8 @@ def test_the_metadata_of_a_bag_end_no_process(text, tmp_path):
         pass
 
 
-@pytest.mark.parametrize('name', targets())
+# Figures that are no file are as if they were not there.
+@pytest.mark.parametrize('name', sorted(targets().keys() - {'comparison', 'stats'}))
 def test_a_device_or_a_pipe_is_not_read(name, tmp_path):
     target = targets()[name]
     device, pipe = tmp_path / f'zero{target.suffix}', tmp_path / f'pipe{target.suffix}'
