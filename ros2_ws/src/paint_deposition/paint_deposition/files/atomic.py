@@ -42,7 +42,9 @@ def require_small_package(package: zipfile.ZipFile) -> None:
                 while content.read(BLOCK_BYTES):
                     pass
         except (EOFError, NotImplementedError, RuntimeError, ValueError, zlib.error) as error:
-            raise zipfile.BadZipFile(f'{member.filename}: {error or "it breaks off"}') from None
+            raise zipfile.BadZipFile(
+                f'{member.filename}: {str(error) or "it breaks off"}'
+            ) from None
 
 
 def read_file(path: str | Path, refusal: type[PaintError], most_mb: float = MOST_MB) -> bytes:

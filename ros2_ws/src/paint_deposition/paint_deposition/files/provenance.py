@@ -27,6 +27,8 @@ def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
         notes[what] = path
         try:
             if what == 'mesh_file':
+                if not Path(path).exists():
+                    raise PaintError(f'{path}: No such file or directory')
                 notes['mesh_sha256'] = sha256(path)
             else:
                 notes['model_yaml'] = model_source(Path(path))
@@ -80,7 +82,7 @@ def sha256(path: str | Path) -> str:
             if path.is_dir():
                 digest.update(str(file.relative_to(path)).encode())
             require_file(file, PaintError, math.inf)
-            if file == path or file.is_file():
+            if file.is_file():
                 with file.open('rb') as content:
                     while block := content.read(BLOCK_BYTES):
                         digest.update(block)

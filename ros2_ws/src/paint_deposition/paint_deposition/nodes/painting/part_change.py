@@ -314,7 +314,7 @@ class PartChange:
             self._save_error = ''
         except (PaintError, OSError, MemoryError) as error:
             films = f'the films of {len(self._unsaved)} former parts are not saved, and kept'
-            self._save_error = f'{films}: {error or "not enough memory"}'
+            self._save_error = f'{films}: {str(error) or "not enough memory"}'
             self._node.get_logger().error(self._save_error)
         return paths
 

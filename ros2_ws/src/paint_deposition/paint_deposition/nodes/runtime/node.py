@@ -156,7 +156,8 @@ class PaintNode(Node):
 
     def _named_folders(self) -> list[Path]:
         """The folders of the files that the parameters name, and those of `input_folders`."""
-        files = map(Path.resolve, map(Path, self._files_of(self.values)))
+        inputs = {name: v for name, v in self.values.items() if name != 'output_directory'}
+        files = map(Path.resolve, map(Path, self._files_of(inputs)))
         return [path if path.is_dir() else path.parent for path in files]
 
     def _files_of(self, values: Mapping[str, Any]) -> list[str]:
