@@ -16,6 +16,7 @@ from paint_deposition.batch.processes import compute
 from paint_deposition.batch.sweep.case import computed, varied_motion
 from paint_deposition.batch.sweep.job import Job
 from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.effects.user_effects import effects_allowed
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
@@ -146,7 +147,16 @@ class Own(Effect):
 """
 
 
+@pytest.fixture
+def with_leave():
+    """As with --allow-effects."""
+    token = effects_allowed.set(True)
+    yield
+    effects_allowed.reset(token)
+
+
 @pytest.mark.slow
+@pytest.mark.usefixtures('with_leave')
 def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(tmp_path, by_itself):
     """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'

@@ -22,6 +22,7 @@ workers_option = click.option(
 @click.command('sweep')
 @click.argument('sweep', type=options.FILE)
 @workers_option
+@options.ALLOW_EFFECTS
 @options.results_options('cases.parquet, sweep.json and sweep.png')
 def sweep_command(sweep: Path, results: options.Results, count: int | None) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
@@ -57,6 +58,7 @@ def sweep_command(sweep: Path, results: options.Results, count: int | None) -> N
 @click.command('line')
 @click.argument('folder', type=options.FOLDER)
 @workers_option
+@options.ALLOW_EFFECTS
 @options.results_options('points.parquet, parts.parquet, line.json and line.png')
 def line_command(folder: Path, results: options.Results, count: int | None) -> None:
     """Simulate and compare all runs in FOLDER, and show what they share and what changes.

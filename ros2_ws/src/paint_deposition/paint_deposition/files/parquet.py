@@ -23,8 +23,7 @@ def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> Non
     if missing:
         named = f'{" and ".join(missing)}, which {"are" if missing[1:] else "is"}'
         raise ManyError(
-            f'{what} needs {named} not installed; run: pip install '
-            f'{" ".join(missing)}, or install paint_deposition[many]'
+            f'{what} needs {named} not installed; run: pip install {" ".join(missing)}'
         )
 
 

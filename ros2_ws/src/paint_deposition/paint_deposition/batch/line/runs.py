@@ -9,6 +9,7 @@ from pydantic import Field
 
 from paint_deposition.batch.cases import Case, code_digest, digest_of
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.motion_source import MotionSource, Number, OnePart, Text
@@ -124,7 +125,7 @@ def line_cases(folder: Path) -> tuple[list[Case], LineFile, DepositionModel, lis
     """
     folder = folder.resolve()
     file = read_line(folder)
-    model = read_model(folder / file.model)
+    model = read_model(folder / file.model, load_unnamed_effect_file)
     files = shared_files(folder, file)
     own = [effect.file_content.decode() for effect in model.effects]
     shared = [code_digest(), file.model_dump(), model_digest(model), own]

@@ -19,6 +19,7 @@ from paint_deposition.batch.sweep.variations import (
 )
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import ManyError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
@@ -95,7 +96,7 @@ class Job:
 
     def _model_file(self, path: Path) -> ModelFile:
         self.files[f'model {path.name}'] = path
-        return self._once(('model', path), lambda: read_model_file(path))
+        return self._once(('model', path), lambda: read_model_file(path, load_unnamed_effect_file))
 
     def _model(self, values: Values) -> DepositionModel:
         path = self._named('model', values)
