@@ -1,1 +1,1 @@
-"""Many cases and many parts: processes, sweeps, lines."""
+"""Many cases side by side: processes and sweeps."""

@@ -1,4 +1,4 @@
-"""Cases of a sweep or a line: what each is computed from, and a cache of their results on disk.
+"""Cases of a sweep: what each is computed from, and a cache of their results on disk.
 
 The cache is our own: joblib's keeps pickles under a digest of the function's text alone, while
 these are Parquet tables that a user opens, found again only by the same code of the whole package.

@@ -70,13 +70,6 @@ def effect_name(effect_id: str) -> str:
     return name.replace('_', ' ')
 
 
-def amplitude_name(name: str) -> str:
-    """'air_drift.shift_down_m' as 'air drift, shift down'."""
-    effect, _, parameter = name.partition('.')
-    unit = EFFECTS[effect].parameters()[parameter]['unit']
-    return f'{effect_name(effect)}, {parameter_words(parameter, unit)}'
-
-
 def competing_explanations(spray: Spray) -> str:
     """The explanations that a spray is to separate."""
     shapeless = {UNKNOWN: 'a cause outside the library', FOOTPRINT: 'another shape of the pattern'}
