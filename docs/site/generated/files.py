@@ -5,7 +5,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from generated.markdown import table
-from paint_deposition.batch.sweep.sweep_file import Passes, Sample, SweepFile
+from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
 from paint_deposition.files.tables.reading_columns import ALIASES, OWN
