@@ -10,6 +10,7 @@ from contextlib import ExitStack, nullcontext
 from pathlib import Path
 
 import pytest
+import yaml
 
 import paint_deposition
 from booth import SAMPLES
@@ -20,8 +21,7 @@ from paint_deposition.batch.sweep_file import SweepFile
 from paint_deposition.errors import ManyError
 
 pytestmark = pytest.mark.slow
-DOOR = SAMPLES / 'measured_door'
-TOLD = {'mesh': 'door.stl', 'trajectory': 'door', 'state_topic': '/atomizer/state'}
+TOLD = {'mesh': 'panel.stl', 'trajectory': 'panel_577', 'max_edge_length_m': 0.1}
 CASES = 200
 FILM = "{'mean_um': [20.0]}"
 
@@ -63,8 +63,7 @@ def dask(address, tmp_path):
 
 def test_films_are_those_of_this_process_though_worker_and_scheduler_die(address, dask, tmp_path):
     grid = {'speed_factor': {'first': 0.9, 'last': 1.1, 'steps': CASES}}
-    told = SweepFile.model_validate(TOLD | {'max_edge_length_m': 0.1, 'grid': grid})
-    job = Job.of(told, DOOR)
+    job = Job.of(SweepFile.model_validate(TOLD | {'grid': grid}), SAMPLES)
 
     def swept(folder: str, executor, progress=silent):
         return compute(computed, job.cases, job.inputs, tmp_path / folder, executor, progress)
@@ -99,8 +98,9 @@ def test_a_worker_with_another_version_is_refused(address, dask, tmp_path):
     (other / '__init__.py').write_text(text.replace(paint_deposition.__version__, '0.0.1'))
     dask('scheduler')
     dask('worker', other.parent)
-    lines = [f'{key}: {DOOR / value}' for key, value in TOLD.items() if key != 'state_topic']
-    (tmp_path / 'sweep.yaml').write_text('\n'.join([*lines, 'grid: {speed_factor: [0.9, 1.1]}']))
+    told = TOLD | {'grid': {'speed_factor': [0.9, 1.1]}}
+    told |= {key: str(SAMPLES / TOLD[key]) for key in ('mesh', 'trajectory')}
+    (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
     refused = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path, '--scheduler', address)
     assert_refused(refused, 'has another paint_deposition (0.0.1)', 'install the same there')
 

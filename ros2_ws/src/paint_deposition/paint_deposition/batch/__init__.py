@@ -1,1 +1,1 @@
-"""Many cases side by side: processes and sweeps."""
+"""Sweeps: many cases, by Dask or any other executor."""
