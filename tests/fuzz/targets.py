@@ -18,7 +18,7 @@ from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
 from paint_deposition.api.shown_results import results_scenes
-from paint_deposition.batch.sweep.sweep_file import read_sweep
+from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings

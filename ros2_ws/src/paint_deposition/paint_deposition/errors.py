@@ -35,7 +35,7 @@ class PlanError(PaintError):
 
 
 class ManyError(PaintError):
-    """A sweep over cases or a line of parts cannot be run."""
+    """A sweep over cases cannot be run."""
 
 
 def require_above_zero(**values: float) -> None:

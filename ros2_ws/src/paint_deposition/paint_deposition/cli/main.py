@@ -30,7 +30,6 @@ COMMANDS = {
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and refit.'),
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
-    'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
     'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),

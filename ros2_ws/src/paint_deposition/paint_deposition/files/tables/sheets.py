@@ -11,7 +11,7 @@ from pathlib import Path
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.parquet import MAGIC, require_libraries
+from paint_deposition.files.parquet import MAGIC, require_pyarrow
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -63,7 +63,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
         if content.startswith(MAGIC):
-            require_libraries(str(path))
+            require_pyarrow(str(path))
             return [_sheet_of_parquet(content)]
         return _sheets_of_text(*_decoded(content))
     except ValueError as error:

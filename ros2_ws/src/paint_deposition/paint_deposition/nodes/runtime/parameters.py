@@ -181,8 +181,8 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
         ),
         'input_folders': NodeParameter(
             [],
-            'Folders whose meshes and models may be asked for later, beside those of the files '
-            'named at the start [path]',
+            'Folders whose meshes, models and recordings may be asked for later, beside those of '
+            'the files named at the start [path]',
             element=str,
             fixed_because='whoever can set parameters could otherwise read files of this machine; '
             'restart the node with the new value',
