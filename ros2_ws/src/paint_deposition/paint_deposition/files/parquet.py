@@ -18,9 +18,7 @@ MAGIC = b'PAR1'
 def require_pyarrow(what: str) -> None:
     """Refuse to begin what needs the library of the extra, where it is not installed."""
     if find_spec('pyarrow') is None:
-        raise ManyError(
-            f'{what} needs pyarrow, which is not installed; run: pip install pyarrow'
-        )
+        raise ManyError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:
