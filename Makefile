@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure bench-line fuzz soak reliability cell numbers lint docs format lock audit sbom wheel clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure fuzz soak reliability cell numbers lint docs format lock audit sbom wheel clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -65,9 +65,6 @@ bench-nature: build  ## diagnose real sprays whose missing physics is known
 
 bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure, plan again, paint
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page loop $(ARGS)
-
-bench-line: build  ## watch 500 virtual parts for a step and an effect too small for one, a worker killed
-	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page line $(ARGS)
 
 docs: build  ## build the site of the documentation into runs/site, links checked
 	@.venv/bin/uv pip install --quiet --require-hashes --python .venv/bin/python -r requirements/docs.txt

@@ -76,15 +76,14 @@ def table(records: list[dict]) -> str:
 @click.command()
 @click.option('--draws', default=50, show_default=True, help='Parts with nothing hidden.')
 @click.option('--each', default=6, show_default=True, help='Parts with each hidden effect.')
-@click.option('--processes', default=2, show_default=True)
 @results_option('bench-brushes.jsonl')
-def main(draws: int, each: int, processes: int, results: Path) -> None:
+def main(draws: int, each: int, results: Path) -> None:
     """Count false alarms and effects found on parts that two brushes painted."""
     hidden = [*[None] * draws, *(truth for truth in HIDDEN for _ in range(each))]
     jobs = [(880_000 + number, truth) for number, truth in enumerate(hidden)]
     done = {(r['seed'], r['truth']) for r in kept(results)}
     left = [job for job in jobs if job not in done]
-    click.echo(table(add(results, run, left, processes)))
+    click.echo(table(add(results, run, left)))
 
 
 if __name__ == '__main__':

@@ -186,7 +186,6 @@ def amounts(painted: Painted, diagnosis) -> list[dict]:
 @click.option('--generators', default=','.join(WORLDS), show_default=True, help='Worlds.')
 @click.option('--kinds', default=','.join(KINDS), show_default=True, help='Kinds of campaigns.')
 @click.option('--seed', default=1, show_default=True, help='Another seed draws other campaigns.')
-@click.option('--jobs', default=2, show_default=True, help='Processes.')
 @click.option(
     '--results', default=ROOT / 'runs' / 'bench-diagnosis.jsonl', type=click.Path(path_type=Path)
 )
@@ -199,7 +198,6 @@ def main(
     generators: str,
     kinds: str,
     seed: int,
-    jobs: int,
     results: Path,
     constants: tuple[str, ...],
     report_only: bool,
@@ -230,7 +228,7 @@ def main(
             for task in tasks(campaigns, worlds, kinds.split(','), seed)
             if f'{task[0]}-{task[2]}-{task[1]}' not in done
         ]
-        records = add(results, run, todo, jobs)
+        records = add(results, run, todo)
     click.echo(table(records))
     if failed:
         click.echo('\n' + failures(records))

@@ -169,19 +169,16 @@ def table(records: list[dict]) -> str:
 @click.option('--parts', default=6, show_default=True, help='Doors to paint.')
 @click.option('--seed', default=640_000, show_default=True, help='For other doors.')
 @click.option('--parcels', default=16_000_000, show_default=True, help='Droplets in a film.')
-@click.option('--processes', default=2, show_default=True)
 @results_option('bench-loop.jsonl')
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
-def main(
-    parts: int, seed: int, parcels: int, processes: int, results: Path, only_summary: bool
-) -> None:
+def main(parts: int, seed: int, parcels: int, results: Path, only_summary: bool) -> None:
     """Measure what diagnosing is worth in evenness of the next part."""
     records = kept(results)
     if not only_summary:
         known = {r['seed'] for r in records}
         jobs = [(seed + n, HIDDEN[n % len(HIDDEN)], parcels) for n in range(parts)]
         todo = [job for job in jobs if job[0] not in known]
-        records = add(results, run_one, todo, processes)
+        records = add(results, run_one, todo)
     click.echo(table(records))
 
 

@@ -179,12 +179,9 @@ def diagnosis_table(records: list[dict]) -> list[str]:
 @click.option('--doors', default=3, show_default=True, help='Doors of different shape.')
 @click.option('--count', default=40, show_default=True, help='Readings that are diagnosed.')
 @click.option('--first-seed', default=41_000, show_default=True, help='For other doors.')
-@click.option('--processes', default=2, show_default=True)
 @results_option('bench-measure.jsonl')
 @click.option('--report-only', is_flag=True, help='Print what is there.')
-def main(
-    doors: int, count: int, first_seed: int, processes: int, results: Path, report_only: bool
-) -> None:
+def main(doors: int, count: int, first_seed: int, results: Path, report_only: bool) -> None:
     """Compare chosen points with a grid and with random ones."""
     records = kept(results)
     seeds = range(first_seed, first_seed + doors)
@@ -192,7 +189,7 @@ def main(
     jobs += [(seed, truth, count) for seed in seeds for truth in TRUTHS]
     if not report_only:
         done = {tuple(r['job']) for r in records}
-        records = add(results, run, [job for job in jobs if job not in done], processes)
+        records = add(results, run, [job for job in jobs if job not in done])
     powers = [r for r in records if 'power' in r]
     said = [r for r in records if 'said' in r]
     click.echo('\n'.join([*power_table(powers), '', *diagnosis_table(said)]))

@@ -183,12 +183,9 @@ def _kept(record: dict) -> bool:
 @click.option('--truths', default=','.join(TRUTHS), help='Hidden effects, by comma.')
 @click.option('--each', default=10, show_default=True, help='Campaigns of each hidden effect.')
 @click.option('--first-seed', default=930_000, show_default=True, help='For other campaigns.')
-@click.option('--processes', default=2, show_default=True)
 @results_option('bench-next.jsonl')
 @click.option('--summary', 'only_summary', is_flag=True, help='Print what is there.')
-def main(
-    truths: str, each: int, first_seed: int, processes: int, results: Path, only_summary: bool
-) -> None:
+def main(truths: str, each: int, first_seed: int, results: Path, only_summary: bool) -> None:
     """Score the first proposed spray on parts with hidden effects."""
     records = kept(results)
     if not only_summary:
@@ -199,7 +196,7 @@ def main(
             for truth in truths.split(',')
         ]
         todo = [job for job in jobs if job[:2] not in known]
-        records = add(results, run_one, todo, processes)
+        records = add(results, run_one, todo)
     click.echo(table(records))
 
 

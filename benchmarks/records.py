@@ -2,13 +2,13 @@
 
 import json
 from collections.abc import Callable, Sequence
-from concurrent.futures import as_completed
 from pathlib import Path
 
 import click
+from distributed import as_completed
 from tqdm import tqdm
 
-from paint_deposition.batch.processes import processes
+from paint_deposition.batch.cases import workers
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
@@ -29,13 +29,11 @@ def kept(results: Path) -> list[dict]:
     )
 
 
-def add(
-    results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple], count: int
-) -> list[dict]:
-    """Run tasks side by side in so many processes, and return all records that the file holds."""
+def add(results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple]) -> list[dict]:
+    """Run tasks as `paint sweep` runs its cases; return all records that the file holds."""
     results.parent.mkdir(parents=True, exist_ok=True)
-    with processes(count, {}) as pool, results.open('a') as file:
-        left = [pool.submit(run, task) for task in todo]
+    with workers() as client, results.open('a') as file:
+        left = client.map(run, todo, pure=False)
         for future in tqdm(as_completed(left), total=len(todo), mininterval=20):
             file.writelines(json.dumps(one, default=float) + '\n' for one in future.result())
             file.flush()

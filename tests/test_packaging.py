@@ -328,7 +328,7 @@ def test_the_wheel_brings_command_and_library_without_ros(run, tmp_path):
     assert {'film.csv', 'film.ply', 'film.png', 'stats.json'} <= set(os.listdir(tmp_path))
     assert "ROS 2           ModuleNotFoundError: No module named 'rclpy'" in done.stdout
     # What it does not bring is asked for in a line: an extra, and ROS for a node.
-    words = 'paint sweep needs pyarrow and ruptures, which are not installed; run:'
+    words = 'a sweep needs pyarrow, which is not installed; run:'
     for command, told in (
         (('paint', 'sweep', 'a', '-o', tmp_path / 'out'), f'paint: {words} pip install '),
         (('bag_player',), 'bag_player: needs rclpy; source a ROS 2 installation'),

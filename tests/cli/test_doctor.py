@@ -1,13 +1,14 @@
 """`paint doctor`: what is there, and a self-test that can fail."""
 
 import json
+import subprocess
 from importlib import metadata
 
 import pytest
 import rclpy
 
 from cli.command import paint
-from paint_deposition.cli import doctor
+from paint_deposition.cli import doctor, options
 
 
 def findings(code: int) -> dict[str, dict]:
@@ -59,3 +60,17 @@ def test_what_cannot_be_looked_at_is_an_error_with_a_remedy(monkeypatch):
     assert 'BAD broken' in done.stdout
     assert '-> set NUMBA_CACHE_DIR to a folder that can be written' in done.stdout
     assert done.stdout.endswith('paint does not work as it should\n')
+
+
+def test_no_other_python_takes_a_module_from_the_current_folder(tmp_path, monkeypatch):
+    """Those of `doctor` and of `watch --live`: they start from the same list of words."""
+    for name in ('numpy', 'rclpy', 'mine'):
+        (tmp_path / f'{name}.py').write_text('open("ran", "w")')
+    monkeypatch.chdir(tmp_path)
+    found = {one.name: one for one in doctor._ros()}
+    assert rclpy.get_rmw_implementation_identifier() in found['ROS 2'].found
+    command = options.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.stdout == "['a']\n"
+    assert "No module named 'mine'" in done.stderr
+    assert not (tmp_path / 'ran').exists()

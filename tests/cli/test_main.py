@@ -106,23 +106,26 @@ def test_a_command_that_is_none_is_refused_with_the_nearest():
 
 
 @pytest.mark.slow
-def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path):
-    pipe = tmp_path / 'readings.csv'
-    os.mkfifo(pipe)
+def test_an_interrupted_command_leaves_nothing_and_says_so(tmp_path, wait_until):
+    (tmp_path / 'wait.py').write_text(
+        'from pathlib import Path\nfrom time import sleep\n'
+        'Path(__file__).with_name("reached").touch()\nsleep(60)\n'
+    )
+    (tmp_path / 'model.yaml').write_text('effects: [{file: wait.py}]\n')
     process = subprocess.Popen(
         ['paint', 'simulate', '--mesh', SAMPLES / 'door.stl',
          '--trajectory', SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
-         '--at', pipe, '-o', tmp_path / 'out'],
+         '--model', tmp_path / 'model.yaml', '-o', tmp_path / 'out'],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         # A shell starts what runs in its background deaf to interrupts, and so are its children.
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
-    with pipe.open('w'):  # opens once the command reads
-        process.send_signal(signal.SIGINT)
-        output, errors = process.communicate(timeout=60)
+    wait_until((tmp_path / 'reached').exists, what='the model')
+    process.send_signal(signal.SIGINT)
+    output, errors = process.communicate(timeout=60)
     assert process.returncode == 130
     assert output == ''
-    assert errors.split() == ['paint:', 'interrupted']
+    assert errors.splitlines()[-1] == 'paint: interrupted'
     assert not (tmp_path / 'out').exists()
 
 

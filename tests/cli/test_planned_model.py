@@ -126,7 +126,7 @@ def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
     assert '--model' in warning
     # Another model of that name is not taken for it.
     (tmp_path / 'model.yaml').write_text('effects: []\n')
-    assert planned_model(tmp_path / 'passes.mod').file is None
+    assert planned_model(tmp_path / 'passes.mod').file() is None
 
 
 def test_the_digest_is_that_of_the_values(model_file, tmp_path):

@@ -1,6 +1,9 @@
 """A folder of results holds those of one command, whole."""
 
 import os
+import signal
+import subprocess
+import sys
 
 import pytest
 
@@ -55,19 +58,144 @@ def test_what_is_interrupted_leaves_the_folder_as_it_was(tmp_path, error):
 def test_a_folder_that_no_command_made_is_not_replaced(tmp_path):
     (tmp_path / 'out/trajectory').mkdir(parents=True)
     (tmp_path / 'out/trajectory/mine.csv').write_text('mine')
-    with pytest.raises(PaintError, match='not written by paint; move it away'):
+    with pytest.raises(PaintError, match=r'mine\.csv was not written by paint; move it away'):
         write(tmp_path / 'out', 'trajectory/bag.mcap', 'plan.json')
     assert names_in(tmp_path / 'out') == ['trajectory']
     assert names_in(tmp_path / 'out/trajectory') == ['mine.csv']
 
 
-def test_a_marker_names_nothing_outside_its_folder(tmp_path):
+@pytest.mark.parametrize(
+    'line', ['..', '.', '', '../mine.txt', '../other', '/{0}', 'a/../../mine.txt']
+)
+def test_a_marker_names_nothing_outside_its_folder(tmp_path, line):
     write(tmp_path / 'out', 'film.csv')
+    write(tmp_path / 'other', 'film.csv')
     (tmp_path / 'mine.txt').write_text('mine')
-    (tmp_path / 'out' / MARKER).write_text('../mine.txt\nfilm.csv\n')
+    (tmp_path / 'out' / MARKER).write_text(f'{line.format(tmp_path)}\nfilm.csv\n')
     write(tmp_path / 'out', 'model.yaml')
     assert names_in(tmp_path / 'out') == ['model.yaml']
-    assert (tmp_path / 'mine.txt').exists()
+    assert names_in(tmp_path) == ['mine.txt', 'other', 'out']
+    assert names_in(tmp_path / 'other') == ['film.csv']
+
+
+@pytest.mark.parametrize('name', ['notes', 'link'])
+def test_what_a_marker_names_is_no_leave_for_a_folder_or_a_link(tmp_path, name):
+    """A tree goes only if every file in it was written by a command, and never through a link."""
+    tree = tmp_path / 'out/notes' if name == 'notes' else tmp_path / 'mine'
+    write(tmp_path / 'out', 'film.csv')
+    tree.mkdir()
+    (tree / 'readings.csv').write_text('mine')
+    if name == 'link':
+        (tmp_path / 'out/link').symlink_to(tree)
+    (tmp_path / 'out' / MARKER).write_text(f'film.csv\n{name}\n')
+    if name == 'notes':
+        with pytest.raises(PaintError, match=r'readings\.csv was not written by paint'):
+            write(tmp_path / 'out', 'model.yaml')
+        assert (tmp_path / 'out/film.csv').exists()
+    else:
+        write(tmp_path / 'out', 'model.yaml')
+    assert (tree / 'readings.csv').read_text() == 'mine'
+
+
+def test_a_file_of_the_users_own_is_not_overwritten(tmp_path):
+    (tmp_path / 'model.yaml').write_text('# by hand')
+    with pytest.raises(PaintError, match=r'model\.yaml was not written by paint; move it away'):
+        write(tmp_path, 'model.yaml', 'calibration.json')
+    assert names_in(tmp_path) == ['model.yaml']
+    assert (tmp_path / 'model.yaml').read_text() == '# by hand'
+
+
+# Ends at the given call of those that change the folder, or raises there.
+AT_A_CALL = """
+import os, sys
+from pathlib import Path
+from paint_deposition.cli.results_folder import results_in
+folder, end, call = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
+with results_in(folder) as work:
+    (work / 'trajectory').mkdir()
+    for name in ('film.csv', 'stats.json', 'trajectory/bag.mcap'):
+        (work / name).write_text('new')
+    left = [call]
+    def counted(function):
+        def call(*args, **more):
+            left[0] -= 1
+            if left[0] == 0:
+                if end == 'kill':
+                    os.kill(os.getpid(), 9)
+                raise OSError(28, 'full')
+            return function(*args, **more)
+        return call
+    for name in ('rename', 'replace', 'mkdir'):
+        setattr(os, name, counted(getattr(os, name)))
+print(left[0])
+"""
+
+
+@pytest.mark.parametrize('end', ['kill', 'full'])
+@pytest.mark.parametrize('others', [True, False], ids=['among_other_files', 'alone'])
+def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, others):
+    states = set()
+    for call in range(1, 40):
+        out = tmp_path / str(call) / 'out'
+        write(out, 'film.csv', 'old.csv', 'trajectory/bag.mcap', 'trajectory/old.yaml')
+        if others:
+            (out / 'notes.txt').write_text('mine')
+        words = [sys.executable, '-c', AT_A_CALL, str(out), end, str(call)]
+        done = subprocess.run(words, capture_output=True, text=True)
+        if end == 'kill' and done.returncode:  # the next command puts right what this one left
+            with pytest.raises(KeyboardInterrupt):
+                write_half(out, KeyboardInterrupt)
+        held = tuple(sorted(p.relative_to(out).as_posix() for p in out.rglob('*')))
+        assert names_in(out.parent) == ['out']
+        assert ('notes.txt' in held) == others
+        is_new = (out / 'film.csv').read_text() == 'new'
+        states.add((is_new, held))
+        if int(done.stdout or 0) > 0:  # all calls were made
+            break
+    assert done.returncode == 0
+    assert {is_new for is_new, _ in states} == {True, False}
+    assert len(states) == 2, states
+
+
+def test_commands_on_one_folder_take_turns(tmp_path):
+    code = """
+import sys
+from pathlib import Path
+from paint_deposition.cli.results_folder import results_in
+for _ in range(40):
+    with results_in(Path(sys.argv[1])) as work:
+        for k in range(5):
+            (work / f'{sys.argv[2]}{k}').write_text(sys.argv[2])
+"""
+    words = [sys.executable, '-c', code, str(tmp_path / 'out')]
+    running = [subprocess.Popen([*words, name]) for name in 'ab']
+    assert [one.wait() for one in running] == [0, 0]
+    held = names_in(tmp_path / 'out')
+    assert held in ([f'{name}{k}' for k in range(5)] for name in 'ab')
+
+
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
+def test_a_signal_ends_a_command_like_an_interrupt_and_nothing_is_left(tmp_path, number):
+    code = """
+import sys, time
+from pathlib import Path
+from paint_deposition.cli import main
+from paint_deposition.cli.results_folder import results_in
+def work(**given):
+    with results_in(Path(sys.argv[1])) as folder:
+        (folder / 'half').touch()
+        print('writing', flush=True)
+        time.sleep(60)
+main.paint.main = work
+main.main()
+"""
+    words = [sys.executable, '-c', code, str(tmp_path / 'out')]
+    running = subprocess.Popen(words, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    running.stdout.readline()
+    running.send_signal(number)
+    _, errors = running.communicate()
+    assert (running.returncode, errors) == (130, 'paint: interrupted\n')
+    assert names_in(tmp_path) == []
 
 
 def test_the_working_directory_may_be_the_folder_of_two_commands(tmp_path):

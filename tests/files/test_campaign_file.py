@@ -128,7 +128,7 @@ def test_two_experiments_need_two_names(campaign):
         (b'PK\x03\x04\x9c\xff', 'is no text, such as a workbook or a bag; give a campaign YAML'),
         ('experiments: [', 'cannot be read as YAML .*line'),
         ('experiments: []\nexperiments: []', 'line 2: found duplicate key "experiments"'),
-        ('just words', "campaign is 'just words'; expected the keys experiments, model"),
+        ('just words', 'campaign is text; expected the keys experiments, model'),
     ],
 )
 def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):

@@ -1,14 +1,22 @@
 """A head that claims more than its file holds is refused before memory is taken for it."""
 
+import os
 import resource
+import shutil
 import struct
+import zipfile
 from collections.abc import Callable, Iterator
+from io import BytesIO
 from pathlib import Path
 
 import pytest
+import zstandard
+from mcap.writer import Writer
 
+from booth import SAMPLES
 from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.bag_files import custom_data, open_bag
 
 CLAIMED = 1_000_000_000
 J = 0x4E4F534A  # a chunk of JSON
@@ -47,6 +55,70 @@ def _far_cell() -> bytes:
     return sheet.around(sheet.seeds[0].replace(b'</sheetData>', far))
 
 
+def _doubled(around: bytes) -> bytes:
+    """Thirty lists of YAML, each with the one before it ten times."""
+    lines = [b'a0: &a0 {k0: 1}' if b'<<' in around else b'a0: &a0 [1]']
+    for k in range(30):
+        aliases = b', '.join([b'*a%d' % k] * 10)
+        lines.append(b'a%d: &a%d ' % (k + 1, k + 1) + around % aliases)
+    return b'\n'.join(lines)
+
+
+def _bomb_chunk() -> bytes:
+    """A bag whose chunk of 100 kB expands to 3 GB, as it says."""
+    plain = targets()['mcap'].seeds[0]
+    compressor = zstandard.ZstdCompressor().compressobj(size=3 * CLAIMED)
+    parts = [compressor.compress(bytes(10**7)) for _ in range(300)]
+    data = b''.join([*parts, compressor.flush()])
+    content = struct.pack('<QQQII', 0, 1, 3 * CLAIMED, 0, 4) + b'zstd'
+    content += struct.pack('<Q', len(data)) + data
+    chunk = b'\x06' + struct.pack('<Q', len(content)) + content
+    head = 8 + 9 + struct.unpack('<Q', plain[9:17])[0]
+    data_end = b'\x0f' + struct.pack('<QI', 4, 0)
+    footer = b'\x02' + struct.pack('<QQQI', 20, 0, 0, 0)
+    return plain[:head] + chunk + data_end + footer + plain[:8]
+
+
+def _mcap_with(field: bytes) -> bytes:
+    made = BytesIO()
+    writer = Writer(made)
+    writer.start(profile='ros2', library='')
+    schema = writer.register_schema('geometry_msgs/msg/PoseStamped', 'ros2msg', field)
+    channel = writer.register_channel('/atomizer/pose', 'cdr', schema)
+    writer.add_message(channel, 1, bytes(64), 1)
+    writer.finish()
+    return made.getvalue()
+
+
+def _blanks() -> bytes:
+    made, old = BytesIO(), zipfile.ZipFile(BytesIO(targets()['workbook'].seeds[0]))
+    with zipfile.ZipFile(made, 'w', zipfile.ZIP_DEFLATED) as new:
+        for name in old.namelist():
+            with new.open(name, 'w', force_zip64=True) as member:
+                member.write(old.read(name))
+                if name.endswith('sheet1.xml'):
+                    for _ in range(1500):
+                        member.write(b' ' * 1_000_000)
+    return made.getvalue()
+
+
+def _row(text: bytes) -> bytes:
+    sheet = targets()['worksheet']
+    return sheet.seeds[0].replace(b'</sheetData>', text + b'><v>1</v></c></row></sheetData>')
+
+
+def _main(body: bytes) -> bytes:
+    return b'MODULE M\nPROC main()\n' + body.replace(b'; ', b';\n') + b'\nENDPROC\nENDMODULE\n'
+
+
+def _calls() -> bytes:
+    """Thirty procedures that each call the next twice, where only the robot knows whether."""
+    procedures = [b'PROC p%d()\np%d;\np%d;\nENDPROC' % (k, k + 1, k + 1) for k in range(30)]
+    procedures.append(b'PROC p30()\nMoveJ p,v100,fine,tool0;\nENDPROC')
+    body = b'IF TestDI(di1) THEN\np0;\nENDIF'
+    return _main(body).replace(b'ENDMODULE', b'\n'.join(procedures) + b'\nENDMODULE')
+
+
 CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'vertices of a binary PLY': ('ply', lambda: _ply('binary_little_endian', CLAIMED, 1)),
     'faces of a text PLY': ('ply', lambda: _ply('ascii', 3, CLAIMED)),
@@ -54,6 +126,31 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'a chunk of a glTF': ('glb', lambda: struct.pack('<4s4I', b'glTF', 2, 20, 4 * CLAIMED, J)),
     'a zstd chunk to recover': ('mcap_recovery', _mcap_chunk),
     'a cell of a workbook': ('workbook', _far_cell),
+    'lists of YAML': ('model', lambda: b'name: ' + b'[' * 100_000),
+    'nested YAML': ('model', lambda: b'- ' * 100_000),
+    'aliases of YAML': ('model', lambda: _doubled(b'[%s]')),
+    'merged aliases of YAML': ('campaign', lambda: _doubled(b'{<<: [%s]}')),
+    'an alias within itself': ('model', lambda: b'effects: &a [*a]'),
+    'a zstd chunk': ('mcap', _bomb_chunk),
+    'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
+    'blanks of a workbook': ('workbook', _blanks),
+    'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
+    'arrays of RAPID': ('rapid', lambda: _main(b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;')),
+    'copies of RAPID': (
+        'rapid',
+        lambda: _main(
+            b'VAR num x{100000}; VAR num y{100000}; FOR i FROM 1 TO 9999 DO y:=x; ENDFOR'
+        ),
+    ),
+    'strings of RAPID': (
+        'rapid',
+        lambda: _main(b'VAR string s:="a"; FOR i FROM 1 TO 9999 DO s:=s+s; ENDFOR'),
+    ),
+    'empty loops of RAPID': (
+        'rapid',
+        lambda: _main(b'FOR i FROM 1 TO 9998 DO FOR j FROM 1 TO 9998 DO ENDFOR ENDFOR'),
+    ),
+    'calls of RAPID': ('rapid', _calls),
     'an array of RAPID': ('rapid', lambda: RAPID.replace(b'n{2}:=', b'n{1000000000}:=[[')),
 }
 
@@ -73,7 +170,7 @@ def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
     name, content = CLAIMS[what]
     target = targets()[name]
     path = tmp_path / f'claims{target.suffix}'
-    path.write_bytes(content())
+    path.write_bytes(target.around(content()))
     with pytest.raises(PaintError) as refused:
         target.read(path)
     error = refused.value
@@ -110,3 +207,25 @@ def test_ten_thousand_headings_are_not_all_shown(tmp_path):
         targets()['readings'].read(path)
     assert len(str(refused.value)) < 1000
     assert 'and 9980 more' in str(refused.value)
+
+
+@pytest.mark.parametrize('text', [b'[' * 100_000, _doubled(b'[%s]')])
+def test_the_metadata_of_a_bag_end_no_process(text, tmp_path):
+    """Parsers written in C would."""
+    shutil.copytree(SAMPLES / 'panel_577', tmp_path / 'run')
+    (tmp_path / 'run/metadata.yaml').write_bytes(text)
+    assert custom_data(tmp_path / 'run') == {}
+    with pytest.raises(PaintError, match='is damaged'), open_bag(tmp_path / 'run'):
+        pass
+
+
+# Figures that are no file are as if they were not there.
+@pytest.mark.parametrize('name', sorted(targets().keys() - {'comparison', 'stats'}))
+def test_a_device_or_a_pipe_is_not_read(name, tmp_path):
+    target = targets()[name]
+    device, pipe = tmp_path / f'zero{target.suffix}', tmp_path / f'pipe{target.suffix}'
+    device.symlink_to('/dev/zero')
+    os.mkfifo(pipe)
+    for path in (device, pipe):
+        with pytest.raises(PaintError, match='is a device or a pipe; give a file'):
+            target.read(path)

@@ -1,5 +1,6 @@
 """The readers of the project, each with small files to begin from."""
 
+import shutil
 import tempfile
 import zipfile
 from collections.abc import Callable
@@ -8,6 +9,7 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 
+import numpy as np
 import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
@@ -15,16 +17,24 @@ from mcap.writer import CompressionType, Writer
 from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
+from paint_deposition.api.shown_results import results_scenes
+from paint_deposition.batch.sweep_file import read_sweep
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
-from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.json_files import json_text
+from paint_deposition.files.meshes import read_mesh, write_mesh_ply
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.parquet import write_parquet
+from paint_deposition.files.planned_model import planned_model
+from paint_deposition.files.provenance import origin
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.reading_columns import Layout
+from paint_deposition.files.zones_file import read_zones
+from paint_deposition.report.live.scene import FIGURES
 from robot_arm import urdf
 from workbook import write_workbook
 
@@ -65,6 +75,17 @@ RAPID = rb"""MODULE Door
     RETURN i mod 2;
   ENDFUNC
 ENDMODULE
+"""
+ZONES = b"""zones:
+  - name: edge
+    target_um: 20
+    tolerance_um: 3
+    box: [[-0.3, -1, -1], [0.3, 1, 1]]
+"""
+SWEEP = b"""mesh: panel.stl
+trajectory: panel_577
+grid: {K2: [0.1, 0.2], speed_factor: {from: 0.5, to: 1.5, steps: 3}}
+sample: {count: 3, seed: 1, vary: {K3: [0.1, 0.2]}}
 """
 POSES = (
     b'time_s,x_mm,y_mm,z_mm,qx,qy,qz,qw,spraying\n0,0,0,0,0,0,0,1,1\n0.1,10,0,0,0,0,0,1,0\n',
@@ -170,6 +191,31 @@ def _recovered(path: Path) -> object:
         return recover(path, Path(folder) / 'recovered')
 
 
+def _results(name: str) -> Callable[[Path], object]:
+    """Reads a folder of results with this file of figures, and a film."""
+
+    def read(path: Path) -> object:
+        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+            (Path(folder) / name).symlink_to(path)
+            if name == 'stats.json':
+                surface = read_mesh(SAMPLES / 'panel.stl', max_edge_length_m=0.2)
+                film_um = np.ones(len(surface.vertices_m), np.float32)
+                colours = np.zeros((len(film_um), 4), np.uint8)
+                write_mesh_ply(Path(folder) / 'film.ply', surface, colours, thickness_um=film_um)
+            return results_scenes(Path(folder))
+
+    return read
+
+
+def _metadata(path: Path) -> object:
+    with tempfile.TemporaryDirectory(dir=path.parent) as folder:
+        run = Path(folder) / 'run'
+        shutil.copytree(SAMPLES / 'panel_577', run)
+        (run / 'metadata.yaml').unlink()
+        (run / 'metadata.yaml').symlink_to(path)
+        return planned_model(run), _bag(run)
+
+
 def _parquet(path: Path) -> None:
     films = {'x_m': [0.1, 0.2], 'y_m': [0.0, 0.0], 'z_m': [0.2, 0.2], 'thickness_um': [24.5, 9.0]}
     write_parquet(path, pa.table(films | {'point': ['P1', 'P2']}))
@@ -186,6 +232,10 @@ def targets() -> dict[str, Target]:
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
     readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
+    made_from = origin(DepositionModel()) | {'campaign': 'campaign.yaml'}
+    compared = {'provenance': made_from}
+    figures = dict.fromkeys(FIGURES, 1.0)
+    stats = {'mesh_file': 'panel.stl', 'down': [0.0, 0.0, -1.0], 'target_um': 20.0, **figures}
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
@@ -220,6 +270,19 @@ def targets() -> dict[str, Target]:
         'mcap': Target('.mcap', _bag, [_mcap()]),
         'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),
         'model': Target('.yaml', read_model_file, [model], 'posterior: mean: id: &a *a'),
+        'comparison': Target(
+            '.json', _results('comparison.json'), [json_text(compared).encode()],
+            '"effects": [{"id": "occlusion"}] null [] {} "brushes": NaN true',
+        ),
+        'stats': Target(
+            '.json', _results('stats.json'), [json_text(stats).encode()], 'null [] {} NaN true "'
+        ),
+        'metadata': Target(
+            '.yaml', _metadata, [(SAMPLES / 'panel_577/metadata.yaml').read_bytes()],
+            'custom_data: model_sha256: &a *a null [] {}',
+        ),
+        'zones': Target('.yaml', lambda path: read_zones(path, SAMPLES / 'panel.stl'), [ZONES]),
+        'sweep': Target('.yaml', read_sweep, [SWEEP], 'grid: cases: sample: vary: &a *a null'),
         'campaign': Target('.yaml', read_campaign, [campaign], '&a *a <<: tf: points:'),
         'urdf': Target('.urdf', Robot.read, [urdf().encode()], '<mimic xyz="1"'),
     }  # fmt: skip

@@ -1,5 +1,6 @@
 """Names from files are shown in a report, and never run in it."""
 
+import csv
 from dataclasses import replace
 from html.parser import HTMLParser
 
@@ -7,6 +8,8 @@ import numpy as np
 import pytest
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.gauge_readings import read_readings, write_table
+from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -28,6 +31,25 @@ class Elements(HTMLParser):
     def handle_starttag(self, tag, attributes):
         self.scripts += tag == 'script'
         self.handlers += [name for name, _ in attributes if name.startswith('on')]
+
+
+@pytest.mark.parametrize(
+    'name', ["=cmd|' /C calc'!A0", '+1+1', '-2+3', '@SUM(A1)', '-P1', '=1,"2"', '\t=1']
+)
+def test_a_name_is_no_formula_in_a_table_and_comes_back_as_it_was(name, tmp_path):
+    rows = [['point', 'x_m', 'y_m', 'z_m', 'thickness_um'], [name, '-0.1', '+0.2', '1e-3', '20']]
+    write_table(tmp_path / 'readings.csv', rows)
+    with (tmp_path / 'readings.csv').open(newline='') as file:
+        _, cells = csv.reader(file)
+    assert cells == [f"'{name}", *rows[1][1:]]
+    assert read_readings(tmp_path / 'readings.csv').point.tolist() == [name.strip()]
+
+
+@pytest.mark.parametrize('mark', ['\r', '\n', '\u2028', '\u2029', '\x85', '\x0c', '\0'])
+def test_a_name_stays_in_the_comment_of_a_model(mark, tmp_path):
+    hostile = f'door{mark}effects: [{{file: evil.py}}]{mark}'
+    write_model(tmp_path / 'model.yaml', DepositionModel(), f'Calibrated on {hostile}')
+    assert read_model(tmp_path / 'model.yaml') == DepositionModel()
 
 
 @pytest.mark.slow

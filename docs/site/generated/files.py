@@ -5,8 +5,7 @@ from typing import Any
 from pydantic import BaseModel
 
 from generated.markdown import table
-from paint_deposition.batch.line.runs import LineFile
-from paint_deposition.batch.sweep.sweep_file import Passes, Sample, SweepFile
+from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
 from paint_deposition.files.tables.reading_columns import ALIASES, OWN
@@ -47,8 +46,6 @@ def text() -> str:
         '## Sweep\n', 'Also the keys of [a motion](#a-motion).\n',
         _keys(SweepFile, without=MOTION),
         '### `passes`\n', _keys(Passes), '### `sample`\n', _keys(Sample),
-        '## Line\n', 'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
-        _keys(LineFile, without=MOTION | PART),
     ])  # fmt: skip
 
 

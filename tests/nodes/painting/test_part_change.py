@@ -13,6 +13,7 @@ import trimesh
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import Part, ThicknessStats
 from paint_msgs.srv import ChangePart
+from rcl_interfaces.msg import SetParametersResult
 
 from brushes import two_brushes
 from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
@@ -27,6 +28,7 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
+from paint_deposition.nodes.runtime.node import ERROR, OK
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'
@@ -243,6 +245,58 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
         assert message in answer.message
     assert np.array_equal(node.film.snapshot().film_um, film)
     assert not (tmp_path / 'films').exists()
+
+
+def test_a_recording_is_read_only_beside_the_runs_and_in_folders_named_at_the_start(
+    simulator, change, tmp_path, tmp_path_factory
+):
+    parts, elsewhere = (tmp_path_factory.mktemp(name) for name in ('parts', 'elsewhere'))
+    simulator(mesh_file=str(write_panel(parts / 'panel.stl')))
+    for folder in (tmp_path / 'films/1', parts / '1', elsewhere / '1'):
+        folder.mkdir(parents=True)
+    for run in (tmp_path / 'films/1', parts / '1'):
+        assert 'holds no .mcap file' in change(serial='1', resume=str(run)).message
+    (tmp_path / 'films/link').symlink_to(elsewhere / '1')
+    for run in (elsewhere / '1', tmp_path / 'films/link', tmp_path / 'films/../../'):
+        answer = change(serial='1', resume=str(run))
+        assert 'is in no folder that deposition_simulator was given' in answer.message
+
+
+def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, tmp_path):
+    """The part changes all the same, and the answer says both."""
+    folder = tmp_path / 'films'
+    node = simulator(part_parent_frame='cell')
+    source = robot(node)
+    assert change(serial='1').success
+    source.send(MOTION)
+    film = painted(node, len(MOTION))
+    folder.write_text('in the way, as a disk that is full')
+    second = change(serial='2')
+    assert (second.success, second.run, second.paths) == (True, '2', [])
+    assert 'films of 1 former parts are not saved, and kept' in second.message
+    assert node.parts.status().level == ERROR
+    folder.unlink()
+    source.send(later(MOTION))
+    painted(node, len(MOTION))
+    third = change(serial='3')
+    assert [Path(path).parent.name for path in third.paths] == 3 * ['1'] + 3 * ['2']
+    saved = np.loadtxt(folder / '1/film.csv', delimiter=',', skiprows=1)[:, 3]
+    assert saved == pytest.approx(film, rel=1e-7)
+    assert node.parts.status().level == OK
+
+
+def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot, painted, change,
+                                                               tmp_path):  # fmt: skip
+    node = simulator(part_parent_frame='cell')
+    assert change(serial='1').success
+    robot(node).send(MOTION)
+    painted(node, len(MOTION))
+    refused = SetParametersResult(successful=False, reason='not now')
+    node.add_on_set_parameters_callback(lambda changes: refused)
+    answer = change(serial='2', part_pose=[0.0] * 6 + [1.0])
+    assert (answer.success, answer.run) == (False, '2')
+    assert 'it stands where the part before did: not now' in answer.message
+    assert (tmp_path / 'films/1/film.csv').is_file()
 
 
 def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,

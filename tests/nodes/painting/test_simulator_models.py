@@ -115,6 +115,33 @@ def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
     assert not node.get_parameter('allow_user_effects').value
 
 
+def test_a_peer_reads_no_files_by_setting_a_model(simulator, tmp_path, tmp_path_factory):
+    """Files elsewhere are not opened, and a message holds nothing of those that are no models."""
+    node = simulator()
+    elsewhere = tmp_path_factory.mktemp('elsewhere') / 'model.yaml'
+    elsewhere.write_text('planar: {K2: 0.3}')
+    (tmp_path / 'link.yaml').symlink_to(elsewhere)
+    for file in (elsewhere, '/etc/passwd', '/dev/zero', tmp_path / 'link.yaml'):
+        (result,) = node.set_parameters(parameters(model_file=str(file)))
+        assert not result.successful
+        assert 'is in no folder that deposition_simulator was given at its start' in result.reason
+    for text in (
+        'secret',
+        'a: &b secret\nb: *b',
+        '- secret',
+        'K2: "secret\n',
+        'planar: secret' * 99,
+    ):
+        (tmp_path / 'model.yaml').write_text(text)
+        (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'model.yaml')))
+        assert not result.successful
+        assert len(result.reason.replace(str(tmp_path), '')) < 300
+        assert 'secret' not in result.reason or text.startswith('planar')
+    node = simulator(input_folders=[str(elsewhere.parent)])
+    assert node.set_parameters(parameters(model_file=str(elsewhere)))[0].successful
+    assert not node.set_parameters(parameters(input_folders=['/']))[0].successful
+
+
 def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted, wait_until,
                                                       set_model):  # fmt: skip
     node = simulator(repaint=False)

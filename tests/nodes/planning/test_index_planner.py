@@ -22,11 +22,12 @@ NARROW = DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, 
 
 
 @pytest.fixture
-def planner(ros_context, spin):
+def planner(ros_context, spin, tmp_path):
     """`planner(**parameters)`: an index planner that runs."""
 
     def planner(**values) -> IndexPlanner:
-        node = IndexPlanner(context=ros_context, parameter_overrides=parameters(**values))
+        chosen = parameters(**{'input_folders': [str(tmp_path)]} | values)
+        node = IndexPlanner(context=ros_context, parameter_overrides=chosen)
         spin(node)
         return node
 

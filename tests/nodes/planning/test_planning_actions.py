@@ -19,12 +19,12 @@ COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
 
 
 @pytest.fixture
-def planner(ros_context, spin):
+def planner(ros_context, spin, tmp_path):
     """`planner(**parameters)`: a planner that runs, and is closed at the end."""
     made = []
 
     def planner(**values) -> IndexPlanner:
-        chosen = parameters(**COARSE | values)
+        chosen = parameters(**COARSE | {'input_folders': [str(tmp_path)]} | values)
         made.append(IndexPlanner(context=ros_context, parameter_overrides=chosen))
         spin(made[-1])
         return made[-1]

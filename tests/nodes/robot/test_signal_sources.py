@@ -12,6 +12,11 @@ from urllib.parse import parse_qs
 import numpy as np
 import pytest
 from asyncua import Server, ua
+from asyncua.crypto.cert_gen import generate_private_key, generate_self_signed_app_certificate
+from asyncua.crypto.permission_rules import User, UserRole
+from cryptography import x509
+from cryptography.hazmat.primitives.serialization import Encoding, NoEncryption, PrivateFormat
+from cryptography.x509.oid import ExtendedKeyUsageOID
 from paint_msgs.msg import AtomizerState
 from websockets.sync.server import serve
 
@@ -46,8 +51,7 @@ class Controller:
     def __init__(self) -> None:
         self.subscribed: dict[str, list[str]] = {}
         self.socket = None
-        self.cookie = ''
-        self.sessions = 0
+        self.cookie, self.host, self.sessions = '', '127.0.0.1', 0
 
     def tell(self, **values: float) -> None:
         self.socket.send(event(**values))
@@ -68,7 +72,7 @@ class Controller:
                 controller.subscribed = parse_qs(body)
                 controller.sessions += 1
                 self.send_response(201)
-                self.send_header('Location', f'ws://127.0.0.1:{port}/poll/1')
+                self.send_header('Location', f'ws://{controller.host}:{port}/poll/1')
                 self.send_header('Set-Cookie', 'ABBCX=21; path=/')
                 self.end_headers()
                 self.wfile.write(event(gun=0, flow=0).encode())
@@ -105,8 +109,8 @@ class Supply:
 
     NAMES = ('Open', 'Voltage')
 
-    def __init__(self, address: str) -> None:
-        self._address = address
+    def __init__(self, address: str, secured: dict | None = None) -> None:
+        self._address, self._secured = address, secured
         self._loop = asyncio.new_event_loop()
         self._nodes: dict = {}
 
@@ -123,8 +127,12 @@ class Supply:
             thread.join()
 
     async def _start(self) -> Server:
-        server = Server()
+        server = Server(user_manager=_OneUser() if self._secured else None)
         await server.init()
+        if self._secured:
+            server.set_security_policy([ua.SecurityPolicyType.Basic256Sha256_SignAndEncrypt])
+            await server.load_certificate(str(self._secured['certificate']))
+            await server.load_private_key(str(self._secured['private_key']))
         server.set_endpoint(self._address)
         space = await server.register_namespace('urn:supply')
         gun = await server.nodes.objects.add_object(space, 'Gun')
@@ -182,6 +190,55 @@ def test_signals_of_a_controller_switch_the_gun(ros_context, spin, states, wait_
         assert controller.sessions == 1
         node.close()
         wait_until(lambda: controller.sessions == 0, what='the end of the session')
+
+
+def test_the_cookie_of_a_controller_goes_to_no_other_host(ros_context, spin, states, wait_until):
+    controller = Controller()
+    controller.host = 'localhost'
+    with controller.running() as url:
+        values = parameters(url=url, trigger='doGun', flow=FLOW)
+        spin(RwsSource(context=ros_context, parameter_overrides=values))
+        wait_until(lambda: states.reports('rws_source: signals', 'another host', b'\x02'))
+        assert controller.cookie == ''
+
+
+class _OneUser:
+    def get_user(self, iserver, username=None, password=None, certificate=None):
+        known = (username, password) == ('cell', 'secret')
+        return User(role=UserRole.User) if known else None
+
+
+def test_a_supply_may_ask_for_a_user_and_encryption(
+    ros_context, spin, states, wait_until, free_port, tmp_path, monkeypatch
+):
+    """The password is in no parameter and in no diagnostics."""
+    files = {kind: tmp_path / f'{kind}.der' for kind in ('certificate', 'private_key')}
+    key = generate_private_key()
+    dump_pem = key.private_bytes(
+        Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()
+    )  # fmt: skip
+    files['private_key'] = tmp_path / 'private_key.pem'
+    files['private_key'].write_bytes(dump_pem)
+    names, host = {'commonName': 'cell'}, socket.gethostname()
+    made = generate_self_signed_app_certificate(
+        key, 'urn:cell', names, [x509.DNSName(host)], [ExtendedKeyUsageOID.CLIENT_AUTH]
+    )
+    files['certificate'].write_bytes(made.public_bytes(Encoding.DER))
+    monkeypatch.setenv('OPCUA_PASSWORD', 'secret')
+    address = f'opc.tcp://127.0.0.1:{free_port}'
+    with Supply(address, files).running():
+        node = OpcuaSource(
+            context=ros_context,
+            parameter_overrides=parameters(
+                url=address, trigger='ns=2;s=Gun.Open', user='cell',
+                security_policy='Basic256Sha256',
+                certificate_file=str(files['certificate']),
+                private_key_file=str(files['private_key']),
+            ),
+        )  # fmt: skip
+        spin(node)
+        wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
+        assert 'secret' not in str(node.values)
 
 
 def test_variables_of_a_material_supply_count_from_their_own_time(
@@ -264,8 +321,13 @@ def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():
 
 @pytest.mark.parametrize(
     ('values', 'words'),
-    [({}, 'trigger is empty'), ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a')],
+    [
+        ({}, 'trigger is empty'),
+        ({'trigger': 'a', 'flow': 'a'}, 'a signal is named twice: a a'),
+        ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
+    ],
 )
 def test_signals_that_are_not_named_are_refused(ros_context, values, words):
-    with pytest.raises(PaintError, match=words):
+    with pytest.raises(PaintError, match=words) as refused:
         RwsSource(context=ros_context, parameter_overrides=parameters(**values))
+    assert 'secret' not in str(refused.value)

@@ -36,6 +36,8 @@ from paint_deposition.api.simulation import (
 from paint_deposition.api.simulation import (
     simulate as simulate,
 )
+from paint_deposition.batch.sweep import Sweep as Sweep
+from paint_deposition.batch.sweep import sweep as sweep
 from paint_deposition.effects.deposition_model import DepositionModel as DepositionModel
 from paint_deposition.errors import PaintError as PaintError
 from paint_deposition.files.campaign_file import read_campaign as read_campaign

@@ -6,6 +6,8 @@ from collections.abc import Iterable, Sequence
 
 # Names less alike than this share, as difflib measures it, are not taken for each other.
 ALIKE = 0.4
+# Letters of a value in a message.
+LONGEST_QUOTED = 60
 
 
 class PaintError(Exception):
@@ -33,7 +35,7 @@ class PlanError(PaintError):
 
 
 class ManyError(PaintError):
-    """A sweep over cases or a line of parts cannot be run."""
+    """A sweep over cases cannot be run."""
 
 
 def require_above_zero(**values: float) -> None:
@@ -47,6 +49,12 @@ def some(names: Sequence[str], most: int) -> str:
     """'a, b and 3 more': so many of the names at most, for a message."""
     more = f' and {len(names) - most} more' if len(names) > most else ''
     return ', '.join(names[:most]) + more
+
+
+def quoted(value: object) -> str:
+    """A value for a message, cut where it is long: it may be the content of another file."""
+    text = repr(value)
+    return text if len(text) <= LONGEST_QUOTED else f'{text[: LONGEST_QUOTED - 3]}...'
 
 
 def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str:

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from paint_deposition.errors import PaintError, PlanError, did_you_mean
+from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
 
 Verb = TypeVar('Verb', bound=Callable)
 # How bounds are said.
@@ -77,7 +77,7 @@ def reason(error: ValidationError, kind: type[BaseModel]) -> str:
     value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
     for long, short in BOUNDS.items():
         remedy = remedy.replace(long, short)
-    shown = f'{value:g}' if isinstance(value, float) else repr(value)
+    shown = f'{value:g}' if isinstance(value, float) else quoted(value)
     field = kind.model_fields.get(str(first['loc'][0]))
     about = f': {field.description}' if field and field.description else ''
     return f'{name} is {shown}; give {remedy}{about}'

@@ -9,6 +9,7 @@ from dataclasses import replace
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import PaintError
 from paint_deposition.files.effect_source import needs_file, source_of
 from paint_deposition.files.model_file import read_model, read_model_file
@@ -182,7 +183,7 @@ def _start(
 ) -> tuple[DepositionModel, Posterior | None, tuple[str, ...]]:
     """The model to start from, by which all parts get paint, what is known of it, warnings."""
     if model is None and campaign.model_file:
-        file = read_model_file(campaign.model_file)
+        file = read_model_file(campaign.model_file, load_unnamed_effect_file)
         model, posterior = file.model, posterior or file.posterior
     given = model or DepositionModel()
     start = with_brushes_of(campaign, given)
@@ -191,4 +192,6 @@ def _start(
 
 
 def _model_of(campaign: Campaign) -> DepositionModel | None:
-    return read_model(campaign.model_file) if campaign.model_file else None
+    if not campaign.model_file:
+        return None
+    return read_model(campaign.model_file, load_unnamed_effect_file)

@@ -1,17 +1,18 @@
 """The results of a command, on the live page."""
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import trimesh
+from pydantic import BaseModel, ValidationError
 
 from paint_deposition.api.inference import compare, compare_models
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
+from paint_deposition.errors import LONGEST_QUOTED, PaintError
+from paint_deposition.files.atomic import read_file, require_file
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import model_of, read_model
 from paint_deposition.files.provenance import model_digest, sha256
@@ -20,9 +21,48 @@ from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_stat
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.live.scene import FIGURES, Scene
+from paint_deposition.report.live.scene import Scene
 
 DIAGNOSIS, COMPARISON, FILM = 'diagnosis.json', 'comparison.json', 'film.ply'
+
+Written = TypeVar('Written', bound=BaseModel)
+
+
+class _File(BaseModel):
+    what: str
+    file: str
+    sha256: str
+
+
+class _MadeFrom(BaseModel):
+    campaign: str
+    models: dict[str, dict[str, Any]] = {}
+    files: list[_File]
+
+
+class _Figures(BaseModel):
+    """Of a comparison or a diagnosis, what is needed to paint its parts again."""
+
+    accepted: list[str] = []
+    provenance: _MadeFrom
+
+
+class _Statistics(BaseModel, allow_inf_nan=False):
+    """Of a film, what is shown beside it."""
+
+    mesh_file: str = ''
+    down: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    painted_above_um: float = DEFAULT_PAINTED_ABOVE_UM
+    target_um: float = 0.0
+    target_tolerance_um: float = 0.0
+    mean_um: float | None = None
+    std_dev_um: float | None = None
+    min_um: float | None = None
+    max_um: float | None = None
+    coverage: float | None = None
+    within_target: float | None = None
+    painted_volume_cm3: float | None = None
+    capture_fraction: float | None = None
 
 
 def is_results(folder: Path) -> bool:
@@ -40,26 +80,25 @@ def results_scenes(folder: Path) -> tuple[list[Scene], list[str]]:
         PaintError: what the results were made from is not there, or cannot be read.
     """
     if (folder / DIAGNOSIS).is_file():
-        figures = _read(folder / DIAGNOSIS)
-        after = ' + '.join(['after', *figures['accepted']])
+        figures = _read(_Figures, folder / DIAGNOSIS)
+        after = ' + '.join(['after', *figures.accepted])
         models = {
-            'before': read_model(folder / 'model_before.yaml'),
-            after: read_model(folder / 'model.yaml'),
+            'before': read_model(folder / 'model_before.yaml', load_unnamed_effect_file),
+            after: read_model(folder / 'model.yaml', load_unnamed_effect_file),
         }
     elif (folder / COMPARISON).is_file():
-        figures = _read(folder / COMPARISON)
-        described = figures['provenance']['models'].items()
+        figures = _read(_Figures, folder / COMPARISON)
+        described = figures.provenance.models.items()
         models = {name: _model(folder, name, values) for name, values in described}
     else:
         return [_written_film(folder)], []
-    made_from = figures['provenance']
-    path = Path(made_from['campaign'])
+    path = Path(figures.provenance.campaign)
     if not path.is_file():
         raise PaintError(
             f'{folder}: its campaign {path} is not there; run the command in the folder in which '
             'the results were made'
         )
-    changed = [f['file'] for f in made_from['files'] if not _unchanged(f)]
+    changed = [f.file for f in figures.provenance.files if not _unchanged(f)]
     warnings = [f'{file} is not what {folder} was made from' for file in changed]
     campaign = read_campaign(path)
     if len(models) == 1:
@@ -113,43 +152,51 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
 
 def _written_film(folder: Path) -> Scene:
     """The film that a command wrote, with its figures."""
-    mesh = trimesh.load_mesh(folder / FILM, process=False)
-    film_um = mesh.metadata['_ply_raw']['vertex']['data']['thickness_um']
+    require_file(folder / FILM, PaintError)
+    try:
+        mesh = trimesh.load_mesh(folder / FILM, process=False)
+        film_um = mesh.metadata['_ply_raw']['vertex']['data']['thickness_um']
+    except Exception as error:  # trimesh raises whatever the broken bytes provoke
+        reason = ' '.join(str(error).split())[:LONGEST_QUOTED]
+        raise PaintError(f'{folder / FILM} is no film ({reason}); make it again') from None
     written = folder / 'stats.json'
-    figures = _read(written) if written.is_file() else {}
+    figures = _read(_Statistics, written) if written.is_file() else _Statistics()
     surface = Surface(
         np.asarray(mesh.vertices, float), np.asarray(mesh.faces), np.asarray(mesh.vertex_normals),
-        np.ones(len(mesh.vertices)), np.array(figures.get('down', [0.0, 0.0, -1.0])),
+        np.ones(len(mesh.vertices)), np.array(figures.down),
     )  # fmt: skip
     scene = Scene()
     scene.show_part(surface)
-    scene.tell('about', text=Path(figures.get('mesh_file', folder)).name)
+    scene.tell('about', text=Path(figures.mesh_file or folder).name)
     scene.show_scale(
-        film_scale(film_um), figures.get('painted_above_um', DEFAULT_PAINTED_ABOVE_UM),
-        figures.get('target_um', 0.0), figures.get('target_tolerance_um', 0.0),
+        film_scale(film_um), figures.painted_above_um, figures.target_um,
+        figures.target_tolerance_um,
     )  # fmt: skip
     scene.show_film(film_um)
-    if 'mean_um' in figures:
-        scene.add_figures(0.0, SimpleNamespace(**{name: figures[name] for name in FIGURES}))
+    if figures.mean_um is not None:
+        scene.add_figures(0.0, figures)
     return scene
 
 
 def _model(folder: Path, name: str, values: dict[str, Any]) -> DepositionModel:
     """The model that a comparison says it was made with."""
     model = model_of({key: value for key, value in values.items() if key != 'sha256'})
-    if model_digest(model) != values['sha256']:
+    if model_digest(model) != values.get('sha256'):
         raise PaintError(
             f'{folder}: its {COMPARISON} does not describe the model {name} in full; compare again'
         )
     return model
 
 
-def _unchanged(file: dict[str, str]) -> bool:
-    return Path(file['file']).exists() and sha256(file['file']) == file['sha256']
+def _unchanged(file: _File) -> bool:
+    return Path(file.file).exists() and sha256(file.file) == file.sha256
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(kind: type[Written], path: Path) -> Written:
     try:
-        return json.loads(path.read_text(encoding='utf-8'))
-    except ValueError as error:
-        raise PaintError(f'{path} is no JSON: {error}; make the results again') from None
+        return kind.model_validate_json(read_file(path, PaintError))
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = '.'.join(map(str, first['loc'])) or 'JSON'
+        reason = f'{where}: {first["msg"]}'
+        raise PaintError(f'{path} is not as paint writes it ({reason}); make it again') from None

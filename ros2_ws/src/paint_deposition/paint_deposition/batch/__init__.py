@@ -1,1 +1,1 @@
-"""Many cases and many parts: processes, sweeps, lines."""
+"""Sweeps: many cases, by Dask or any other executor."""

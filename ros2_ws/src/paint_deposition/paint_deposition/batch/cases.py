@@ -1,6 +1,6 @@
-"""Cases of a sweep or a line: what each is computed from, and a cache of their results on disk.
+"""Cases of a sweep, computed by an executor; each result is kept as soon as it is there.
 
-The cache is our own: joblib's keeps pickles under a digest of the function's text alone, while
+The files are our own: joblib keeps pickles under a digest of the function's text alone, while
 these are Parquet tables that a user opens, found again only by the same code of the whole package.
 """
 
@@ -8,23 +8,37 @@ from __future__ import annotations
 
 import hashlib
 import io
+import logging
+import os
 import pickle
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
-from functools import cache
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor, as_completed
+from contextlib import AbstractContextManager, contextmanager
+from dataclasses import dataclass
+from functools import cache, lru_cache, partial
+from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
+from socket import gethostname
 from typing import TYPE_CHECKING, Any
 
 import paint_deposition
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.user_effects import effect_of
+from paint_deposition.errors import ManyError
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.parquet import write_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from distributed import Client
 
 Columns = Mapping[str, Any]
+# How long a scheduler may take to answer, and to have a worker.
+CONNECT_S = 30
+# Inputs that a worker keeps in memory.
+INPUTS_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -35,43 +49,117 @@ class Case:
     parameters: Any  # of this case alone, small
     # Names of what it shares with other cases, such as a part or a motion.
     inputs: tuple[str, ...] = ()
-    # Columns of its row that need no computation.
-    known: Mapping[str, Any] = field(default_factory=dict)
 
 
-@dataclass(frozen=True)
-class ResultCache:
-    """A folder of results, a Parquet file for each case: a run that was cut off is resumed."""
+def compute(
+    work: Callable[..., Columns],
+    cases: Sequence[Case],
+    inputs: Mapping[str, Any],
+    folder: Path,
+    executor: AbstractContextManager[Executor | Client],
+    progress: Callable[[str, float], None],
+) -> tuple[pa.Table, int]:
+    """Compute the cases that are not finished yet.
 
-    folder: Path  # of the files, each written as a whole
-    # Columns of cases that could not be computed; the next run tries them again.
-    failures: dict[str, Columns] = field(default_factory=dict)
+    A case that ends its workers again and again, or fails in an unforeseen way, has the reason in
+    its column ``error`` and is tried again by the next run.
 
-    def has(self, digest: str) -> bool:
-        """Whether the result of a case is stored."""
-        return self._path(digest).is_file()
+    Args:
+        work: a function of a module: (parameters, *inputs of the case) -> equally long columns.
+        cases: in any order; of several with one digest, one is run.
+        inputs: by name.
+        folder: of finished cases, a Parquet file for each, written as a whole.
+        executor: what computes them; entered where a case is left.
+        progress: called with what is being done and the share of it that is done.
 
-    def add(self, digest: str, columns: Columns) -> None:
-        """Keep the result of a case: equally long columns by name."""
-        import pyarrow as pa
+    Returns:
+        The rows of all cases in their order, and how many were computed now. Columns that a case
+        lacks are empty in its rows.
 
-        write_parquet(self._path(digest), pa.table(dict(columns)))
+    Raises:
+        ManyError: another command uses the folder, a worker has other code, or the scheduler is
+            lost. What is finished is kept.
+    """
+    import pyarrow as pa
+    import pyarrow.parquet as pq
 
-    def table(self, digests: Iterable[str]) -> pa.Table:
-        """These cases, one after the other; columns that a case lacks are empty in its rows."""
-        import pyarrow as pa
-        import pyarrow.parquet as pq
+    files = {case.digest: folder / f'{case.digest}.parquet' for case in cases}
+    failures = {}
+    with _used_alone(folder):
+        left = {c.digest: c for c in cases if not files[c.digest].is_file()}
+        done = len(cases) - len(left)
+        for digest, future in _finished(work, left, inputs, executor) if left else ():
+            try:
+                write_parquet(files[digest], pa.table(dict(future.result())))
+            except CancelledError:
+                raise ManyError(
+                    'the scheduler is lost; finished cases are kept, run the same command again'
+                ) from None
+            except ManyError:
+                raise
+            except Exception as error:
+                failure = f'not computed: {type(error).__name__}: {" ".join(str(error).split())}'
+                failures[digest] = pa.table({'error': [failure]})
+            done += 1
+            progress(f'{done} of {len(cases)} cases', done / len(cases))
+        rows = [failures.get(c.digest) or pq.read_table(files[c.digest]) for c in cases]
+    return pa.concat_tables(rows, promote_options='permissive'), len(left)
 
-        parts = [
-            pa.table(dict(self.failures[digest]))
-            if digest in self.failures
-            else pq.read_table(self._path(digest))
-            for digest in digests
-        ]
-        return pa.concat_tables(parts, promote_options='permissive')
 
-    def _path(self, digest: str) -> Path:
-        return self.folder / f'{digest}.parquet'
+@contextmanager
+def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[Client | Executor]:
+    """Connect to a scheduler of Dask, or start processes of one thread that end with the block.
+
+    Without Dask, this process computes, a case at a time.
+
+    Args:
+        scheduler: address, 'tcp://10.0.0.5:8786'; default: that of Dask's own settings, such as
+            the variable DASK_SCHEDULER_ADDRESS, unless there is a count.
+        count: of processes on this machine; default: one a core that this process may use.
+
+    Raises:
+        ManyError: no scheduler answers, or it has no worker.
+    """
+    if find_spec('distributed') is None:
+        with ThreadPoolExecutor(1) as pool:
+            yield pool
+        return
+    import dask
+    from distributed import Client, LocalCluster
+    from distributed.utils import silence_logging_cmgr
+
+    if scheduler is None and count is None:
+        scheduler = dask.config.get('scheduler-address', None)
+    if scheduler is None:
+        # A case for each worker and no more in store: a case that ends its worker is blamed alone.
+        with (
+            dask.config.set({'distributed.scheduler.worker-saturation': 1.0}),
+            LocalCluster(
+                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None,
+                silence_logs=logging.CRITICAL, env={'NUMBA_NUM_THREADS': '1'},
+            ) as cluster,
+            Client(cluster) as client,
+        ):  # fmt: skip
+            yield client
+        return
+    # What is lost or refused becomes an error of one line.
+    with silence_logging_cmgr(logging.CRITICAL):
+        try:
+            client = Client(scheduler, timeout=CONNECT_S)
+        except (OSError, TimeoutError, ValueError) as error:
+            raise ManyError(
+                f'no scheduler answers at {scheduler} ({type(error).__name__}); start one with '
+                '`dask scheduler`'
+            ) from None
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=CONNECT_S)
+            except TimeoutError:
+                raise ManyError(
+                    f'the scheduler at {scheduler} has no worker; start one for each core with '
+                    f'`dask worker {scheduler} --nthreads 1`'
+                ) from None
+            yield client
 
 
 def digest_of(*values: Any) -> str:
@@ -81,16 +169,87 @@ def digest_of(*values: Any) -> str:
 
 @cache
 def code_digest() -> str:
-    """The same for the package's version and all its sources."""
+    """The same for all sources of the package and the versions of what computes its films."""
     package = Path(paint_deposition.__file__).parent
     digest = hashlib.sha256(paint_deposition.__version__.encode())
+    for library in ('numba', 'numpy', 'scipy'):
+        digest.update(version(library).encode())
     for file in sorted(package.rglob('*.py')):
         digest.update(str(file.relative_to(package)).encode())
         digest.update(file.read_bytes())
     return digest.hexdigest()[:32]
 
 
-def serialised(value: Any) -> bytes:
+@contextmanager
+def _used_alone(folder: Path) -> Iterator[None]:
+    """Refuse a folder that another command uses; the system frees it when a command dies."""
+    from fcntl import LOCK_EX, LOCK_NB, flock
+
+    folder.mkdir(parents=True, exist_ok=True)
+    descriptor = os.open(folder, os.O_RDONLY)
+    try:
+        try:
+            flock(descriptor, LOCK_EX | LOCK_NB)
+        except BlockingIOError:
+            raise ManyError(
+                f'{folder} is in use by another command; wait for it, or choose another --output'
+            ) from None
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _finished(
+    work: Callable[..., Columns],
+    cases: Mapping[str, Case],
+    inputs: Mapping[str, Any],
+    executor: AbstractContextManager[Any],
+) -> Iterator[tuple[str, Future]]:
+    """Submit the cases by their digests, and return each when it is done."""
+    futures: dict[Future, str] = {}
+    with executor as pool:
+        place: Callable[[bytes], Any] = bytes
+        if hasattr(pool, 'get_executor'):
+            # Dask sends the result of a task to each worker once, and computes it again where the
+            # only worker that holds it dies.
+            place, pool = partial(pool.submit, bytes, pure=False), pool.get_executor(pure=False)
+        names = {name for case in cases.values() for name in case.inputs}
+        with warnings.catch_warnings():
+            warnings.simplefilter('ignore')  # of Dask: inputs are large
+            placed = {name: place(_serialised(inputs[name])) for name in names}
+        try:
+            for case in cases.values():
+                given = (placed[name] for name in case.inputs)
+                future = pool.submit(
+                    _run_case, code_digest(), work, _serialised(case.parameters), *given
+                )
+                futures[future] = case.digest
+            for future in as_completed(list(futures)):
+                yield futures.pop(future), future
+        finally:
+            for future in futures:
+                future.cancel()
+
+
+def _run_case(
+    code: str, work: Callable[..., Columns], parameters: bytes, *inputs: bytes
+) -> Columns:
+    """Compute a case in a worker, which may have joined at any time."""
+    if code != code_digest():  # films are the same only by the same code
+        raise ManyError(
+            f'a worker on {gethostname()} has another paint_deposition '
+            f'({paint_deposition.__version__}), Numba, NumPy or SciPy; install the same there'
+        )
+    return work(pickle.loads(parameters), *map(_deserialised, inputs))
+
+
+@lru_cache(maxsize=INPUTS_KEPT)
+def _deserialised(content: bytes) -> Any:
+    """An input; what it caches, such as a search tree, serves the next case too."""
+    return pickle.loads(content)
+
+
+def _serialised(value: Any) -> bytes:
     """Bytes that ``pickle.loads`` opens elsewhere; the files of users' effects run there."""
     content = io.BytesIO()
     _EffectPickler(content, protocol=5).dump(value)

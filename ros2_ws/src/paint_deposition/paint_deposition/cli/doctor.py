@@ -6,7 +6,6 @@ import json
 import os
 import platform
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
@@ -76,7 +75,9 @@ def _findings() -> Iterator[Finding]:
             yield from look()
         except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
             name = look.__name__.strip('_').replace('_', ' ')
-            remedy = 'pip install --force-reinstall paint_deposition'
+            remedy = (
+                'install it again: pip install --force-reinstall ./ros2_ws/src/paint_deposition'
+            )
             if 'cannot cache' in str(error):
                 remedy = 'set NUMBA_CACHE_DIR to a folder that can be written'
             yield Finding(name, f'{type(error).__name__}: {error}', False, remedy)
@@ -103,8 +104,7 @@ def _libraries() -> Iterator[Finding]:
 
 
 def _ros() -> Iterator[Finding]:
-    command = [sys.executable, '-c', ASK_ROS]
-    asked = subprocess.run(command, capture_output=True, text=True, timeout=60)
+    asked = subprocess.run(options.python(ASK_ROS), capture_output=True, text=True, timeout=60)
     if asked.returncode:
         said = asked.stderr.strip().splitlines() or [f'ended with exit code {asked.returncode}']
         yield Finding('ROS 2', said[-1], None, ROS_REMEDY)

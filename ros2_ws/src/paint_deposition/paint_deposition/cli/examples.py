@@ -11,7 +11,6 @@ EXAMPLES = {
     'diagnose': 'measured_door/campaign.yaml --model bell/model.yaml -o found',
     'refit': 'measured_door/campaign.yaml --add incidence_attraction -o refitted',
     'sweep': 'my_sweep.yaml -o swept',
-    'line': 'my_line -o monitored',
     'locate': '--touched my_touched.csv --points my_points.csv',
     'inspect': 'door_horizontal --mesh door.stl --out door.png',
     'recover': 'my_broken_run -o recovered',

@@ -33,6 +33,7 @@ from paint_deposition.planning.requests import ImproveRequest
 @options.motion_options
 @options.PAINT_MOVES
 @options.JOINT_ACCELERATION
+@options.ALLOW_EFFECTS
 @options.results_options(
     'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
 )

@@ -47,6 +47,7 @@ def _run(
         begins_with: what of the model's file the verb takes.
         fitted: what happens to the model, for the line on it; words: that line, if it is another.
     """
+    from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
     def remark(kind: str, experiment: str, line: str) -> None:
@@ -55,7 +56,8 @@ def _run(
     with Progress(command) as show:
         data = pd.read_campaign(campaign, show, part_pose, remark, zones_file)
         chosen = Path(model_file or data.model_file or '')
-        start = read_model_file(chosen) if chosen.name else None
+        load = load_effect_file if model_file else load_unnamed_effect_file
+        start = read_model_file(chosen, load) if chosen.name else None
         known = {name: getattr(start, name, None) for name in begins_with}
         result = verb(data, progress=show, **known)
         show('writing')
@@ -79,6 +81,7 @@ def _run(
 @MODEL
 @options.seed_option('the starts of the fit')
 @options.PART_POSE
+@options.ALLOW_EFFECTS
 @options.results_options('model.yaml, calibration.json and pictures')
 def calibrate_command(seed: int, **given: Any) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
@@ -127,6 +130,7 @@ def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
     "campaign's.",
 )  # fmt: skip
 @options.PART_POSE
+@options.ALLOW_EFFECTS
 @RESULTS
 def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     """Compare the model with the gauge readings of CAMPAIGN and show where it is off.
@@ -193,6 +197,7 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
 )  # fmt: skip
 @SEED
 @options.PART_POSE
+@options.ALLOW_EFFECTS
 @RESULTS
 def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) -> None:
     """Find out which physical effect the model of CAMPAIGN lacks, if any, and add it.
@@ -223,6 +228,7 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
 @MODEL
 @SEED
 @options.PART_POSE
+@options.ALLOW_EFFECTS
 @RESULTS
 def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any) -> None:
     """Add an effect to the model, refit it to CAMPAIGN and show the error before and after.

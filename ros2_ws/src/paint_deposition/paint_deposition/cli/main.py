@@ -2,6 +2,7 @@
 
 import importlib
 import os
+import signal
 import sys
 
 import click
@@ -29,7 +30,6 @@ COMMANDS = {
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and refit.'),
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
-    'line': ('batch', 'Pool many parts over days: what they share and what changes.'),
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('locate', 'Find the pose of the part from touched points.'),
     'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
@@ -106,8 +106,20 @@ def paint(context: click.Context) -> None:
 
 
 def main(arguments: list[str] | None = None) -> None:
-    """Run a command: exit code 0, 2 with one line on stderr for bad input, 130 for Ctrl-C."""
+    """Run a command: exit code 0, 2 with one line on stderr for bad input, 130 for Ctrl-C.
+
+    SIGTERM and SIGHUP end a command as Ctrl-C does, unless they are ignored, as under nohup.
+    """
+    for name in ('SIGTERM', 'SIGHUP'):
+        number = getattr(signal, name, None)
+        if number and signal.getsignal(number) == signal.SIG_DFL:
+            signal.signal(number, _interrupt)
     sys.exit(run(arguments))
+
+
+def _interrupt(number: int, frame: object) -> None:
+    signal.signal(number, signal.SIG_IGN)  # a second one does not disturb the tidying up
+    raise KeyboardInterrupt
 
 
 def run(arguments: list[str] | None = None) -> int:
@@ -119,6 +131,8 @@ def run(arguments: list[str] | None = None) -> int:
         return _refuse(text)
     except OSError as error:
         return _refuse(f'{error.filename or "output"}: {error.strerror or error}')
+    except MemoryError:
+        return _refuse('there is not enough memory; give smaller files, or a machine with more')
     except (click.Abort, KeyboardInterrupt):
         click.echo('paint: interrupted', err=True)
         return 130

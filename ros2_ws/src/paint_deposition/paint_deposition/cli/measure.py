@@ -32,6 +32,7 @@ HARDLY = 0.15
 @options_of(FilmBuild, into='passes')
 @options.motion_options
 @options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
 @options.results_options('points.csv, poses.csv, points.png and measure.json')
 def measure_command(
     request: MeasureRequest,

@@ -31,27 +31,31 @@ class ChosenModel:
         return model.with_brush(self.brush) if self.brush else model
 
 
-def chosen_model(given: Path | None, brush: int = 0) -> ChosenModel:
-    """The model named with --model, else the default; brush: that of --brush, 0 for none."""
+def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> ChosenModel:
+    """The model of a file, else the default; brush: that of --brush, 0 for none.
+
+    A file that is not ``named`` by the user, but by a recording, runs no effect files unasked.
+    """
+    from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
     if given is None:
         return ChosenModel(None, None, 'default, a 50 mm bell; --model gives another', brush)
-    file = read_model_file(given)
+    file = read_model_file(given, load_effect_file if named else load_unnamed_effect_file)
     words = model_words(given, file) + (f', brush {brush}' if brush else '')
     return ChosenModel(file, given, words, brush)
 
 
-def model_for(given: Path | None, motion: Path) -> ChosenModel:
-    """The model named with --model, else the one that the motion was planned with, else a bell.
+def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenModel:
+    """The model of a file, else the one that the motion was planned with, else a bell.
 
-    Warnings about it go to stderr.
+    ``named`` is as for ``chosen_model``. Warnings go to stderr.
     """
     from paint_deposition.files.planned_model import planned_model
     from paint_deposition.files.provenance import model_digest
 
     planned = planned_model(motion)
-    chosen = chosen_model(given)
+    chosen = chosen_model(given, named=named)
     if planned is None:
         return chosen
     if chosen.file is not None:
@@ -60,18 +64,19 @@ def model_for(given: Path | None, motion: Path) -> ChosenModel:
         if planned.digest not in map(model_digest, alike):
             print_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
         return chosen
-    if planned.file is None:
+    file = planned.file()
+    if file is None:
         print_all('warning', [
             f'{motion} was planned with a model ({planned.digest[:12]}) that is not in '
             f'{planned.path}; give it with --model, or the film is another one than planned'
         ])  # fmt: skip
         return chosen
-    words = f'that of the plan, {model_words(planned.path, planned.file)}'
-    return ChosenModel(planned.file, planned.path, words)
+    words = f'that of the plan, {model_words(planned.path, file)}'
+    return ChosenModel(file, planned.path, words)
 
 
 def models_for(
-    given: Sequence[Path], motions: Sequence[Path], guns: Sequence[str]
+    given: Sequence[Path], motions: Sequence[Path], guns: Sequence[str], named: bool = True
 ) -> list[ChosenModel]:
     """The model of each gun: one of those named with --model, else as ``model_for`` has it.
 
@@ -87,7 +92,7 @@ def models_for(
         )
     files = [*given] if len(given) == len(guns) else [*given, None][:1] * len(guns)
     each = motions if len(motions) == len(guns) else [motions[0]] * len(guns)
-    chosen = [model_for(*pair) for pair in zip(files, each, strict=True)]
+    chosen = [model_for(*pair, named) for pair in zip(files, each, strict=True)]
     names = [f'{gun}: ' if len(given) > 1 else '' for gun in guns]
     return [replace(m, words=name + m.words) for name, m in zip(names, chosen, strict=True)]
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
@@ -142,6 +143,18 @@ def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> li
     return list(given)
 
 
+def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> None:
+    if given:
+        from paint_deposition.effects.user_effects import effects_allowed
+
+        token = effects_allowed.set(True)
+        ctx.call_on_close(lambda: effects_allowed.reset(token))
+
+
+ALLOW_EFFECTS = click.option(
+    '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
+    help='Run the Python code of effect files that recordings, results or campaigns name, too.',
+)  # fmt: skip
 MAX_POSE_GAP = click.option(
     '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
     help='A longer interval between poses is a gap, in which the gun is off.',
@@ -282,6 +295,12 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
     return grouped(options, 'part')
 
 
+def python(code: str, *words: str) -> list[str]:
+    """The command of another Python that runs code and takes no module from this folder."""
+    head = 'import sys; sys.path[:] = filter(None, sys.path); '
+    return [sys.executable, '-c', head + code, *words]
+
+
 def print_all(label: str, lines: Iterable[str]) -> None:
     """Print each line behind its label on stderr: notes, warnings."""
     for line in lines:
@@ -322,8 +341,8 @@ def results_options(what: str, default: str | None = None) -> Callable[[Callable
     """A command takes ``Results``; their folder is to be named where there is no default."""
     text = (
         f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
-        'into it are removed; other files in it are kept, unless a result has their name. Nothing '
-        'is changed before all results are complete.'
+        'into it are removed; other files in it are kept as they are. Nothing is changed before '
+        'all results are complete.'
     )
     options = (
         click.option('-o', '--output', type=FOLDER, required=default is None, default=default,

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 @options.model_option('Model that says where the spray goes; default: a 50 mm bell.')
 @options.motion_options
 @options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
 @options.JSON
 def inspect_command(
     recording: Path | None,

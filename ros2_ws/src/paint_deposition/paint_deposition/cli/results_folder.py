@@ -1,14 +1,18 @@
 """A folder of results that appears, or takes the place of an older one, as a whole."""
 
+import hashlib
 import shutil
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from contextlib import contextmanager, suppress
+from pathlib import Path, PurePosixPath
+
+from filelock import FileLock
 
 from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import write_text
 
-# In every folder of results: the names of what the last command wrote there, one a line.
+# In every folder of results: the files that the last command wrote there, one a line.
 MARKER = '.paint_results'
 
 
@@ -16,42 +20,118 @@ MARKER = '.paint_results'
 def results_in(folder: Path) -> Iterator[Path]:
     """Give an empty folder to write to; when all is written, its content moves to ``folder``.
 
-    What an earlier command wrote there is removed. Other files stay, unless a result has their
-    name. Work that fails or is interrupted leaves the folder as it was.
+    What an earlier command wrote there is removed; other files stay. Work that fails or is
+    interrupted leaves the folder as it was; what a killed command left is put right first. Another
+    command waits until this one has written.
 
     Raises:
-        PaintError: a folder that no command made has the name of a result.
+        PaintError: what no command wrote has the name of a result, or lies among former results.
     """
     folder = folder.resolve()
-    folder.parent.mkdir(parents=True, exist_ok=True)
-    work = Path(tempfile.mkdtemp(dir=folder.parent, prefix=f'.{folder.name}-'))
-    try:
-        yield work
-        _move(work, folder)
-    finally:
-        shutil.rmtree(work)
+    # The temporary folder of this machine: a lock beside the results would stay there.
+    key = hashlib.sha256(f'{Path.home()} {folder}'.encode()).hexdigest()[:16]
+    with FileLock(Path(tempfile.gettempdir()) / f'paint-{key}.lock'):
+        place = _Place(folder)
+        place.put_right()
+        made = [parent for parent in folder.parents if not parent.exists()]
+        place.work.mkdir(parents=True)
+        try:
+            yield place.work
+            place.replace()
+        finally:
+            place.put_right()
+            with suppress(OSError):  # it is not empty any more
+                for parent in made:
+                    parent.rmdir()
 
 
-def _move(work: Path, folder: Path) -> None:
-    """Replace the former results. An interruption in between is made good by the next run."""
-    folder.mkdir(exist_ok=True)
+class _Place:
+    """A folder of results and, beside it, the work folder and the former results."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.work, self.former = (
+            folder.with_name(f'.{folder.name}.paint_{what}') for what in ('work', 'former')
+        )
+
+    def replace(self) -> None:
+        """Put the former results aside, by one rename where nothing else is there; the new in."""
+        old, new = _written(self.folder), _files_below(self.work)
+        present = {path.name for path in self.folder.iterdir()} if self.folder.exists() else set()
+        ours = _tops(old | new)
+        for name in sorted(ours & present):
+            path = self.folder / name
+            held = {f'{name}/{file}' for file in _files_below(path)} if _is_tree(path) else {name}
+            for strange in sorted(held - old):
+                raise PaintError(
+                    f'{self.folder / strange} was not written by paint; move it away, or choose '
+                    'another --output'
+                )
+        if not self.folder.exists() or (
+            MARKER in present <= ours | {MARKER} and not Path.cwd().is_relative_to(self.folder)
+        ):
+            self._mark(self.work, new)
+            with suppress(FileNotFoundError):
+                shutil.copymode(self.folder, self.work)
+                self.folder.rename(self.former)
+            self.work.rename(self.folder)
+            return
+        self._mark(self.folder, old | new)
+        self.former.mkdir()
+        self._mark(self.former, old)
+        for name in sorted(ours & present):
+            (self.folder / name).rename(self.former / name)
+        for path in sorted(self.work.iterdir()):
+            path.rename(self.folder / path.name)
+        self.former.rename(self.work / 'former')  # from here on the new results count
+        self._mark(self.folder, new)
+
+    def put_right(self) -> None:
+        """Bring back former results unless the new ones count, and remove the rest."""
+        if _is_tree(self.former) and not self.folder.exists():
+            self.former.rename(self.folder)
+        if _is_tree(self.work) and (self.former / MARKER).is_file():
+            old = _tops(_written(self.former))
+            for name in _tops(_written(self.folder)):
+                is_new = name not in old or (self.former / name).exists()
+                if is_new and (self.folder / name).exists():
+                    (self.folder / name).rename(self.work / name)
+            for path in sorted(self.former.iterdir(), reverse=True):  # its marker last
+                path.replace(self.folder / path.name)
+        for path in (self.former, self.work):
+            if _is_tree(path):
+                shutil.rmtree(path)
+
+    def _mark(self, folder: Path, files: set[str]) -> None:
+        """Name the files in the marker of a folder, by way of the work folder."""
+        copy = self.work / f'{MARKER}_copy'
+        write_text(copy, ''.join(f'{name}\n' for name in sorted(files)))
+        copy.replace(folder / MARKER)
+
+
+def _written(folder: Path) -> set[str]:
+    """The files that the marker of a folder names, which anyone can edit: those in it only."""
     marker = folder / MARKER
-    former = marker.read_text(encoding='utf-8').splitlines() if marker.exists() else []
-    fresh = sorted(path.name for path in work.iterdir())
-    for name in fresh:
-        if (folder / name).is_dir() and name not in former:
-            raise PaintError(
-                f'{folder / name} is a folder that was not written by paint; move it away, or '
-                'choose another --output'
-            )
-    marker.write_text('\n'.join(sorted({*former, *fresh})) + '\n', encoding='utf-8')
-    for name in former:
-        # Only names beside the marker: it is a file that anyone can edit.
-        old = folder / Path(name).name
-        if old.is_dir():
-            shutil.rmtree(old)
-        else:
-            old.unlink(missing_ok=True)
-    for name in fresh:
-        (work / name).replace(folder / name)
-    marker.write_text('\n'.join(fresh) + '\n', encoding='utf-8')
+    text = marker.read_text(encoding='utf-8', errors='replace') if marker.is_file() else ''
+    paths = map(PurePosixPath, filter(str.isprintable, text.splitlines()))
+    plain = (
+        p for p in paths if p.parts and not p.is_absolute() and not {'..', MARKER} & {*p.parts}
+    )
+    return set(map(str, plain))
+
+
+def _tops(files: set[str]) -> set[str]:
+    """The names in the folder itself."""
+    return {PurePosixPath(name).parts[0] for name in files}
+
+
+def _files_below(folder: Path) -> set[str]:
+    """All that is no folder, by its path from the folder."""
+    return {
+        path.relative_to(folder).as_posix() for path in folder.rglob('*') if not _is_tree(path)
+    }
+
+
+def _is_tree(path: Path) -> bool:
+    """Whether it is a folder itself, and no link to one."""
+    return path.is_dir() and not path.is_symlink()

@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 @click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
               help='Accepted difference from the target, either way [µm].')  # fmt: skip
 @options.ZONES
+@options.ALLOW_EFFECTS
 @options.results_options('film.ply, film.csv, stats.json and film.png')
 def simulate_command(
     part: dict[str, Any],

@@ -7,8 +7,10 @@ from pathlib import Path
 
 import click
 
-from paint_deposition.cli.options import FILE
+from paint_deposition.cli.options import FILE, python
 from paint_deposition.errors import PaintError
+
+RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
 
 
 @click.command('view')
@@ -24,4 +26,4 @@ def view_command(run: Path) -> None:
         raise PaintError(f'{run}: no .mcap file; give a run that run_recorder recorded')
     if find_spec('rerun') is None:
         raise PaintError('Rerun is not installed; run: pip install rerun-sdk')
-    sys.exit(subprocess.run([sys.executable, '-m', 'rerun', *map(str, files)]).returncode)
+    sys.exit(subprocess.run(python(RERUN, *map(str, files))).returncode)

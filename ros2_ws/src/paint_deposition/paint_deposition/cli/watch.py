@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from threading import Event
@@ -15,12 +14,12 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import models_for
 from paint_deposition.cli.progress import Progress
-from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
+from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
 
-NODE = 'import sys; from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
+NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
 
 
 @click.command('watch')
@@ -42,10 +41,14 @@ NODE = 'import sys; from paint_deposition.nodes.executables import web_view; sys
 @click.option('--port', default=DEFAULT_PORT, show_default=True, type=click.IntRange(0, 65535),
               help='Port to listen on; 0: one that is free.')  # fmt: skip
 @click.option(
-    '--token', default='', help='Token that browsers must give; default: made if needed.'
+    '--token',
+    default='',
+    envvar=TOKEN,
+    help=f'Token that browsers must give; default: that in the environment, {TOKEN}, or made.',
 )
 @options.motion_options
 @options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
 def watch_command(
     run: Path | None,
     live: bool,
@@ -73,8 +76,8 @@ def watch_command(
         _start_node({
             'mesh_file': part['path'], 'mesh_scale': part['scale'],
             'max_edge_length_m': part['max_edge_length_m'], 'target_um': given['target_um'],
-            'target_tolerance_um': given['tolerance_um'], **at,
-        })  # fmt: skip
+            'target_tolerance_um': given['tolerance_um'], 'host': host, 'port': port,
+        }, token)  # fmt: skip
     assert run is not None
     with Progress('watch') as show:
         show('loading')
@@ -117,7 +120,7 @@ def _replay(
     source = checked(MotionSource, 'motion', motion, pd.PaintError)
     guns = read_gun_motions([run], source)
     files = [file for file in (model_file or named,) if file]
-    chosen = models_for(files, [run], [gun.name for gun in guns])
+    chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)
     show('refining the mesh')
     surface = pd.read_mesh(**part | {'path': Path(mesh)})
     replay = Replay(surface, guns, [model.model for model in chosen], **given)
@@ -137,8 +140,10 @@ def _serve(page: Page, work: Callable[[Event], object]) -> None:
         page.close()
 
 
-def _start_node(parameters: dict[str, object]) -> None:
-    """Become the node `web_view`, which says what it needs."""
+def _start_node(parameters: dict[str, object], token: str) -> None:
+    """Become the node `web_view`, which says what it needs; others can read its words."""
+    os.environ[TOKEN] = token
     words = [w for name, value in parameters.items() if value not in ('', None)
              for w in ('-p', f'{name}:={value}')]  # fmt: skip
-    os.execv(sys.executable, [sys.executable, '-c', NODE, '--ros-args', *words])
+    command = options.python(NODE, '--ros-args', *words)
+    os.execv(command[0], command)

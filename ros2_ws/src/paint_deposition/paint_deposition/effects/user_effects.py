@@ -7,6 +7,7 @@ import re
 import sys
 import traceback
 from collections.abc import Callable
+from contextvars import ContextVar
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -29,6 +30,9 @@ PLACES = (*LAWS, 'on_path', 'on_film', 'on_gauge', 'shadow')
 # A ray on which laws are tried out: at the model plane, 0.6 rad off the normal.
 TRIAL_RAY = Ray(*np.array([0.1, -0.05, 1.0, 0.825, 0.5], dtype=np.float32))
 
+# Whether code may run that data name, and not the user: --allow-effects.
+effects_allowed = ContextVar('effects_allowed', default=False)
+
 _loaded: dict[tuple[Path, str], type[Effect]] = {}
 
 
@@ -37,6 +41,20 @@ def load_effect_file(path: str | Path) -> type[Effect]:
     effect = read_effect_file(path)
     try_effect(effect, path)
     return effect
+
+
+def load_unnamed_effect_file(path: str | Path) -> type[Effect]:
+    """``load_effect_file`` for a file that only data name: a campaign, a recording, results.
+
+    Raises:
+        ModelError: such code is not allowed.
+    """
+    if not effects_allowed.get():
+        raise ModelError(
+            f'effect file {path} is not run, because it is Python code that you did not name; if '
+            'you trust it, give --allow-effects, or its model yourself, with --model'
+        )
+    return load_effect_file(path)
 
 
 def read_effect_file(path: str | Path) -> type[Effect]:
@@ -49,6 +67,8 @@ def read_effect_file(path: str | Path) -> type[Effect]:
         ModelError: the file cannot be read or run, its class is not sound, or its id is taken.
     """
     path = Path(path)
+    if path.exists() and not path.is_file():
+        raise ModelError(f'{path} is no file; give the file of an effect')
     try:
         source = path.read_bytes()
     except OSError as error:
@@ -87,12 +107,13 @@ def try_effect(effect: type[Effect], path: str | Path) -> None:
 
 def _run(path: Path, source: bytes, digest: str) -> ModuleType:
     # Not through the import system: that would keep stale byte code beside the user's file.
+    sys.stderr.write(f'note: running the code of effect file {path}\n')
     module = ModuleType(f'paint_effect_{digest[:16]}')
     module.__file__ = str(path)
     sys.modules[module.__name__] = module
     try:
         exec(compile(source, str(path), 'exec'), module.__dict__)
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         del sys.modules[module.__name__]
         line = _line_in(error, path)
         raise ModelError(
@@ -101,14 +122,14 @@ def _run(path: Path, source: bytes, digest: str) -> ModuleType:
     return module
 
 
-def _line_in(error: Exception, path: Path) -> str:
+def _line_in(error: BaseException, path: Path) -> str:
     if isinstance(error, SyntaxError):
         return f', line {error.lineno}'
     frames = traceback.extract_tb(error.__traceback__)
     return next((f', line {f.lineno}' for f in reversed(frames) if f.filename == str(path)), '')
 
 
-def _one_line(error: Exception) -> str:
+def _one_line(error: BaseException) -> str:
     """The telling line of a message; compilers begin theirs with how far they came."""
     text = re.sub(r'\x1b\[[0-9;]*m', '', str(error))
     lines = [line.strip() for line in text.splitlines() if line.strip()]

@@ -13,6 +13,7 @@ from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
+from paint_deposition.files.tables.sheets import FORMULA
 from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
@@ -196,9 +197,15 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
 
 def write_table(path: str | Path, lines: Iterable[Sequence[object]]) -> None:
     """Write lines of values as CSV, whole or not at all."""
+    write_text(path, table_text(lines))
+
+
+def table_text(lines: Iterable[Sequence[object]]) -> str:
+    """Lines of values as CSV in which no program finds a formula: ' stands before such texts."""
     text = StringIO(newline='')
-    csv.writer(text, lineterminator='\n').writerows(lines)
-    write_text(path, text.getvalue())
+    writer = csv.writer(text, lineterminator='\n')
+    writer.writerows([f"'{v}" if FORMULA.match(str(v)) else v for v in line] for line in lines)
+    return text.getvalue()
 
 
 def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.errors import MeshError, did_you_mean, some
+from paint_deposition.files.atomic import require_file, require_small_package
 
 if TYPE_CHECKING:
     from trimesh import Scene
@@ -53,6 +55,7 @@ def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> 
     Raises MeshError, saying what to do, for what is no mesh, has no such body, or no colours
     although it should be ``coloured``.
     """
+    require_file(path, MeshError)
     kind = path.suffix.lower()
     if kind == '.stl' and (triangles := _binary_stl(path)):
         if coloured:
@@ -115,6 +118,12 @@ def _scene(path: Path, kind: str) -> Scene:
         options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
     else:
         source = str(path)
+    if kind == '.3mf':
+        try:
+            with zipfile.ZipFile(path) as package:
+                require_small_package(package)
+        except zipfile.BadZipFile as error:
+            raise MeshError(f'{path}: not readable as a mesh ({error}); export it again') from None
     if kind in ('.step', '.stp'):
         if importlib.util.find_spec(STEP_READER) is None:
             raise MeshError(

@@ -132,7 +132,7 @@ def _load(path: Path, body: str | None, coloured: bool) -> Bodies:
             f'{path}: a mesh of type "{path.suffix}" cannot be read; '
             f'export it as one of {", ".join(SUFFIXES)}'
         )
-    if not path.is_file():
+    if not path.exists() or path.is_dir():
         raise MeshError(f'{path}: no such mesh file; check the path')
     bodies = read_bodies(path, body, coloured)
     vertices, faces = bodies.vertices, bodies.faces

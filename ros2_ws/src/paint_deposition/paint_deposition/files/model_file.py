@@ -11,8 +11,8 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.errors import ModelError
+from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
+from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.effect_source import file_name, needs_file, source_of
 from paint_deposition.files.model_text import LEARNED_ID, model_text
@@ -76,8 +76,9 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
     """The deposition model of a file with its name, uncertainty and history.
 
     What the file leaves out has its default. Effects given as ``file`` are looked for beside the
-    model file, and ``load_effect`` runs their code. Raises ModelError naming the file, the key,
-    its value and the remedy.
+    model file, and ``load_effect`` runs their code: give ``load_unnamed_effect_file`` for a path
+    that was found in other data. Raises ModelError naming the file, the key, its value and the
+    remedy.
     """
     path = Path(path)
     content = read_yaml(path, 'model', ModelError)
@@ -85,6 +86,12 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
         return _model_file(content, lambda name: load_effect(path.parent / name))
     except ModelError as error:
         raise ModelError(f'{path}: {error}') from None
+
+
+def model_source(path: Path) -> str:
+    """The text of a model file, whose effect files are not run. Raises ModelError for another."""
+    checked(_Sections, f'{path}: model', read_yaml(path, 'model', ModelError), ModelError)
+    return path.read_text(encoding='utf-8')
 
 
 def write_model(
@@ -120,11 +127,15 @@ def model_of(values: Mapping[str, Any]) -> DepositionModel:
         ModelError: it has an effect of a user's own, whose file is not named there.
     """
     about = {'number', 'interpolated'}
-    brushes = {
-        brush['number']: {key: value for key, value in brush.items() if key not in about}
-        for brush in values.get('brushes', ())
-    }
-    return _model_file({**values, 'brushes': brushes or None}, load_effect_file).model
+    try:
+        brushes = {
+            brush['number']: {key: value for key, value in brush.items() if key not in about}
+            for brush in values.get('brushes', ())
+        }
+    except (KeyError, TypeError, AttributeError):
+        raise ModelError('brushes is no list of brushes with their number') from None
+    sections = {**values, 'brushes': brushes or None}
+    return _model_file(sections, load_unnamed_effect_file).model
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
@@ -166,7 +177,9 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
     between: list[tuple[int, dict[str, Any]]] = []
     for number, entry in section.items():
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
-            raise ModelError(f'brushes: {number!r} is not a brush number; give 1, 2 and so on')
+            raise ModelError(
+                f'brushes: {quoted(number)} is not a brush number; give 1, 2 and so on'
+            )
         given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
         at = given.model_dump(exclude={'planar'})
         if given.planar is None:
@@ -190,7 +203,7 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
     values = dict(entry)
     source = values.pop(chosen[0])
     if not isinstance(source, str):
-        raise ModelError(f'{where}: {chosen[0]} is {source!r}; expected text')
+        raise ModelError(f'{where}: {chosen[0]} is {quoted(source)}; expected text')
     if chosen == ['file']:
         cls = load(source)
     elif source == LEARNED_ID:
@@ -200,7 +213,8 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
         covariate = values.pop('covariate', None)
         if not isinstance(covariate, str):
             raise ModelError(
-                f'{where}: covariate is {covariate!r}; give that of the learned law, time_s say'
+                f'{where}: covariate is {quoted(covariate)}; give that of the learned law, as '
+                'time_s'
             )
         cls = learned_law(covariate)
         source = cls.id

@@ -39,7 +39,9 @@ def model_text(
     """
     text = CommentedMap({'name': name} if name else {})
     if header_comment:
-        text.yaml_set_start_comment(header_comment)
+        # Names may hold what ends a line for YAML, and what it does not take.
+        lines = (''.join(filter(str.isprintable, line)) for line in header_comment.splitlines())
+        text.yaml_set_start_comment('\n'.join(lines))
     if model.brushes:
         text['brushes'] = CommentedMap({brush.number: _brush(brush) for brush in model.brushes})
     else:

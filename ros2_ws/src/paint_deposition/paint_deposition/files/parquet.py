@@ -1,4 +1,4 @@
-"""Parquet tables, and what to install where a library of the extra `many` is missing."""
+"""Parquet tables, and what to install where their library is missing."""
 
 from __future__ import annotations
 
@@ -13,19 +13,12 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 MAGIC = b'PAR1'
-PYARROW = 'pyarrow'
-MANY = (PYARROW, 'ruptures')
 
 
-def require_libraries(what: str, libraries: tuple[str, ...] = (PYARROW,)) -> None:
-    """Refuse to begin what needs libraries of the extra, naming those that are missing."""
-    missing = [name for name in libraries if find_spec(name) is None]
-    if missing:
-        named = f'{" and ".join(missing)}, which {"are" if missing[1:] else "is"}'
-        raise ManyError(
-            f'{what} needs {named} not installed; run: pip install '
-            f'{" ".join(missing)}, or install paint_deposition[many]'
-        )
+def require_pyarrow(what: str) -> None:
+    """Refuse to begin what needs the library of the extra, where it is not installed."""
+    if find_spec('pyarrow') is None:
+        raise ManyError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

@@ -8,6 +8,9 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
+from paint_deposition.errors import ModelError
+from paint_deposition.files.atomic import read_file
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.program import is_rapid
@@ -24,24 +27,24 @@ IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 
 @dataclass(frozen=True)
 class PlannedModel:
-    """What a motion says of its plan's model; ``file`` is None where that is not there."""
+    """What a motion says of its plan's model: where that should lie, and its digest."""
 
     path: Path
     digest: str
-    file: ModelFile | None
+
+    def file(self) -> ModelFile | None:
+        """The model, if it is still that of the plan."""
+        if not self.path.is_file():
+            return None
+        file = read_model_file(self.path, load_unnamed_effect_file)
+        return file if model_digest(file.model) == self.digest else None
 
 
 def planned_model(motion: Path) -> PlannedModel | None:
     """The model of a plan's bag, module or table, None for a motion that was not planned."""
     folder = motion if motion.is_dir() else motion.parent
     digest = _digest(motion, folder)
-    if not digest:
-        return None
-    path = folder / MODEL_FILE
-    file = read_model_file(path) if path.is_file() else None
-    if file is not None and model_digest(file.model) != digest:
-        file = None
-    return PlannedModel(path, digest, file)
+    return PlannedModel(folder / MODEL_FILE, digest) if digest else None
 
 
 def _digest(motion: Path, folder: Path) -> str:
@@ -53,6 +56,6 @@ def _digest(motion: Path, folder: Path) -> str:
         plans = (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ()
         files, pattern = [folder / name for name in plans], IN_JSON
     for file in filter(Path.is_file, files):
-        found = pattern.search(file.read_text(encoding='utf-8', errors='replace'))
+        found = pattern.search(read_file(file, ModelError).decode('utf-8', errors='replace'))
         return found[1] if found else ''
     return ''

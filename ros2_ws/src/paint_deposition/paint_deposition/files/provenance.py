@@ -1,6 +1,7 @@
 """What a run or a result was made with, so that a film can be explained years later."""
 
 import hashlib
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,9 @@ from typing import Any
 from paint_deposition import __version__
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import require_file
 from paint_deposition.files.json_files import json_text, plain
+from paint_deposition.files.model_file import model_source
 from paint_deposition.files.version import git_version
 from paint_deposition.model.brush import BETWEEN
 
@@ -21,15 +24,16 @@ def provenance(mesh_file: str = '', model_file: str = '') -> dict[str, str]:
     for what, path in (('mesh_file', mesh_file), ('model_file', model_file)):
         if not path:
             continue
-        try:
-            content = Path(path).read_bytes()
-        except OSError as error:
-            raise PaintError(f'{what} {path}: {error.strerror}') from None
         notes[what] = path
-        if what == 'mesh_file':
-            notes['mesh_sha256'] = hashlib.sha256(content).hexdigest()
-        else:
-            notes['model_yaml'] = content.decode('utf-8', errors='replace')
+        try:
+            if what == 'mesh_file':
+                if not Path(path).exists():
+                    raise PaintError(f'{path}: No such file or directory')
+                notes['mesh_sha256'] = sha256(path)
+            else:
+                notes['model_yaml'] = model_source(Path(path))
+        except PaintError as error:
+            raise PaintError(f'{what} {error}') from None
     return {key: value for key, value in notes.items() if value}
 
 
@@ -77,6 +81,7 @@ def sha256(path: str | Path) -> str:
         for file in sorted(path.rglob('*')) if path.is_dir() else [path]:
             if path.is_dir():
                 digest.update(str(file.relative_to(path)).encode())
+            require_file(file, PaintError, math.inf)
             if file.is_file():
                 with file.open('rb') as content:
                     while block := content.read(BLOCK_BYTES):

@@ -7,7 +7,7 @@ from annotated_types import Ge, Gt, Le
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
-from paint_deposition.errors import PaintError, did_you_mean
+from paint_deposition.errors import PaintError, did_you_mean, quoted
 
 NUMBERS = (float, float | None)
 Made = TypeVar('Made', bound=BaseModel)
@@ -47,19 +47,23 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     if first['type'] == 'value_error':
         return f'{where}: {f"{key}: " if key else ""}{first["ctx"]["error"]}{more}'
     if not first['loc']:
-        return f'{where} is {first["input"]!r}; expected the keys {", ".join(model.model_fields)}'
+        # Nothing of a text or a list: the file may be of any other kind.
+        value = first['input']
+        of_kind = 'text' if isinstance(value, str) else quoted(value)
+        of_kind = 'a list' if isinstance(value, list) else of_kind
+        return f'{where} is {of_kind}; expected the keys {", ".join(model.model_fields)}'
     if first['type'] == 'extra_forbidden':
-        return f'{where}: unknown key {key!r}; {did_you_mean(key, model.model_fields)}{more}'
+        return f'{where}: unknown key {quoted(key)}; {did_you_mean(key, model.model_fields)}{more}'
     field = _field(model, first['loc'])
     if field is None:
-        return f'{where}: unknown key {key}; expected names of parameters{more}'
+        return f'{where}: unknown key {quoted(key)}; expected names of parameters{more}'
     if first['type'] == 'missing':
         return f'{where} has no {key!r}; give {_expected(field)}{more}'
     return f'{_wrong(where, key, first["input"], field)}{more}'
 
 
 def _wrong(where: str, key: str, value: object, field: FieldInfo) -> str:
-    return f'{where}: {key} is {value!r}; expected {_expected(field)}'
+    return f'{where}: {key} is {quoted(value)}; expected {_expected(field)}'
 
 
 def _expected(field: FieldInfo) -> str:

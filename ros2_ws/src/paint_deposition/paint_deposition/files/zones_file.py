@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from paint_deposition.errors import PaintError, some
+from paint_deposition.errors import PaintError, quoted, some
 from paint_deposition.files.meshes import Triangles, read_triangles
 from paint_deposition.files.motion_source import Number, Text
 from paint_deposition.files.refusals import checked
@@ -27,10 +27,10 @@ def _number_range(written: Any) -> tuple[int, int]:
     """First and last of '0-119', or of 7."""
     ends = str(written).split('-')
     if isinstance(written, bool) or len(ends) > 2 or not all(e.strip().isdecimal() for e in ends):
-        raise ValueError(f'{written!r} is no number and no range of numbers; give {FACES}')
+        raise ValueError(f'{quoted(written)} is no number and no range of numbers; give {FACES}')
     first, last = int(ends[0]), int(ends[-1])
     if last < first:
-        raise ValueError(f'{written!r} ends before it begins; swap the two')
+        raise ValueError(f'{quoted(written)} ends before it begins; swap the two')
     return first, last
 
 

@@ -7,7 +7,6 @@ BEFORE = '#9aa5b1'
 ACCENT = '#00708c'
 # Film below, within and above the target band, and bare metal; distinct to the colour-blind too.
 BELOW, WITHIN, HIGH, BARE = '#3f6fb0', '#b9dcae', '#e07b1f', '#9e9e9e'
-ALARM = '#c62828'
 COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
 # Models side by side; as many as can be distinguished.
 MODELS = (ACCENT, *COMPONENTS, '#b5485f', '#8a7a2b')

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.footprint import LearnedFootprint
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
@@ -68,13 +68,6 @@ def effect_name(effect_id: str) -> str:
         return f'learned law over {LEARNED[covariate].over}'
     name = effect_id.replace('tcp_', 'TCP ').replace('faraday', 'Faraday')
     return name.replace('_', ' ')
-
-
-def amplitude_name(name: str) -> str:
-    """'air_drift.shift_down_m' as 'air drift, shift down'."""
-    effect, _, parameter = name.partition('.')
-    unit = EFFECTS[effect].parameters()[parameter]['unit']
-    return f'{effect_name(effect)}, {parameter_words(parameter, unit)}'
 
 
 def competing_explanations(spray: Spray) -> str:

@@ -11,6 +11,8 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from paint_deposition.errors import quoted
+
 # Quaternions are written with four digits; further off is damage, not rounding.
 QUATERNION_TOLERANCE = 0.01
 Frame = tuple[np.ndarray, Rotation]  # position [mm] and orientation
@@ -20,7 +22,9 @@ def frame(pose: Any) -> Frame:
     """The frame of [[x, y, z], [q1, q2, q3, q4], ...]; ValueError if it is none."""
     position, quaternion = pose[:2] if isinstance(pose, list) and len(pose) > 1 else ([], [])
     if not (_are_numbers(position, 3) and _are_numbers(quaternion, 4)):
-        raise ValueError(f'{pose} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]')
+        raise ValueError(
+            f'{quoted(pose)} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]'
+        )
     norm = math.hypot(*quaternion)
     if abs(norm - 1.0) > QUATERNION_TOLERANCE:
         raise ValueError(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
@@ -83,11 +87,15 @@ def _half_up(value: float) -> float:
 
 def _of_vectors(calculate: Callable) -> Callable:
     """An operator that takes positions too."""
-    return lambda a, b: (
-        calculate(np.array(a), np.array(b)).tolist()
-        if isinstance(a, list) or isinstance(b, list)
-        else calculate(a, b)
-    )
+
+    def calculated(a: Any, b: Any) -> Any:
+        if not (isinstance(a, list) or isinstance(b, list)):
+            return calculate(a, b)
+        if isinstance(a, list) and isinstance(b, list) and np.shape(a) != np.shape(b):
+            raise ValueError('they have not the same size')
+        return calculate(np.array(a), np.array(b)).tolist()
+
+    return calculated
 
 
 OPERATORS: dict[str, Callable] = {

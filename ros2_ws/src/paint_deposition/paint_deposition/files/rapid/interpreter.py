@@ -41,7 +41,7 @@ class Interpreter(Values):
     """Runs a program. What acts on the robot and the gun is the business of a subclass."""
 
     _running: tuple[Routine, ...] = ()
-    _count = 0
+    _count = 0.0
 
     def act(self, i: Instruction) -> bool:
         """Do what an instruction does to the robot or the gun; whether it does anything."""
@@ -90,8 +90,9 @@ class Interpreter(Values):
             if option not in known:
                 self.fail(f'{name} has no option \\{option}; {did_you_mean(option, known)}')
 
-    def reached(self, node: Any, seen: frozenset[str] = frozenset()) -> Iterator[Instruction]:
-        """All instructions in a block, and in the routines that it calls."""
+    def reached(self, node: Any, seen: set[str] | None = None) -> Iterator[Instruction]:
+        """All instructions in a block, and in the routines that it calls, each of these once."""
+        seen = set() if seen is None else seen
         for child in node.children:
             if isinstance(child, Node):
                 yield from self.reached(child, seen)
@@ -100,19 +101,24 @@ class Interpreter(Values):
                 if not routine:
                     yield child
                 elif child.name not in seen:
-                    yield from self.reached(routine.body, seen | {child.name})
+                    seen.add(child.name)
+                    yield from self.reached(routine.body, seen)
 
     # --- statements
 
     def _execute(self, block: Node) -> None:
         for statement in block.children:
-            self._count += 1
-            if self._count > MOST_STATEMENTS:
-                self.fail(f'{MOST_STATEMENTS} statements have run; check the loops')
+            self._step()
             if isinstance(statement, Instruction):
                 self._instruction(statement)
             else:
                 getattr(self, f'_{statement.rule}')(*statement.children)
+
+    def _step(self, count: float = 1.0) -> None:
+        """Count a statement, a turn of a loop, or a part of either."""
+        self._count += count
+        if self._count > MOST_STATEMENTS:
+            self.fail(f'{MOST_STATEMENTS} statements have run; check the loops')
 
     def _instruction(self, i: Instruction) -> None:
         self.line = i.line
@@ -187,6 +193,7 @@ class Interpreter(Values):
         leaves = any(i.name in LEAVING for i in self.reached(body))
         for turn in count():
             self.line = line_of(word)
+            self._step()
             going_on = self.value(condition)
             if isinstance(going_on, Unknown):
                 return self._only_if_idle(word, going_on.reason, body)
@@ -211,6 +218,7 @@ class Interpreter(Values):
             self.fail(f'FOR takes {MOST_TURNS} turns or more; check its bounds')
         outer = self._local
         for turn in range(int(turns + 1e-9) + 1 if turns >= 0.0 else 0):
+            self._step()
             self._local = outer | {name: Datum('num', first + turn * step)}
             self._execute(body)
         self._local = outer
@@ -233,6 +241,7 @@ class Interpreter(Values):
         for body in bodies:
             changed = [*_assigned(body)]
             for i in self.reached(body):
+                self._step(0.01)
                 if i.name in CHANGING or i.name.startswith('tpread'):
                     changed += i.values[:1]
                 elif self.acts(i):

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
 from paint_deposition.files.rapid.gun import Gun, Spray, gun_signal, name_of
 from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
@@ -236,5 +237,5 @@ class Painting(Interpreter):
 
     def _record(self, value: object, kind: str) -> list:
         if not isinstance(value, list) or len(value) != len(RECORDS[kind]):
-            self.fail(f'{value!r} is no {kind}')
+            self.fail(f'{quoted(value)} is no {kind}')
         return value

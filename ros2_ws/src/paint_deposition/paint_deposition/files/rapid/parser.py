@@ -10,7 +10,7 @@ from typing import Any, NamedTuple, cast
 
 from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import RecordingError, quoted
 
 GRAMMAR = Path(__file__).with_name('rapid.lark')
 
@@ -156,7 +156,7 @@ def parse_modules(text: str, source: str) -> list[Module]:
         if token is None:
             reason = f'{text.lower()[error.pos_in_stream or 0]!r} is not RAPID'
         else:
-            reason = f'{str(token) or "the end"!r} is not expected here'
+            reason = f'{quoted(str(token) or "the end")} is not expected here'
             reason += (
                 "; is a ';' missing before it?"
                 if 'SEMICOLON' in getattr(error, 'expected', ())

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 from paint_deposition.files.rapid.moves import RapidProgram, with_one_frame, with_one_tool
 from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
@@ -77,7 +78,8 @@ def _files(path: Path) -> list[Path]:
 
 def _text(file: Path) -> str:
     try:
-        return file.read_text(encoding='utf-8', errors='replace')
+        content = read_file(file, RecordingError, MOST_TEXT_MB)
+        return content.decode('utf-8', errors='replace')
     except OSError as error:
         raise RecordingError(f'cannot read {file}: {error.strerror}') from None
 

@@ -1,17 +1,18 @@
 """The data of a RAPID program while it runs, and the values of its expressions."""
 
-import copy
 import math
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.functions import FUNCTIONS, OPERATORS, is_number
 from paint_deposition.files.rapid.parser import Declared, Module, Node, Routine
 
-MOST_ELEMENTS = 1_000_000
+# Of one array, and of all lists that are made or copied while a program runs.
+MOST_ELEMENTS, MOST_COPIED = 1_000_000, 10_000_000
+MOST_LETTERS = 80  # of a string on the controller
 
 
 def _all(kind: str, names: str) -> dict[str, str]:
@@ -72,6 +73,7 @@ class Values:
     def __init__(self, modules: list[Module]) -> None:
         self.source, self.line = modules[0].source, 0
         self._local: dict[str, Datum] = {}
+        self._elements = 0
         self._global: dict[str, Any] = {f'reg{k}': Datum('num', 0.0) for k in range(1, 6)}
         self._of_module: dict[str, dict[str, Any]] = {}
         for module in modules:
@@ -113,15 +115,15 @@ class Values:
         """The value of an expression that must be a number; ``what`` is for the message."""
         value = self.known(node)
         if not is_number(value):
-            self.fail(f'{what} is {value!r}; a number expected')
+            self.fail(f'{what} is {quoted(value)}; a number expected')
         return value
 
     def assign(self, reference: Any, value: Any) -> None:
         """Assign a copy of a value to a datum or a part of it."""
         if not isinstance(reference, Node) or reference.rule != 'reference':
-            self.fail(f'{reference!r} is no name to assign to')
+            self.fail(f'{quoted(reference)} is no name to assign to')
         name, *parts = reference.children
-        value = copy.deepcopy(value) if isinstance(value, list) else value
+        value = self._copied(value)
         datum = self._find(name)
         if not isinstance(datum, Datum):
             if parts:
@@ -174,11 +176,14 @@ class Values:
 
     def _calculated(self, name: str, function: Any, values: list, **named: Any) -> Any:
         try:
-            return function(*values, **named)
+            result = function(*values, **named)
+            if isinstance(result, str) and len(result) > MOST_LETTERS:
+                self.fail(f'a string of {len(result)} letters; RAPID has {MOST_LETTERS} at most')
+            return result
         except ZeroDivisionError:
             self.fail('division by zero')
         except (ArithmeticError, IndexError, TypeError, ValueError) as error:
-            self.fail(f'{name} of {", ".join(map(repr, values))}: {error}')
+            self.fail(f'{name} of {", ".join(map(quoted, values))}: {error}')
 
     # --- data
 
@@ -193,9 +198,16 @@ class Values:
             datum.value = (
                 self._initial(declared.type, declared.sizes or [])
                 if declared.value is None
-                else copy.deepcopy(self.value(declared.value))
+                else self._copied(self.value(declared.value))
             )
         return datum.value
+
+    def _copied(self, value: Any) -> Any:
+        """A copy of a list, any other value itself."""
+        self._elements += 1
+        if self._elements > MOST_COPIED:
+            self.fail(f'{MOST_COPIED} elements were made or copied; check sizes and loops')
+        return [self._copied(one) for one in value] if type(value) is list else value
 
     def _initial(self, kind: str, sizes: list) -> Any:
         """What a datum without a value begins with on the controller."""
@@ -203,7 +215,8 @@ class Values:
             count = self.number(sizes[0], 'the size of an array')
             if not 0.0 < count <= MOST_ELEMENTS:
                 self.fail(f'an array of {count:g} elements; give 1 to {MOST_ELEMENTS}')
-            return [self._initial(kind, sizes[1:]) for _ in range(int(count))]
+            one = self._initial(kind, sizes[1:])
+            return [self._copied(one) for _ in range(int(count))]
         if kind in RECORDS:
             return [self._initial(one, []) for one in RECORDS[kind].values()]
         simple = {'num': 0.0, 'dnum': 0.0, 'bool': False, 'string': ''}

@@ -4,30 +4,43 @@ Only the types of the topics that are read are parsed: a topic that rosbags does
 as service events, does not make the others unreadable.
 """
 
+import bz2
+import math
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import lz4.frame
 import yaml
+import zstandard
 from mcap.writer import MCAP0_MAGIC
-from rosbags.interfaces import Connection, MessageDefinitionFormat
+from rosbags.interfaces import Connection, MessageDefinitionFormat, Nodetype
 from rosbags.rosbag1 import Reader as Ros1Reader
+from rosbags.rosbag1 import reader as ros1_reader
 from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2 import storage_mcap
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.files.atomic import MOST_TEXT_MB, read_file, require_file
 from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.strict_yaml import require_small
 
 # The key under which the custom data of a plan's bag names its trigger topic.
 TRIGGER = 'trigger_topic'
 # The key under which a run says how many messages of a topic are of its part, if not all.
 KEPT = 'messages_of_the_part'
 ROS2_SUFFIXES = ('.mcap', '.db3')
+# Of a chunk, expanded; recorders make chunks of some megabytes.
+MOST_CHUNK_BYTES = 256 * 1024 * 1024
+# Elements of the arrays of fixed length in a type, other than arrays of numbers.
+MOST_FIXED, TEXTS = 10_000, ('string', 'wstring')
 
 
 @dataclass(frozen=True)
@@ -137,6 +150,7 @@ class Bag:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
             types = _definitions(connection)
+            _require_short_arrays(topic, types)
             store.register({name: types[name] for name in types if name not in store.fielddefs})
             self._stores[topic] = store
         return self._stores[topic]
@@ -154,6 +168,37 @@ def _definitions(connection: Connection) -> dict:
     return get_types_from_msg(text, connection.msgtype)
 
 
+def _require_short_arrays(topic: str, types: Mapping[str, Any]) -> None:
+    """Refuse types for which rosbags would write a line of code for each of very many elements."""
+    fields = (kind for _, of in types.values() for _, kind in of)
+    arrays = (of for kind, of in fields if kind == Nodetype.ARRAY)
+    long = sum(length for (kind, of), length in arrays if kind != Nodetype.BASE or of[0] in TEXTS)
+    if long > MOST_FIXED:
+        raise RecordingError(
+            f'{topic} has a type with arrays of {long} elements, over {MOST_FIXED}'
+        )
+
+
+def expanded(compression: str, data: bytes, most_bytes: int = MOST_CHUNK_BYTES) -> bytes:
+    """A chunk as it was before it was compressed, cut where it holds more than it may."""
+    if compression == 'zstd':
+        return zstandard.ZstdDecompressor().stream_reader(data).read(most_bytes + 1)
+    of_kind = {'lz4': lz4.frame.LZ4FrameDecompressor, 'bz2': bz2.BZ2Decompressor}
+    return of_kind[compression]().decompress(data, most_bytes + 1)
+
+
+def _small(compression: str, data: bytes, size: int = MOST_CHUNK_BYTES) -> bytes:
+    content = expanded(compression, data, min(size, MOST_CHUNK_BYTES))
+    if len(content) > MOST_CHUNK_BYTES:
+        raise ValueError('a chunk is larger than any recorder makes')
+    return content
+
+
+# rosbags expands chunks to any size.
+storage_mcap.DECOMPRESSORS.update({c: partial(_small, c) for c in ('lz4', 'zstd')})
+ros1_reader.decompressors.update({c: partial(_small, c) for c in ('lz4', 'bz2')})
+
+
 def listed_topics(topics: Sequence[BagTopic], kind: str) -> str:
     """The topics of a kind, for a message."""
     if not topics:
@@ -167,6 +212,9 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
     path = Path(path)
     _require_bag(path)
     with _read_errors(path):
+        if (path / 'metadata.yaml').is_file():
+            metadata = read_file(path / 'metadata.yaml', RecordingError, MOST_TEXT_MB)
+            require_small(metadata.decode('utf-8'))
         reader = Ros1Reader(path) if path.suffix == '.bag' else Ros2Reader(path)
         reader.open()
     try:
@@ -177,13 +225,15 @@ def open_bag(path: Path | str) -> Iterator[Bag]:
 
 def custom_data(path: Path) -> dict[str, str]:
     """The custom data in the metadata.yaml of a rosbag2 folder, by name."""
-    return _information(path).get('custom_data') or {}
+    told = _information(path).get('custom_data')
+    return {str(key): str(value) for key, value in told.items()} if isinstance(told, dict) else {}
 
 
 def _information(path: Path) -> dict[str, Any]:
     """What the metadata.yaml of a rosbag2 folder says, nothing where it cannot be read."""
     try:
-        text = (path / 'metadata.yaml').read_text(encoding='utf-8')
+        text = read_file(path / 'metadata.yaml', RecordingError, MOST_TEXT_MB).decode('utf-8')
+        require_small(text)
         metadata = yaml.load(text, Loader=getattr(yaml, 'CSafeLoader', yaml.SafeLoader))
         return dict(metadata['rosbag2_bagfile_information'])
     except Exception:  # damaged, or no bag, which reading it reports
@@ -220,6 +270,8 @@ def _is_unfinished(path: Path) -> bool:
 def _require_bag(path: Path) -> None:
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
+    for file in path.iterdir() if path.is_dir() else [path]:
+        require_file(file, RecordingError, math.inf)
     if path.is_dir():
         names = [file.name.removesuffix('.zstd') for file in path.iterdir()]
         if not any(name.endswith(ROS2_SUFFIXES) for name in names):
@@ -237,8 +289,11 @@ def _require_bag(path: Path) -> None:
         raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
     if path.is_dir():
         # A recorder that splits its bag and is killed has not named the last file yet.
-        listed = _information(path).get('relative_file_paths') or names
-        named = {Path(name).name.removesuffix('.zstd') for name in listed}
+        listed = _information(path).get('relative_file_paths')
+        named = {
+            Path(str(name)).name.removesuffix('.zstd')
+            for name in (listed if isinstance(listed, list) else names)
+        }
         there = {name for name in names if name.endswith(ROS2_SUFFIXES)}
         if others := ', '.join(sorted(there - named)):
             raise RecordingError(_unfinished(path, f'its metadata.yaml does not name {others}'))

@@ -13,6 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError, did_you_mean
+from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 from paint_deposition.files.recordings.bag_files import Bag, listed_topics
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
@@ -59,7 +60,7 @@ class Robot:
         from pytransform3d.urdf import parse_urdf
 
         try:
-            text = path.read_text(encoding='utf-8')
+            text = read_file(path, RecordingError, MOST_TEXT_MB).decode('utf-8')
         except OSError as error:
             raise RecordingError(f'cannot read {path}: {error.strerror}') from None
         except UnicodeDecodeError as error:

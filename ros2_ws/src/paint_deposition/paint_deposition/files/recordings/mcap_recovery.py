@@ -1,13 +1,16 @@
 """Recovery of unfinished or damaged MCAP runs into a complete rosbag2 folder."""
 
+import math
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from dataclasses import dataclass, field
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
 from io import BytesIO
+from mmap import ACCESS_READ, mmap
 from pathlib import Path
+from typing import IO, cast
 
-import lz4.frame
 import yaml
 import zstandard
 from mcap.data_stream import ReadDataStream
@@ -21,16 +24,16 @@ from rosbags.rosbag2 import ReaderError
 from rosbags.rosbag2.metadata import parse_qos
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.bag_files import mcap_files
+from paint_deposition.files.atomic import require_file
+from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
-MAX_CHUNK_BYTES = 256 * 1024 * 1024
 HEAD_BYTES = 9  # opcode and length of a record
 # Exceptions of the readers on damaged data.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
-    OverflowError,
+    OverflowError, KeyError,
 )  # fmt: skip
 
 
@@ -72,6 +75,7 @@ def recover(
     path = Path(path)
     if not path.exists():
         raise RecordingError(f'{path} does not exist')
+    require_file(path, RecordingError, math.inf)
     files = mcap_files(path)
     if not files:
         raise RecordingError(f'{path} holds no .mcap file; only MCAP runs can be recovered')
@@ -98,7 +102,7 @@ def _copy(
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
     try:  # the summary repeats all channels, in case the chunk that defines one is damaged
-        with file.open('rb') as stream:
+        with _mapped(file) as stream:
             reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
             if summary := reader.get_summary():
                 schemas, channels = dict(summary.schemas), dict(summary.channels)
@@ -124,7 +128,7 @@ def _records(
 ) -> Iterator[McapRecord]:
     """The records up to the break, which is noted, including those in chunks."""
     size, start = file.stat().st_size, len(MCAP0_MAGIC)
-    with file.open('rb') as stream:
+    with _mapped(file) as stream:
         reader = StreamReader(stream, emit_chunks=True, record_size_limit=size)
         try:
             for record in reader.records:
@@ -141,14 +145,26 @@ def _records(
             reason = 'the end is missing' if cut else str(error)
             recovery.breaks.append(f'{file.name} breaks off at byte {start} of {size}: {reason}')
             stream.seek(start)
-            yield from _truncated_chunk_records(stream.read(MAX_CHUNK_BYTES))
+            yield from _truncated_chunk_records(stream.read(MOST_CHUNK_BYTES))
+
+
+@contextmanager
+def _mapped(file: Path) -> Iterator[IO[bytes]]:
+    """The file to read from: as mapped memory it gives what is there, and no more is asked for."""
+    with file.open('rb') as stream, mmap(stream.fileno(), 0, access=ACCESS_READ) as content:
+        yield cast(IO[bytes], content)
 
 
 def _chunk_records(chunk: Chunk, recovery: Recovery) -> list[McapRecord]:
     try:
-        if chunk.uncompressed_size > MAX_CHUNK_BYTES:
-            raise ValueError('no recorder makes chunks of that size')
-        return breakup_chunk(chunk, validate_crc=True)
+        data = chunk.data
+        if chunk.compression:
+            data = expanded(
+                chunk.compression, data, min(chunk.uncompressed_size, MOST_CHUNK_BYTES)
+            )
+        if len(data) != chunk.uncompressed_size:
+            raise ValueError('a chunk has another size than it says')
+        return breakup_chunk(replace(chunk, compression='', data=data), validate_crc=True)
     except DAMAGE:
         recovery.damaged_chunks += 1
         return []
@@ -163,11 +179,7 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
         return
     try:
         chunk = Chunk.read(ReadDataStream(BytesIO(record[HEAD_BYTES:])))
-        data = chunk.data
-        if chunk.compression == 'zstd':
-            data = zstandard.ZstdDecompressor().decompressobj().decompress(data)
-        elif chunk.compression == 'lz4':
-            data = lz4.frame.LZ4FrameDecompressor().decompress(data)
+        data = expanded(chunk.compression, chunk.data) if chunk.compression else chunk.data
         reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
         yield from reader.records
     except DAMAGE:

@@ -71,13 +71,14 @@ def _edge(parent: str, child: str, rows: list[tuple]) -> Edge:
 
 
 def read_frames(bag: Bag) -> FrameTree:
-    """The frames of /tf_static, part_pose and /tf."""
+    """The frames of /tf_static, part_pose and /tf; a static one without direction is none."""
     tree = FrameTree()
     for edge in _edges(bag, static=False):
         for stamp, pose in zip(edge.stamps_ns.tolist(), edge.poses, strict=True):
             tree.add(edge.child, edge.parent, stamp, pose)
     for edge in _edges(bag, static=True):
-        tree.fix(edge.child, edge.parent, edge.poses[-1])
+        if np.isfinite(edge.poses[-1]).all() and np.any(edge.poses[-1][3:]):
+            tree.fix(edge.child, edge.parent, edge.poses[-1])
     return tree
 
 

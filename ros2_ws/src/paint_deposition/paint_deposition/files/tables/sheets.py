@@ -10,7 +10,8 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.parquet import MAGIC, require_libraries
+from paint_deposition.files.atomic import read_file, require_small_package
+from paint_deposition.files.parquet import MAGIC, require_pyarrow
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -20,7 +21,11 @@ WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
 ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
 # A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
 MOST_CELLS = 10_000_000
-XLSX_CELL = re.compile(rb'<c\s[^>]*?\br=["\']([A-Za-z]{1,3})(\d{1,7})')
+MOST_TABLE_MB = 500
+# The place of a cell, of a row, or of the end of the table.
+XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]{0,3})(\d{1,7})["\']')
+# What a spreadsheet would take for a formula, and no number: written with a ' before it.
+FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
 EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
 
 
@@ -49,7 +54,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     A file that is neither raises ``refusal``.
     """
     try:
-        content = path.read_bytes()
+        content = read_file(path, refusal, MOST_TABLE_MB)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
@@ -58,7 +63,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
         if content.startswith(MAGIC):
-            require_libraries(str(path))
+            require_pyarrow(str(path))
             return [_sheet_of_parquet(content)]
         return _sheets_of_text(*_decoded(content))
     except ValueError as error:
@@ -123,6 +128,7 @@ def _refuse_far_cells(content: bytes) -> None:
     if not zipfile.is_zipfile(BytesIO(content)):
         return
     with zipfile.ZipFile(BytesIO(content)) as package:
+        require_small_package(package)
         for name in package.namelist():
             if not (name.startswith('xl/') and name.endswith('.xml')):
                 continue
@@ -156,4 +162,5 @@ def _sheet_of_parquet(content: bytes) -> Sheet:
 def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    return ' '.join(str(value).strip().splitlines())
+    text = ' '.join(str(value).strip().splitlines())
+    return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text

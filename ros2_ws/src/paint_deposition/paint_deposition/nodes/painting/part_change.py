@@ -42,6 +42,8 @@ HEARD_S, RESET_HEARD_S = 3.0, 1.0
 RECORDED_S = 1.2
 # Prepared parts beside the one in the cell; a large one takes some 100 MB.
 MAX_KEPT_PARTS = 4
+# Films that cannot be saved are kept, so many at most, and saved again after so long.
+MOST_UNSAVED, SAVE_AGAIN_S = 4, 10.0
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
 Version = tuple[str, int | None, int | None]
 
@@ -89,15 +91,21 @@ class PartChange:
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
         self._gap_s = 0.0
+        # Films of former parts that are not on disk yet, and why.
+        self._unsaved: list[Callable[[], list[Path]]] = []
         self._save_error = ''
+        node.create_steady_timer(SAVE_AGAIN_S, self._save_again)
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
     def close(self) -> None:
-        """Save the film if the part has a serial number."""
+        """Save the film if the part has a serial number, and those that could not be saved."""
         self._reading.shutdown(cancel_futures=True)
         if self.part.serial and self._node.film.counts.received:
-            self._film_writer()()
+            self._unsaved.append(self._film_writer())
+        self._saving.submit(self._save_films).result()
+        if self._save_error:
+            raise PaintError(self._save_error)
 
     def status(self) -> Status:
         """The status of the part and of its last change."""
@@ -125,10 +133,10 @@ class PartChange:
         self, request: ChangePart.Request, response: ChangePart.Response
     ) -> ChangePart.Response:
         try:
-            await (self._prefetch if request.prepare else self._change)(request, response)
-            response.success = True
-        except PaintError as error:
-            response.message = str(error)
+            wrong = await (self._prefetch if request.prepare else self._change)(request, response)
+            response.success = not wrong
+        except (PaintError, MemoryError) as error:
+            response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
         return response
@@ -140,17 +148,20 @@ class PartChange:
         part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
         response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
-    async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
+    async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> str:
+        """Change the part; what of it failed after the part had changed, if anything."""
         node = self._node
         if self.waiting:
             raise PaintError('another change of the part is under way: call again after it')
+        if len(self._unsaved) >= MOST_UNSAVED:
+            raise PaintError(f'{self._save_error}; the part stays until they are saved')
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
         began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
-        save = None
+        unplaced = ''
         self.waiting = True
         try:
             if len(node.inputs) > 1:
@@ -171,10 +182,12 @@ class PartChange:
             version = mesh_version(following.mesh_file)
             ready = None if request.coat else await self._ready(version)
             run = await self._recorded(request.resume) if request.resume else None
-            if node.film.counts.received and run is None:
-                save = self._film_writer()
+            # What was painted since a crash is of the part that is resumed, and saved with it.
+            is_resumed = run is not None and not self.part.serial
+            if node.film.counts.received and not is_resumed:
+                self._unsaved.append(self._film_writer())
             if ready is not None:
-                log = [[*gun.log.events()] for gun in node.film.guns]
+                log = [[*gun.log.events()] if is_resumed else [] for gun in node.film.guns]
                 node.change_part(version[0], ready)
                 self._version = version
                 if run is not None:
@@ -187,17 +200,20 @@ class PartChange:
             self._publish(since_ns, request.part_pose)
             # After the part, so that a recorder knows whose pose it is.
             if len(request.part_pose):
-                self._set_pose(list(request.part_pose))
+                unplaced = self._set_pose(list(request.part_pose))
         finally:
             self.waiting = False
             node.release()
         self._gap_s = response.gap_s = time.monotonic() - began_s
         response.run = following.run
-        if save is not None:
-            response.paths = await self._saved(save)
-            notes.append(f'wrote {", ".join(response.paths)}')
-        response.message = '; '.join([self._sentence(), *notes])
+        if self._unsaved:
+            saved = await node.result_of(self._saving.submit(self._save_films))
+            response.paths = [str(path) for path in saved]
+            notes.append(f'wrote {", ".join(response.paths)}' if saved else '')
+        notes += [self._save_error, unplaced]
+        response.message = '; '.join(filter(None, [self._sentence(), *notes]))
         node.get_logger().info(response.message)
+        return unplaced
 
     def _requested(self, request: ChangePart.Request) -> Part:
         """The part that the request describes.
@@ -240,6 +256,10 @@ class PartChange:
                 f'{folder} already exists: a part has one run for each coat, and none is '
                 'overwritten; give another serial, or move the folder away'
             )
+        # Runs beside that of the part may be read, too.
+        run = Path(request.resume).expanduser().resolve()
+        if request.resume and run.parent != folder.parent.resolve():
+            self._node.require_named_folder(request.resume)
         return following
 
     async def _recorded(self, path: str) -> RecordedPart:
@@ -300,11 +320,11 @@ class PartChange:
         newest_ns = max(source.newest_ns for source in self._node.inputs)
         return newest_ns or self._node.get_clock().now().nanoseconds
 
-    def _set_pose(self, part_pose: list[float]) -> None:
+    def _set_pose(self, part_pose: list[float]) -> str:
+        """Place the part; why it stands as before, if it does."""
         change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
         result = self._node.set_parameters_atomically([change])
-        if not result.successful:
-            raise PaintError(result.reason)
+        return '' if result.successful else f'it stands where the part before did: {result.reason}'
 
     def _sentence(self) -> str:
         part = self.part
@@ -330,6 +350,7 @@ class PartChange:
     def _prepare(self, mesh_file: str) -> PreparedPart:
         """Read the mesh and compile, in a thread of its own."""
         node = self._node
+        node.require_named_folder(mesh_file)
         surface = read_part(node.values, mesh_file)
         points = surface.points()
         film = unpainted_films(surface, points, node.models, node.values)
@@ -352,15 +373,23 @@ class PartChange:
         }
         return film_writer(node, self._folder(part.run), 'film', described)
 
-    async def _saved(self, save: Callable[[], list[Path]]) -> list[str]:
+    def _save_films(self) -> list[Path]:
+        """Save the films that are not on disk, the oldest first, in the thread for that."""
+        paths: list[Path] = []
         try:
-            paths = await self._node.result_of(self._saving.submit(save))
-        except (PaintError, OSError) as error:
-            self._save_error = f'the film of the previous part is not saved: {error}'
+            while self._unsaved:
+                paths += self._unsaved[0]()
+                del self._unsaved[0]
+            self._save_error = ''
+        except (PaintError, OSError, MemoryError) as error:
+            films = f'the films of {len(self._unsaved)} former parts are not saved, and kept'
+            self._save_error = f'{films}: {str(error) or "not enough memory"}'
             self._node.get_logger().error(self._save_error)
-            raise PaintError(f'{self._sentence()}; {self._save_error}') from None
-        self._save_error = ''
-        return [str(path) for path in paths]
+        return paths
+
+    def _save_again(self) -> None:
+        if self._save_error:
+            self._saving.submit(self._save_films)
 
     def _publish(self, since_ns: int, part_pose: Sequence[float]) -> None:
         part, node = self.part, self._node

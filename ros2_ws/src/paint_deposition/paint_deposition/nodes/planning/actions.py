@@ -65,9 +65,9 @@ class PassesAction:
         except CancelledError:
             goal.canceled()
             return PlanPasses.Result(message='cancelled')
-        except PaintError as error:
+        except (PaintError, MemoryError) as error:
             goal.abort()
-            return PlanPasses.Result(message=str(error))
+            return PlanPasses.Result(message=str(error) or 'not enough memory')
         goal.succeed()
         return result
 

@@ -143,8 +143,8 @@ class IndexPlanner(PaintNode):
                 travel_rad=values['travel_rad'],
             )
             answer = recommend(self._selected_model(), index_request)
-        except PaintError as error:
-            self._last = Status(WARN, str(error))
+        except (PaintError, MemoryError) as error:
+            self._last = Status(WARN, str(error) or 'not enough memory')
             response.message = str(error)
             return response
         self._last = Status(OK, answer.sentence)
@@ -159,6 +159,7 @@ class IndexPlanner(PaintNode):
             raise PlanError('mesh_file is empty: name the mesh of the part')
         progress('reading the mesh', 0.0)
         mesh_file = os.path.expanduser(values['mesh_file'])
+        self.require_named_folder(mesh_file)
         surface = read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'])
         for note in surface.notes:
             self.get_logger().warning(note)

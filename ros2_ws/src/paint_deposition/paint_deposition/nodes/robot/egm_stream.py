@@ -42,8 +42,7 @@ def egm_message(name: str = 'Robot') -> Any:
         from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
     except ImportError:
         raise PaintError(
-            'egm_source needs protobuf, which is not installed; run: pip install '
-            "'paint_deposition[robot]'"
+            'egm_source needs protobuf, which is not installed; run: pip install protobuf'
         ) from None
     file = descriptor_pb2.FileDescriptorProto(name='egm_read.proto', package='egm_read')
     kinds = descriptor_pb2.FieldDescriptorProto

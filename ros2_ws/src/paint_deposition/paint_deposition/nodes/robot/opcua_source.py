@@ -1,7 +1,8 @@
 """Node `opcua_source`: the gun's signals of a material supply, by OPC UA."""
 
 import asyncio
-from collections.abc import Callable
+import os
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from paint_deposition.errors import PaintError
@@ -9,12 +10,24 @@ from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
 POLL_S = 0.2
+POLICIES = ('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss')
 
 SOURCE = fixed_while_running(
     'the signals are subscribed to with it; restart the node',
     url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
     period_s=NodeParameter(
         0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
+    ),
+    user=NodeParameter(
+        '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
+    ),
+    security_policy=NodeParameter(
+        'None', 'How messages are signed and encrypted', choices=POLICIES
+    ),
+    certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
+    private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),
+    server_certificate_file=NodeParameter(
+        '', 'Certificate that the server must have; empty: the one that it sends [path]'
     ),
     **SIGNALS,
 )
@@ -28,9 +41,19 @@ class OpcuaSource(SignalSource):
     """
 
     PARAMETERS = SOURCE
+    PASSWORD = 'OPCUA_PASSWORD'
 
     def __init__(self, **kwargs: Any):
         super().__init__('opcua_source', **kwargs)
+
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        super()._validate(values)
+        keys = [values['certificate_file'], values['private_key_file']]
+        if (values['security_policy'] != 'None') != all(keys) or any(keys) != all(keys):
+            raise PaintError(
+                'opcua_source: security_policy, certificate_file and private_key_file belong '
+                'together: give all of them, or none'
+            )
 
     def follow(self, stopped: Callable[[], bool]) -> None:
         """Subscribe to all variables, and take their values."""
@@ -40,10 +63,17 @@ class OpcuaSource(SignalSource):
         try:
             from asyncua.client.client import Client
         except ImportError:
-            raise PaintError(
-                "asyncua is not installed; run: pip install 'paint_deposition[robot]'"
-            ) from None
-        async with Client(self.values['url']) as client:
+            raise PaintError('asyncua is not installed; run: pip install asyncua') from None
+        client = Client(self.values['url'])
+        if self.values['user']:
+            client.set_user(self.values['user'])
+            client.set_password(os.environ.get(self.PASSWORD, ''))
+        if self.values['security_policy'] != 'None':
+            named = ('certificate_file', 'private_key_file', 'server_certificate_file')
+            files = filter(None, (self.values[name] for name in named))
+            secured = [self.values['security_policy'], 'SignAndEncrypt', *files]
+            await client.set_security_string(','.join(secured))
+        async with client:
             found: dict[Any, str] = {}
             for signal in self.signals:
                 if '=' in signal:

@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from typing import Any
 from urllib import request
-from urllib.parse import urlencode
+from urllib.parse import urlencode, urlsplit
 from xml.etree import ElementTree
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, quoted
 from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
@@ -18,13 +18,12 @@ PATH = '/rw/iosystem/signals/'
 PROTOCOL = 'robapi2_subscription'
 # Of the three that RWS has, the one for signals that are wanted at once.
 HIGH = 2
-PASSWORD = 'RWS_PASSWORD'
 
 SOURCE = fixed_while_running(
     'the signals are subscribed to with it; restart the node',
     url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
     user=NodeParameter(
-        'Default User', f'User of the controller; its password is in {PASSWORD} [name]'
+        'Default User', 'User of the controller; its password is in RWS_PASSWORD [name]'
     ),
     **SIGNALS,
 )
@@ -37,6 +36,7 @@ class RwsSource(SignalSource):
     """
 
     PARAMETERS = SOURCE
+    PASSWORD = 'RWS_PASSWORD'
 
     def __init__(self, **kwargs: Any):
         super().__init__('rws_source', **kwargs)
@@ -46,21 +46,22 @@ class RwsSource(SignalSource):
         try:
             from websockets.sync.client import connect
         except ImportError:
-            raise PaintError(
-                "websockets is not installed; run: pip install 'paint_deposition[robot]'"
-            ) from None
+            raise PaintError('websockets is not installed; run: pip install websockets') from None
         wanted: dict[str, Any] = {'resources': [*range(1, len(self.signals) + 1)]}
         for number, signal in enumerate(self.signals, start=1):
             wanted |= {f'{number}': f'{PATH}{signal};state', f'{number}-p': HIGH}
         url, user = self.values['url'].rstrip('/'), self.values['user']
         logins = request.HTTPPasswordMgrWithDefaultRealm()
-        logins.add_password(None, url, user, os.environ.get(PASSWORD, 'robotics'))
+        logins.add_password(None, url, user, os.environ.get(self.PASSWORD, 'robotics'))
         cookies = request.HTTPCookieProcessor()
         opener = request.build_opener(cookies, request.HTTPDigestAuthHandler(logins))
         body = urlencode(wanted, doseq=True).encode()
         try:
             with opener.open(f'{url}/subscription', body, TIMEOUT_S) as answer:
                 events, first = answer.headers['Location'], answer.read()
+            if urlsplit(events).hostname != urlsplit(url).hostname:
+                told = quoted(events)
+                raise PaintError(f'events are said to be at {told}, which is another host')
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
             more = {'Cookie': kept}
             with connect(events, subprotocols=[PROTOCOL], additional_headers=more) as socket:  # type: ignore[list-item]

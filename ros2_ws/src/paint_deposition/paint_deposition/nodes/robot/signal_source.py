@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -90,7 +91,10 @@ class SignalSource(PaintNode):
     """Publishes `atomizer/state` from signals that a thread of the subclass follows.
 
     The state is published, latched, when it changes and once all named signals have arrived.
+    Passwords come from the environment: parameters are read, and recorded, by others.
     """
+
+    PASSWORD: str  # the variable of the environment
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
@@ -114,6 +118,11 @@ class SignalSource(PaintNode):
         self._thread.start()
 
     def _validate(self, values: Mapping[str, Any]) -> None:
+        if urlsplit(values['url']).username is not None:
+            raise PaintError(
+                f'{self.get_name()}: url holds a login, which all nodes of the cell could read; '
+                f'give user, and its password in the environment as {self.PASSWORD}'
+            )
         if not values['trigger']:
             raise PaintError(f'{self.get_name()}: trigger is empty: name the signal of the gun')
         named = [values[kind] for kind in ('trigger', *FIELDS) if values[kind]]

@@ -6,6 +6,7 @@ import concurrent.futures
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -19,7 +20,7 @@ from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, quoted
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -53,6 +54,7 @@ class PaintNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
+            self._input_folders = self._named_folders()
             self._validate(self.values)
             self._start()
         except PaintError:
@@ -140,6 +142,35 @@ class PaintNode(Node):
         if not self.finished.done():
             self.finished.set_exception(error)
 
+    def require_named_folder(self, file: str) -> None:
+        """Raise PaintError for a file in no folder that was named when the node was started.
+
+        Otherwise whoever can reach the node could read the files of this machine.
+        """
+        path = Path(file).expanduser().resolve()
+        if path.exists() and not any(map(path.is_relative_to, self._input_folders)):
+            raise PaintError(
+                f'{quoted(file)} is in no folder that {self.get_name()} was given at its start; '
+                'restart it with that folder in input_folders'
+            )
+
+    def _named_folders(self) -> list[Path]:
+        """The folders of the files that the parameters name, and those of `input_folders`."""
+        inputs = {name: v for name, v in self.values.items() if name != 'output_directory'}
+        files = map(Path.resolve, map(Path, self._files_of(inputs)))
+        return [path if path.is_dir() else path.parent for path in files]
+
+    def _files_of(self, values: Mapping[str, Any]) -> list[str]:
+        """The paths that parameters hold."""
+        paths = (
+            value
+            for name, value in values.items()
+            if name in self.PARAMETERS and self.PARAMETERS[name].description.endswith('[path]')
+        )
+        return [
+            file for held in paths for file in ([held] if isinstance(held, str) else held) if file
+        ]
+
     # --- changes of parameters
 
     def set_parameters_atomically(
@@ -166,11 +197,14 @@ class PaintNode(Node):
     def _on_set_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         new = {change.name: change.value for change in changes}
         try:
+            for file in self._files_of(new):
+                self.require_named_folder(file)
             self._validate(self.values | new)
             if self.configured:
                 self._validate_change(self.values | new, set(new))
-        except PaintError as error:
-            return SetParametersResult(successful=False, reason=str(error))
+        except (PaintError, MemoryError) as error:
+            reason = str(error) or 'not enough memory'
+            return SetParametersResult(successful=False, reason=reason)
         return SetParametersResult(successful=True)
 
     def _after_set_parameters(self, changes: list[Parameter]) -> None:

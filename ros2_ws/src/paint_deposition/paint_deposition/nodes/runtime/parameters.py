@@ -16,7 +16,7 @@ from rcl_interfaces.msg import (
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
-from paint_deposition.errors import PaintError, did_you_mean
+from paint_deposition.errors import PaintError, did_you_mean, quoted
 
 INT64_MAX = 2**63 - 1
 # Declared by rclpy itself, or read by it when publishers and subscriptions are created.
@@ -115,9 +115,9 @@ class NodeParameter:
             upper = f' and at most {high}' if math.isfinite(high) else ''
             return f'is {value}: must be at least {low}{upper}'
         if self.choices and value not in self.choices:
-            return f'is {value!r}: choose one of {", ".join(self.choices)}'
+            return f'is {quoted(value)}: choose one of {", ".join(self.choices)}'
         if self.allows is not None and not self.allows(value):
-            return f'is {value!r}: must be {self.constraints}'
+            return f'is {quoted(value)}: must be {self.constraints}'
         return None
 
 
@@ -179,6 +179,14 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
             constraints='a name',
             allows=lambda value: bool(value.strip('/')),
         ),
+        'input_folders': NodeParameter(
+            [],
+            'Folders whose meshes, models and recordings may be asked for later, beside those of '
+            'the files named at the start [path]',
+            element=str,
+            fixed_because='whoever can set parameters could otherwise read files of this machine; '
+            'restart the node with the new value',
+        ),
     }
 
 
@@ -224,7 +232,7 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
 def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
     reason = None
     if value != [] and Parameter.Type.from_parameter_value(value) != row.ros_type:
-        reason = f'is {value!r}: give {TYPE_DESCRIPTIONS[row.ros_type]}'
+        reason = f'is {quoted(value)}: give {TYPE_DESCRIPTIONS[row.ros_type]}'
     if reason := reason or row.error_for(value):
         raise PaintError(f'{node.get_name()}: {name} {reason}')
     if value != []:

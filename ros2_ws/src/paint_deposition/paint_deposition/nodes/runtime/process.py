@@ -92,8 +92,8 @@ def _spin(node: PaintNode, signals: list[int]) -> int:
 
 
 def _report_error(error: Exception) -> int:
-    if isinstance(error, PaintError):
-        sys.stderr.write(f'error: {error}\n')
+    if isinstance(error, PaintError | MemoryError):
+        sys.stderr.write(f'error: {str(error) or "not enough memory"}\n')
         return EXIT_BAD_INPUT
     traceback.print_exception(error)
     return EXIT_CRASH

@@ -1,6 +1,8 @@
 """Node `web_view`: the film as it is painted, on a page for browsers."""
 
 import contextlib
+import os
+import sys
 import time
 from collections.abc import Mapping
 from functools import partial
@@ -41,7 +43,7 @@ from paint_deposition.nodes.runtime.parameters import (
 from paint_deposition.nodes.runtime.topics import gun_topic
 from paint_deposition.part.facing import turned
 from paint_deposition.report.live.scene import Scene
-from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, Page
+from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 # Poses are taken from their queue so often [s]; at 1 kHz half a second of them fits into it.
 TAKE_PERIOD_S = 0.05
@@ -60,7 +62,9 @@ WEB_VIEW = dict(
             'Address to listen on; any but that of this machine alone needs a token [name]',
         ),
         port=NodeParameter(DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)),
-        token=NodeParameter('', 'Token that browsers must give; empty: made where needed [name]'),
+        token=NodeParameter(
+            '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
+        ),
     ),
     color_min_um=thickness_parameter(
         'Film at the lower end of the colours; both ends 0: automatic [µm]'
@@ -129,8 +133,11 @@ class WebView(PaintNode):
         self._sent = 0, time.monotonic()
         self._show_part(self.values['mesh_file'])
         values = self.values
-        self.page = Page([self.scene], values['host'], values['port'], values['token'])
-        self.get_logger().info(f'the page is at {self.page.url}')
+        token = values['token'] or os.environ.get(TOKEN, '')
+        self.page = Page([self.scene], values['host'], values['port'], token)
+        # Not to the log, which is published.
+        sys.stdout.write(f'the page is at {self.page.url}\n')
+        sys.stdout.flush()
 
     def close(self) -> None:
         self.page.close()
@@ -159,9 +166,10 @@ class WebView(PaintNode):
             self.scene.begin_again()
         else:
             try:
+                self.require_named_folder(part.mesh_file)
                 self._show_part(part.mesh_file)
-            except PaintError as error:
-                self._say(str(error))
+            except (PaintError, MemoryError) as error:
+                self._say(str(error) or 'not enough memory')
                 return
         serial = f'{part.serial}, ' if part.serial else ''
         self.scene.tell('about', text=serial + Path(part.mesh_file).name)

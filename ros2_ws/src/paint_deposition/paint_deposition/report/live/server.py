@@ -18,6 +18,8 @@ from paint_deposition.errors import PaintError
 from paint_deposition.report.live.scene import Scene, Seen, frame
 
 DEFAULT_HOST, DEFAULT_PORT = '127.0.0.1', 8090
+# The variable of the environment for the token: others can read the words of a command.
+TOKEN = 'PAINT_TOKEN'
 STATIC = Path(__file__).parent / 'static'
 # Browsers are brought up to date this often [s].
 PERIOD_S = 0.1

@@ -1,6 +1,7 @@
 """A finished film on disk: painted mesh, table, figures and picture."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,7 @@ import numpy as np
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import replacing
-from paint_deposition.files.gauge_readings import write_predictions
+from paint_deposition.files.gauge_readings import table_text, write_predictions
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.film.colour_scales import film_scale
@@ -85,7 +86,7 @@ def write_film(
             raise PaintError(
                 f'{path} is there already; choose another name, or move the old file away'
             )
-    with writable(folder):
+    with writable(folder), _all_or_none([] if overwrite else paths):
         shown = film_um > statistics.painted_above_um
         colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
         films = {'thickness_um': film_um}
@@ -97,15 +98,26 @@ def write_film(
     return paths
 
 
+@contextmanager
+def _all_or_none(paths: list[Path]) -> Iterator[None]:
+    """Remove these files if one of them cannot be written."""
+    try:
+        yield
+    except OSError:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        raise
+
+
 def _write_table(path: Path, columns: Mapping[str, np.ndarray], names: np.ndarray | None) -> None:
     """Columns (V,) of numbers by heading, and the zones' names (V,) as the last one, if any."""
     rows = np.column_stack([*columns.values()])
-    heading, form = ','.join(columns), ','.join(['%.9g'] * len(columns))
+    heading, form = [*columns], ','.join(['%.9g'] * len(columns))
     if names is not None:
         rows = np.column_stack([rows.astype(object), _in_table(names)])
-        heading, form = f'{heading},zone', f'{form},%s'
+        heading, form = [*heading, 'zone'], f'{form},%s'
     with replacing(path) as temporary, temporary.open('w', encoding='utf-8') as file:
-        file.write(f'{heading}\n')
+        file.write(table_text([heading]))
         for start in range(0, len(rows), ROWS_AT_ONCE):
             some = rows[start : start + ROWS_AT_ONCE]
             file.write(f'{form}\n' * len(some) % tuple(some.ravel().tolist()))
@@ -114,8 +126,4 @@ def _write_table(path: Path, columns: Mapping[str, np.ndarray], names: np.ndarra
 def _in_table(names: np.ndarray) -> np.ndarray:
     """Names (V,) as fields of a CSV table."""
     each, of = np.unique(names, return_inverse=True)
-    quoted = [
-        '"{}"'.format(name.replace('"', '""')) if set(name) & set('",\n') else name
-        for name in each
-    ]
-    return np.array(quoted)[of]
+    return np.array([name and table_text([[name]]).removesuffix('\n') for name in each])[of]

@@ -1,13 +1,15 @@
 """What a sweep varies: every combination of its grid, its cases and its draws."""
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 from pydantic import BaseModel
+from scipy.spatial.transform import Rotation
 
-from paint_deposition.batch.sweep.sweep_file import MOST_CASES, SweepFile
+from paint_deposition.batch.sweep_file import MOST_CASES, SweepFile
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -15,6 +17,7 @@ from paint_deposition.errors import ManyError, did_you_mean
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
+from paint_deposition.motion.trajectory import Trajectory
 
 INPUTS = ('mesh', 'trajectory', 'model')
 # Of passes that are planned, and of a recording as it was.
@@ -194,3 +197,36 @@ def _changed(section: Any, field: str, value: float, name: str) -> Any:
 
     values = section.model_dump() | {field: float(value)}
     return checked(type(section), name.partition('.')[0], values, ManyError)
+
+
+def varied_motion(
+    trajectory: Trajectory,
+    speed_factor: float = 1.0,
+    standoff_change_m: float = 0.0,
+    flow_factor: float = 1.0,
+) -> Trajectory:
+    """The same motion, changed; as it is where nothing is asked for.
+
+    Args:
+        trajectory: as recorded.
+        speed_factor: all times from the first pose on are divided by it, those of the trigger too.
+        standoff_change_m: the TCP moves back along the tool's axis by it; negative is nearer [m].
+        flow_factor: on the flow of the trigger. Without a trigger the gun sprays all the time.
+    """
+    if speed_factor != 1.0 and len(trajectory):
+        first = trajectory.stamps_ns[0]
+        stamps, triggers = (
+            first + np.round((stamps - first) / speed_factor).astype(np.int64)
+            for stamps in (trajectory.stamps_ns, trajectory.trigger_stamps_ns)
+        )
+        trajectory = replace(trajectory, stamps_ns=stamps, trigger_stamps_ns=triggers)
+    if standoff_change_m != 0.0:
+        tool_z = Rotation.from_quat(trajectory.quaternions_xyzw).apply([0.0, 0.0, 1.0])
+        moved = trajectory.positions_m - standoff_change_m * tool_z
+        trajectory = replace(trajectory, positions_m=moved)
+    if flow_factor != 1.0:
+        stamps, flow = trajectory.trigger_stamps_ns, trajectory.trigger_flow
+        if not len(stamps):
+            stamps, flow = trajectory.stamps_ns[:1], np.ones(1)
+        trajectory = replace(trajectory, trigger_stamps_ns=stamps, trigger_flow=flow_factor * flow)
+    return trajectory

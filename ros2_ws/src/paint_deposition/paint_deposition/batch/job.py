@@ -1,13 +1,16 @@
-"""The cases of a sweep and the inputs that they share, each read once."""
+"""The cases of a sweep, the inputs that they share, each read once, and what a case computes."""
 
-from collections.abc import Callable
+import hashlib
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from paint_deposition.api.planning import plan
+from paint_deposition.api.simulation import simulate
 from paint_deposition.batch.cases import Case, code_digest, digest_of
-from paint_deposition.batch.sweep.sweep_file import SweepFile
-from paint_deposition.batch.sweep.variations import (
+from paint_deposition.batch.sweep_file import SweepFile
+from paint_deposition.batch.variations import (
     DRAW,
     MOTION_KEYS,
     PASS_KEYS,
@@ -16,10 +19,12 @@ from paint_deposition.batch.sweep.variations import (
     named_models,
     variations,
     varied_model,
+    varied_motion,
 )
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ManyError
+from paint_deposition.effects.user_effects import load_unnamed_effect_file
+from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
@@ -27,8 +32,14 @@ from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.inference.fitting.posterior import draw_models
+from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
 
 NOTHING = 'nothing'
+# Columns that hold a list in each row: the film at every vertex, the gauge at every reading.
+PREDICTED = 'predicted_um'
+WARNINGS = 'warnings'
 
 
 @dataclass
@@ -95,7 +106,7 @@ class Job:
 
     def _model_file(self, path: Path) -> ModelFile:
         self.files[f'model {path.name}'] = path
-        return self._once(('model', path), lambda: read_model_file(path))
+        return self._once(('model', path), lambda: read_model_file(path, load_unnamed_effect_file))
 
     def _model(self, values: Values) -> DepositionModel:
         path = self._named('model', values)
@@ -166,3 +177,42 @@ class Job:
             'target_um': file.target_um,
             'tolerance_um': file.tolerance_um,
         }
+
+
+def computed(
+    parameters: Mapping[str, Any],
+    surface: Surface,
+    trajectory: Trajectory | None,
+    readings: Readings | None,
+) -> dict[str, list[Any]]:
+    """The figures of a case, one row; a case without a film says why in the column ``error``.
+
+    Args:
+        parameters: ``model``, ``motion``, ``passes``, ``target_um``, ``tolerance_um``.
+        surface: the part. trajectory: the motion; None: passes are planned.
+        readings: places at which the gauge is predicted, or None.
+    """
+    model: DepositionModel = parameters['model']
+    figures: dict[str, Any] = {}
+    try:
+        if trajectory is None:
+            planned = plan(surface, model, **parameters['passes'])
+            trajectory = planned.trajectory
+            figures |= {'passes': len(planned.passes), 'cycle_time_s': planned.cycle_time_s}
+        film = simulate(
+            surface, varied_motion(trajectory, **parameters['motion']), model, readings=readings,
+            target_um=parameters['target_um'], tolerance_um=parameters['tolerance_um'],
+        )  # fmt: skip
+    except PaintError as error:
+        return {'error': [str(error)]}
+    statistics = film.statistics
+    figures |= {
+        **statistics.to_dict(),
+        'sigma_n': statistics.std_dev_um / statistics.mean_um if statistics.mean_um else None,
+        'spraying_time_s': film.path.spraying_time_s,
+        'film_sha256': hashlib.sha256(film.film_um.tobytes()).hexdigest(),
+        WARNINGS: '; '.join(film.warnings),
+    }
+    if film.predicted_um is not None:
+        figures[PREDICTED] = film.predicted_um.tolist()
+    return {name: [value] for name, value in figures.items()}

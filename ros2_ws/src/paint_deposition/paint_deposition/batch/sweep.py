@@ -1,9 +1,11 @@
-"""The result of a sweep: a row for each case, and its files."""
+"""A sweep: its cases computed, a row for each, and its files."""
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,12 +13,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from paint_deposition.batch.cases import ResultCache
-from paint_deposition.batch.sweep.case import PREDICTED, WARNINGS
-from paint_deposition.batch.sweep.job import Job
-from paint_deposition.batch.sweep.variations import DRAW
+from paint_deposition.batch.cases import compute, workers
+from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
+from paint_deposition.batch.sweep_file import read_sweep
+from paint_deposition.batch.variations import DRAW
+from paint_deposition.errors import ManyError
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.parquet import write_parquet
+from paint_deposition.files.parquet import require_pyarrow, write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK
@@ -24,6 +27,7 @@ from paint_deposition.report.writers.write import written
 
 if TYPE_CHECKING:
     import pyarrow as pa
+    from distributed import Client
 
 # With no more values than this a line is drawn through their medians.
 FEW_VALUES = 12
@@ -37,6 +41,56 @@ SCORE, LABEL = 'sigma_n', 'unevenness σ_N'
 CHARTED = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
 
 
+def sweep(
+    path: str | Path,
+    folder: str | Path,
+    executor: Executor | Client | None = None,
+    *,
+    scheduler: str | None = None,
+    count: int | None = None,
+    progress: Callable[..., None] = lambda what, share=None: None,
+) -> Sweep:
+    """Compute the variations that a sweep file describes; each film is that of a single run.
+
+    Args:
+        path: of the YAML file.
+        folder: what is finished is kept in its folder ``finished``: a run that was cut off
+            computes the rest only.
+        executor: what computes the cases: any of ``concurrent.futures``, or a Client of Dask,
+            which sends the part once to each worker. Default: processes of this machine, or the
+            workers of a scheduler.
+        scheduler: of Dask, its address, 'tcp://10.0.0.5:8786'; default: DASK_SCHEDULER_ADDRESS,
+            unless there is a count.
+        count: of processes on this machine; default: one a core.
+        progress: called with what is being done, and the share of it that is done.
+
+    Raises:
+        PaintError: a file that cannot be used, values that do not go together, or no case has a
+            result.
+    """
+    require_pyarrow('a sweep')
+    import pyarrow as pa
+
+    path = Path(path)
+    progress('reading')
+    job = Job.of(read_sweep(path), path.parent, progress)
+    open_executor = nullcontext(executor) if executor else workers(scheduler, count)
+    figures, now = compute(
+        computed, job.cases, job.inputs, Path(folder) / 'finished', open_executor, progress
+    )
+    columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
+    for name in dict.fromkeys(name for values in job.values for name in values):
+        columns[name] = _column([values.get(name) for values in job.values])
+    columns |= {name: figures[name] for name in figures.column_names}
+    if 'error' not in columns:
+        columns['error'] = pa.nulls(len(job.cases), pa.string())
+    found = Sweep(job, pa.table(columns), now)
+    if len(found.errors) == len(job.cases):
+        number, error = found.errors[0]
+        raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
+    return found
+
+
 @dataclass(frozen=True)
 class Sweep:
     """The finished cases of a sweep."""
@@ -44,20 +98,6 @@ class Sweep:
     job: Job  # what was swept
     table: pa.Table  # a row for each case in the order of the job: what varied, then its figures
     computed: int  # how many cases this run computed; the others had been finished before
-
-    @staticmethod
-    def of(job: Job, results: ResultCache, computed: int) -> Sweep:
-        """Collect the results of a job that is finished."""
-        import pyarrow as pa
-
-        figures = results.table(case.digest for case in job.cases)
-        columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
-        for name in dict.fromkeys(name for values in job.values for name in values):
-            columns[name] = _column([values.get(name) for values in job.values])
-        columns |= {name: figures[name] for name in figures.column_names}
-        if 'error' not in columns:
-            columns['error'] = pa.nulls(len(job.cases), pa.string())
-        return Sweep(job, pa.table(columns), computed)
 
     def __repr__(self) -> str:
         return f'Sweep({self.sentence})'

@@ -1,8 +1,9 @@
-"""A sweep by processes: the films of single runs, whatever dies on the way."""
+"""A sweep: the films of single runs, and what was finished before is not computed again."""
 
 import hashlib
 import json
-import multiprocessing
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import nullcontext
 
 import pyarrow.parquet as pq
 import pytest
@@ -11,15 +12,14 @@ import yaml
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.batch.cases import ResultCache
-from paint_deposition.batch.processes import compute
-from paint_deposition.batch.sweep.case import computed, varied_motion
-from paint_deposition.batch.sweep.job import Job
-from paint_deposition.batch.sweep.sweep_file import SweepFile
+from paint_deposition.batch.cases import compute, workers
+from paint_deposition.batch.job import Job, computed
+from paint_deposition.batch.sweep_file import SweepFile
+from paint_deposition.batch.variations import varied_motion
+from paint_deposition.effects.user_effects import effects_allowed
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08
-ONE = ('--workers', 1)
 SPEEDS, K1 = [0.9, 1.0, 1.1], [1.8, 1.9]
 TOLD = {
     'mesh': 'door.stl', 'trajectory': 'door', 'state_topic': '/atomizer/state',
@@ -37,6 +37,19 @@ def sweep_file(tmp_path):
 
 
 @pytest.fixture(scope='module')
+def worker():
+    """A worker process of this machine, through its client."""
+    with workers(count=1) as client:
+        yield client
+
+
+@pytest.fixture
+def at_worker(worker):
+    """Options by which a command uses it."""
+    return '--scheduler', worker.scheduler.address
+
+
+@pytest.fixture(scope='module')
 def by_itself():
     """`by_itself(model, speed)`: the same film as one run."""
     surface = pd.read_mesh(DOOR / 'door.stl', max_edge_length_m=EDGE_M)
@@ -48,21 +61,10 @@ def by_itself():
 
 
 @pytest.mark.slow
-def test_films_are_those_of_single_runs_though_a_process_is_killed(tmp_path, by_itself):
-    job = Job.of(SweepFile.model_validate(TOLD), DOOR)
-    finished = ResultCache(tmp_path / 'finished')
-    killed = []
-
-    def kill_one(what: str, share: float) -> None:
-        if not killed:
-            killed.extend(multiprocessing.active_children())
-            killed[0].kill()
-
-    for left in (6, 0):
-        assert compute(computed, job.cases, job.inputs, finished, kill_one, 2) == left
-    assert len(killed) == 2
-    table = finished.table(case.digest for case in job.cases).to_pylist()
-    for values, row in zip(job.values, table, strict=True):
+def test_films_are_those_of_single_runs_by_any_executor(sweep_file, tmp_path, by_itself):
+    with ThreadPoolExecutor(2) as threads:
+        found = pd.sweep(sweep_file, tmp_path / 'out', threads)
+    for values, row in zip(found.job.values, found.table.to_pylist(), strict=True):
         planar = pd.DepositionModel().planar
         planar = planar.model_copy(update={'K1_cm3_per_s': values['planar.K1_cm3_per_s']})
         alone = by_itself(pd.DepositionModel(planar=planar), values['speed_factor'])
@@ -72,15 +74,15 @@ def test_films_are_those_of_single_runs_though_a_process_is_killed(tmp_path, by_
 
 
 @pytest.mark.slow
-def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path):
+def test_a_run_that_was_cut_off_computes_the_rest_only(sweep_file, tmp_path, at_worker):
     output = tmp_path / 'out'
-    told = json.loads(paint('sweep', sweep_file, '-o', output, *ONE, '--json').stdout)
+    told = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
     assert (told['cases'], told['computed'], told['errors']) == (6, 6, [])
     assert told['judged_by'] == 'sigma_n'
     first = pq.read_table(output / 'cases.parquet')
     kept = sorted((output / 'finished').iterdir())
     kept[2].unlink()
-    again = json.loads(paint('sweep', sweep_file, '-o', output, *ONE, '--json').stdout)
+    again = json.loads(paint('sweep', sweep_file, '-o', output, *at_worker, '--json').stdout)
     assert again['computed'] == 1
     assert pq.read_table(output / 'cases.parquet').equals(first)
     assert first['speed_factor'].to_pylist() == SPEEDS * 2
@@ -116,20 +118,19 @@ def test_what_does_not_go_together_is_refused_before_any_process_starts(tmp_path
 
 
 @pytest.mark.slow
-def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path):
+def test_what_cannot_be_painted_says_why_and_the_rest_is_drawn(tmp_path, at_worker):
     """Names of files and lists of effects are drawn over, too; a bare part is no best case."""
     told = {'max_edge_length_m': EDGE_M, 'cases': [{'standoff_change_m': 30.0}, {'effects': []}]}
     told |= {key: str(DOOR / TOLD[key]) for key in ('mesh', 'trajectory')}
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *ONE)
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     assert done.returncode == 0, done.stderr
     assert 'warning: case 1: ' in done.stderr
     assert 'best by unevenness σ_N: case 2, effects []' in done.stdout
     assert (tmp_path / 'out/sweep.png').stat().st_size > 10_000
     told['cases'] = told['cases'][:1]
     (tmp_path / 'sweep.yaml').write_text(yaml.safe_dump(told))
-    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out')
-    done.stderr = done.stderr.splitlines()[-1]  # after the notes
+    done = paint('sweep', tmp_path / 'sweep.yaml', '-o', tmp_path / 'out', *at_worker)
     assert_refused(done, 'none of 1 cases has a result; case 1: ')
 
 
@@ -146,8 +147,19 @@ class Own(Effect):
 """
 
 
+@pytest.fixture
+def with_leave():
+    """As with --allow-effects."""
+    token = effects_allowed.set(True)
+    yield
+    effects_allowed.reset(token)
+
+
 @pytest.mark.slow
-def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(tmp_path, by_itself):
+@pytest.mark.usefixtures('with_leave')
+def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(
+    tmp_path, by_itself, worker
+):
     """Its parameters vary like any others, and its text is part of what a case is known by."""
     file, model_file = tmp_path / 'own.py', tmp_path / 'model.yaml'
     file.write_text(OWN)
@@ -158,9 +170,10 @@ def test_a_users_own_effect_travels_to_processes_that_have_not_its_file(tmp_path
     job = Job.of(sweep, DOOR)
     alone = by_itself(pd.read_model(model_file), SPEEDS[0])
     file.unlink()
-    finished = ResultCache(tmp_path / 'finished')
-    compute(computed, job.cases, job.inputs, finished, lambda what, share: None, 1)
-    as_told, weaker = finished.table(case.digest for case in job.cases).to_pylist()
+    table, _ = compute(
+        computed, job.cases, job.inputs, tmp_path, nullcontext(worker), lambda what, share: None
+    )
+    as_told, weaker = table.to_pylist()
     assert as_told['film_sha256'] == hashlib.sha256(alone.film_um.tobytes()).hexdigest()
     assert weaker['mean_um'] < as_told['mean_um']
     file.write_text(OWN.replace('1.0 + ', '1.5 + '))

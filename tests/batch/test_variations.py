@@ -5,9 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from booth import spot
-from paint_deposition.batch.sweep.case import varied_motion
-from paint_deposition.batch.sweep.sweep_file import SweepFile, read_sweep
-from paint_deposition.batch.sweep.variations import variations, varied_model
+from paint_deposition.batch.sweep_file import SweepFile, read_sweep
+from paint_deposition.batch.variations import variations, varied_model, varied_motion
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
 from paint_deposition.model.brush import Brush

@@ -1,1 +1,0 @@
-"""A line: many parts over days, what they have in common and what changes."""

@@ -1,1 +1,0 @@
-"""A sweep: many variations of one job, each computed as `simulate` or `compare` would."""
