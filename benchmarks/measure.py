@@ -14,7 +14,7 @@ from pathlib import Path
 
 import click
 import numpy as np
-from benchmarks.records import add, kept, model_of, results_option
+from benchmarks.records import add, kept, results_option
 from tests.virtual_paint_shop.bench import Bench
 from tests.virtual_paint_shop.draw import draw_jobs, stream
 from tests.virtual_paint_shop.gauge import GaugeNoise, measure
@@ -23,6 +23,7 @@ from tests.virtual_paint_shop.truths import choose as choose_truths
 
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.reading_choice import (
     ChosenReadings,
@@ -33,6 +34,8 @@ from paint_deposition.inference.diagnosis.reading_choice import (
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.gauge_places import grid_places
 from paint_deposition.part.surface import Surface
@@ -71,7 +74,13 @@ class Door:
             log.stamps_ns, log.positions_m, log.quaternions_xyzw,
             trigger_stamps_ns=log.trigger_stamps_ns, trigger_flow=1.0 * log.trigger_on,
         )  # fmt: skip
-        model = model_of(pattern.as_dict())
+        values = pattern.as_dict()
+        model = DepositionModel(
+            planar=PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields}),
+            projection=Projection(
+                model_plane_m=pattern.model_plane_m, emission_offset_m=pattern.emission_offset_m
+            ),
+        )
         seen = look_at(surface, motion, model)
         part = UnmeasuredPart(seen.surface, seen.path, model, EFFECTS)
         film_um = part.film_um

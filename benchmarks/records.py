@@ -9,9 +9,6 @@ from distributed import as_completed
 from tqdm import tqdm
 
 from paint_deposition.batch.cases import workers
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.model.eq2_projection import Projection
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -38,10 +35,3 @@ def add(results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple]
             file.writelines(json.dumps(one, default=float) + '\n' for one in future.result())
             file.flush()
     return kept(results)
-
-
-def model_of(values: dict[str, float]) -> DepositionModel:
-    """The model of a pattern of the shop, by name."""
-    planar = PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields})
-    sizes = {name: values[name] for name in ('model_plane_m', 'emission_offset_m')}
-    return DepositionModel(planar=planar, projection=Projection(**sizes))

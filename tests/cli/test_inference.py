@@ -102,7 +102,7 @@ def test_the_page_of_the_demo_has_the_figures_of_the_files(demo):
     better = content(folder / 'improved/improvement.json')
     assert better['sigma_n']['after'] < 0.5 * better['sigma_n']['before']
     for label, before, after in (
-        ('RMSE, fitted points', f'{errors["before"]:.2f}', f'{errors["after"]:.2f}'),
+        ('Error at fitted points', f'{errors["before"]:.2f}', f'{errors["after"]:.2f}'),
         ('RMSE, 60 unseen readings', *(f'{one:.2f}' for one in unseen)),
         ('Standard deviation', *(f'{100 * better["sigma_n"][k]:.1f}' for k in better['sigma_n'])),
     ):
