@@ -257,3 +257,38 @@ def test_power_of_the_procedure():
     assert detected[0.02] >= 2
     assert detected[0.06] == 3
     assert named[0.06] >= 2
+
+
+@pytest.fixture(scope='module')
+def striped():
+    """Three panels painted alike, with an upright stripe that lost a fifth of its film."""
+    experiments = []
+    for number in range(3):
+        (panel,) = gauged(BASE, seed=number, columns=7).experiments
+        across_m = panel.readings.positions_m[:, 0]
+        lost = 0.2 * np.exp(-0.5 * ((across_m - 0.15) / 0.08) ** 2)
+        readings = replace(panel.readings, thickness_um=panel.readings.thickness_um * (1.0 - lost))
+        experiments.append(replace(panel.with_readings(readings), name=f'panel {number + 1}'))
+    return diagnose(Campaign(tuple(experiments)), BASE, EFFECTS)
+
+
+def test_a_stripe_on_parts_painted_alike_is_unknown_with_its_place(striped):
+    assert striped.verdict == 'unknown_effect'
+    assert striped.p_value < ALPHA
+    assert not [name for name in striped.accepted if not name.startswith('learned:')]
+    unknown = striped.unknown
+    assert unknown.parts == ('panel 1', 'panel 2', 'panel 3')
+    assert -0.25 < unknown.share < -0.03
+    assert 'of the width from the left' in unknown.where
+    assert str(unknown) in striped.reason
+    assert 'Spray the same part another way' in striped.reason
+
+
+def test_the_figures_of_the_error_belong_together(striped):
+    rmse_um = striped.to_dict()['rmse_um']
+    for when in ('before', 'after'):
+        square = rmse_um[f'beyond_noise_{when}'] ** 2 + rmse_um['noise_floor'] ** 2
+        assert square == pytest.approx(
+            max(rmse_um[f'holdout_{when}'], rmse_um['noise_floor']) ** 2
+        )
+    assert rmse_um['holdout_after'] < rmse_um['holdout_before']

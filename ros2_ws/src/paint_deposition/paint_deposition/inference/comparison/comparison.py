@@ -122,7 +122,8 @@ def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) 
     left, right = 100.0 * np.quantile(share, [0.1, 0.9])
     if right - left > MOST_OF_WIDTH or np.ptp(across[rows]) < LEAST_WIDTH_M:
         return vertical
-    return f'{vertical} at {left:.0f} to {right:.0f} % of the width from the left'
+    place = f'{left:.0f}' if right - left < 1.0 else f'{left:.0f} to {right:.0f}'
+    return f'{vertical} at {place} % of the width from the left'
 
 
 @dataclass(frozen=True)

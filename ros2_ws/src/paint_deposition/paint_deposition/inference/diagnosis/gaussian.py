@@ -141,10 +141,6 @@ class OrthogonalDirections:
         """(m,) squared lengths of the directions."""
         return np.sum(self.columns**2, axis=0)
 
-    def length(self, amplitudes: np.ndarray, some: slice = slice(None)) -> np.ndarray:
-        """(...) standard deviations by which original amplitudes (..., n), or some, move all."""
-        return np.sqrt((amplitudes[..., some] @ self.axes[some]) ** 2 @ self.squares)
-
     def amplitudes(self, deviation: np.ndarray, sizes: np.ndarray) -> np.ndarray:
         """(S, n) posterior means of the original amplitudes at each of S sizes.
 

@@ -216,7 +216,8 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
     shown = [name for name in names if name in {region.experiment for region in regions}]
-    first = regions[0] if regions else None
+    # The strongest contrast is the place to look at: what is widest may only balance it.
+    first = max(regions, key=lambda region: abs(region.mean_residual_um), default=None)
     mean_um = float(np.mean(study.measured_um[first.rows])) if first else np.nan
     return Unknown(
         covariate.name,

@@ -35,7 +35,7 @@ from paint_deposition.inference.fitting.study import Study
 # beyond nature.
 PRIOR_EFFECT, PRIOR_UNKNOWN = 0.02, 0.02
 # Sizes of the amplitudes, times their typical ones: what is typical is known to within a factor.
-SIZES = np.array([0.5, 1.0, 2.0, 4.0])
+SIZES = np.array([0.5, 1.0, 2.0])
 # An effect acts for certain from this posterior probability of its group on.
 SURE = 0.7
 # Between rivals, whose laws are true to their form no better than that, differences of log weight
@@ -193,11 +193,6 @@ class ModelSpace:
         terms[UNKNOWN] = [*terms.get(UNKNOWN, []), *beyond, -np.inf]
         found = {cause: float(np.logaddexp.reduce(values)) for cause, values in terms.items()}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-    def inclusion(self, cause: str) -> float:
-        """Posterior probability that a cause acts, if one acts at the most."""
-        total = np.logaddexp.reduce([0.0, *self.alone.values()])
-        return float(np.exp(self.alone[cause] - total))
 
     def by_law(self, cause: str) -> Effect:
         """An effect in its best shape with the amplitudes that it has if nothing else acts."""

@@ -104,15 +104,15 @@ class EffectSet:
     @cached_property
     def p_value_of_causes(self) -> float:
         """Probability of at least this much evidence for any cause if none acted beside it."""
-        return min(1.0, 2.0 * self.space.p_value(self.state.seed))
+        return min(1.0, self.space.p_value(self.state.seed) / OF_CAUSES)
 
     @property
     def p_value(self) -> float:
         """The same, or of fields over the parts larger than those of usual sprays.
 
-        Two tests were made, so that each counts twice (Bonferroni).
+        Two tests are made, each with its share of the significance level (Bonferroni).
         """
-        of_size = min(1.0, 2.0 * self.space.p_value_of_size(self.state.seed))
+        of_size = self.space.p_value_of_size(self.state.seed) / (1.0 - OF_CAUSES)
         return min(self.p_value_of_causes, of_size)
 
     @cached_property
@@ -177,6 +177,8 @@ class EffectSet:
         return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
 
 
+# Share of the significance level that the test for causes has.
+OF_CAUSES = 0.8
 # So many effects are added at most.
 MOST_EFFECTS = 4
 # Log evidence that two fits of one set may differ by and be the same.
