@@ -363,5 +363,6 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
     assert 'Added as asked' in page.text
     assert 'no known effect' not in page.text
     assert learned_range(law) in page.text
-    assert f'goes from {done.history[0].holdout_rmse_um:.2f} µm' in page.text
+    before, after = (f'{step.holdout_rmse_um:.2f} µm' for step in done.history)
+    assert f'left out of the fit: {before} → {after}; beyond gauge and texture: ' in page.text
     assert page.open == page.clashes == []
