@@ -1,5 +1,7 @@
 """The live film is the offline film, whatever way the motion comes in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -133,6 +135,24 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     assert np.allclose(
         film.snapshot().film_um, painted(lying_plane(), second).film_um, rtol=0, atol=1e-9
     )
+
+
+def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before_their_poses():
+    """All of them, also one that comes with poses that may yet be stragglers."""
+    motion = straight_pass(TIMES_S)
+    back_ns = 3_600_000_000_000
+    again = replace(motion, stamps_ns=motion.stamps_ns - back_ns)
+    film = followed([TriggerChange(START_NS, 1.0), poses(motion, slice(0, 500))])
+    states = [(0.0, 1.0), (0.8, 0.0), (1.2, 0.5)]
+    first, second, third = (
+        TriggerChange(int(stamps_ns([at_s])[0]) - back_ns, flow) for at_s, flow in states
+    )
+    film.replay([first, second, poses(again, slice(0, 20)), third])
+    film.reset()
+    film.add_poses(poses(again, slice(20, None)))
+    seconds = 0.8 - 0.08 + 0.5 * (TIMES_S[-1] - 1.2)
+    emitted_cm3 = MODEL.planar.K1_cm3_per_s * seconds
+    assert film.snapshot().emitted_cm3 == pytest.approx(emitted_cm3, rel=0.01)
 
 
 def test_a_motion_that_begins_again_paints_a_second_coat():

@@ -153,6 +153,8 @@ class LiveFilm:
             self._builder.add_trigger(BEFORE_ALL_NS, 0.0)
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
+        # Of the newest pose that was kept, or of the first change of a stream about to restart.
+        self._reached_ns = BEFORE_ALL_NS
         self._snapshot: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:
@@ -176,9 +178,8 @@ class LiveFilm:
         if not self._changes and self.log.complete and self.log.poses:
             self._restart_with(change)
             return
-        newest = self.newest_ns
-        if newest is not None and newest - change.stamp_ns > STREAM_RESTART_NS:
-            self._changes = []
+        if self._reached_ns - change.stamp_ns > STREAM_RESTART_NS:
+            self._changes, self._reached_ns = [], change.stamp_ns
         self._take_change(change)
 
     def add_poses(self, batch: PoseBatch) -> None:
@@ -187,7 +188,10 @@ class LiveFilm:
             return
         self._restore_carried_trigger(int(batch.stamps_ns[0]))
         self.log.add(batch)
+        before_ns = self.newest_ns
         self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
+        if self.newest_ns is not None and self.newest_ns != before_ns:
+            self._reached_ns = self.newest_ns
         self._integrator.add(self._builder.take(self._settled_ns))
         self._snapshot = None
 
@@ -259,6 +263,6 @@ class LiveFilm:
         self._builder.add_trigger(change.stamp_ns, change.flow, change.brush)
         # Keep the changes that are in effect from the newest pose on.
         insort(self._changes, change, key=_STAMP)
-        passed = bisect_right(self._changes, self.newest_ns or 0, key=_STAMP)
+        passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         del self._changes[: max(0, passed - 1)]
         self._snapshot = None

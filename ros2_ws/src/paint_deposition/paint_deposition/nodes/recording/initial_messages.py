@@ -53,6 +53,9 @@ class InitialMessages:
         self._states_of = {topic: gun[1] for gun in guns.items() for topic in gun}
         # The last pose of each gun that was forgotten.
         self._forgotten = {poses: Recorded(poses, b'', 0, 0) for poses in guns}
+        # Stamp of each gun's newest pose, or of the first state of a stream about to restart, by
+        # the topic of its states.
+        self._reached_ns: dict[str, int] = {}
         self.begin_ns = 0
         # Topics of states that this run does not have yet.
         self._due: set[str] = set()
@@ -68,6 +71,7 @@ class InitialMessages:
             if topic in self._guns:
                 states = self._states_in_force(message)
                 self._motion[topic].append(message)
+                self._reached_ns[self._guns[topic]] = message.stamp_ns
                 return states
             try:
                 trigger_change(deserialize_message(cdr, AtomizerState))
@@ -141,10 +145,12 @@ class InitialMessages:
     def _remember_state(self, state: Recorded) -> None:
         """In the order of the stamps, as a film has them; all anew where a stream restarted."""
         states = self._motion[state.topic]
-        (poses,) = (poses for poses, its in self._guns.items() if its == state.topic)
-        newest = (self._motion[poses] or [self._forgotten[poses]])[-1]
-        if newest.stamp_ns - state.stamp_ns > STREAM_RESTART_NS:
+        # Before any pose the states themselves tell, which are latched from before the recorder.
+        newest_ns = states[-1].stamp_ns if states else state.stamp_ns
+        if self._reached_ns.get(state.topic, newest_ns) - state.stamp_ns > STREAM_RESTART_NS:
             states.clear()
+            if state.topic in self._reached_ns:
+                self._reached_ns[state.topic] = state.stamp_ns
         if len(states) == REMEMBERED_MESSAGES:
             states.popleft()
         row = bisect_right(states, state.stamp_ns, key=lambda other: other.stamp_ns)
@@ -173,8 +179,15 @@ class InitialMessages:
         remembered = self._motion[poses]
         while remembered and remembered[0].sent_ns <= until_ns:
             self._forgotten[poses] = remembered.popleft()
-        states, newest_ns = self._motion[self._guns[poses]], self._forgotten[poses].stamp_ns
-        passed = [row for row, state in enumerate(states) if state.stamp_ns <= newest_ns]
+        states, last = self._motion[self._guns[poses]], self._forgotten[poses]
+        # None that were sent after the last pose, for a stream that restarts long before it.
+        passed = [
+            row for row, state in enumerate(states)
+            if state.stamp_ns <= last.stamp_ns and (
+                state.sent_ns <= last.sent_ns
+                or last.stamp_ns - state.stamp_ns <= STREAM_RESTART_NS
+            )
+        ]  # fmt: skip
         for _ in range(passed[-1] if passed else 0):
             states.popleft()
         return len(remembered)
