@@ -135,8 +135,9 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
         with (
             dask.config.set({'distributed.scheduler.worker-saturation': 1.0}),
             LocalCluster(
-                n_workers=count, threads_per_worker=1, processes=True, dashboard_address=None,
-                silence_logs=logging.CRITICAL, env={'NUMBA_NUM_THREADS': '1'},
+                n_workers=count, threads_per_worker=1, processes=True,
+                dashboard_address='127.0.0.1:0', silence_logs=logging.CRITICAL,
+                env={'NUMBA_NUM_THREADS': '1'},
             ) as cluster,
             Client(cluster) as client,
         ):  # fmt: skip

@@ -352,5 +352,13 @@ class Search:
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
-        without = others.log_weight, others.log_weight_unknown
-        return tuple(members), inclusion_of([*weights.values()], without)
+        # Beside an accepted effect, whose law is no truer than that, evidence counts for less.
+        scale = COARSENED if others.names else 1.0
+        odds = [
+            (self.with_effect(others, rival).log_evidence - others.log_evidence) / scale
+            + log_odds(PRIOR_EFFECT)
+            for rival in rivals
+        ]
+        unknown = others.log_weight_unknown - others.log_weight
+        probability = inclusion_of(odds, [0.0, unknown])
+        return tuple(members), probability

@@ -1,0 +1,48 @@
+"""Forty parts over four days, alike but for an effect that grows from each morning to evening."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.diagnosis.procedure import diagnose
+from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from small_campaign import generated, small_campaign
+from virtual_paint_shop.draw import stream
+from virtual_paint_shop.gauge import GaugeNoise, measure
+
+PARTS, A_DAY, READINGS, TURNS = 40, 10, 36, 6
+GREATEST = 0.8
+DOOR = {
+    'seed': 3, 'truth': 'faraday_shielding', 'amplitude': GREATEST, 'experiments': ('door',),
+    'readings': READINGS, 'repeats': 0, 'heldout': 1, 'style': 'random', 'parcels': 2_000_000,
+    'mesh_edge_m': 0.03,
+}  # fmt: skip
+
+
+@pytest.mark.slow
+def test_an_effect_that_grows_over_each_day_is_named_with_its_mean(tmp_path):
+    (door,) = small_campaign(tmp_path, **DOOR).experiments
+    painted = generated(**DOOR)
+    shown = painted.experiments[0].readings
+    parts = []
+    for row in range(PARTS):
+        share = row % A_DAY / (A_DAY - 1)
+        film_um = shown.clean_um + share * (shown.expected_um - shown.clean_um)
+        read = measure(shown.point, film_um, film_um, GaugeNoise(level=0.015), stream(row, 80))
+        taken = replace(door.readings, thickness_um=read.thickness_um)
+        taken = taken.select(np.arange(READINGS) % TURNS == row % TURNS)
+        part = replace(door.with_readings(taken), name=f'part {row}')
+        parts.append(part)
+    pattern = painted.truth['pattern']
+    planar = PlanarPattern(**{name: pattern[name] for name in PlanarPattern.model_fields})
+    start = time.process_time()
+    found = diagnose(Campaign(tuple(parts)), DepositionModel(planar=planar), EFFECTS)
+    assert time.process_time() - start < 120.0  # of one core, on any machine
+    assert found.accepted == ('faraday_shielding',)
+    shielding = found.classes[0].parameters['shielding']
+    assert shielding.low < GREATEST / 2 < shielding.high
