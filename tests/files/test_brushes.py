@@ -50,6 +50,7 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
         ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
         ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
         ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
         ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
     ],
 )

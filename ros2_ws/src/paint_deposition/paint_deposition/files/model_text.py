@@ -61,7 +61,7 @@ def model_text(
 
 
 def _brush(brush: Brush) -> CommentedMap:
-    text = CommentedMap({} if brush.interpolated else {'planar': _fields(brush.planar)})
+    text = CommentedMap({'planar': _fields(brush.planar)})
     known = brush.set_points.model_dump(exclude_none=True)
     text |= {key: value for key, value in _fields(brush.set_points).items() if key in known}
     for key in known:

@@ -80,11 +80,11 @@ def trajectory_of(
         # Where the clock was set back, the order in which they came says of which stream they are.
         order = np.arange(len(order))
         rows = np.searchsorted(np.maximum.accumulate(log_times_ns), gun.log_times_ns)
-    columns = gun.stamps_ns, gun.flow, gun.brush, gun.set_points
-    stamps, flow, brush, points = (its[order] if len(its) else its for its in columns)
+    columns = gun.stamps_ns, gun.flow, gun.brush
+    stamps, flow, brush = (its[order] if len(its) else its for its in columns)
     return replace(
         trajectory, trigger_stamps_ns=stamps, trigger_flow=flow, trigger_brush=brush,
-        trigger_set_points=points, trigger_rows=rows, settings=gun.settings,
+        trigger_rows=rows, settings=gun.settings,
         notes=(*trajectory.notes, *gun.notes),
     )  # fmt: skip
 
@@ -145,12 +145,10 @@ def write_pose_bag(
         )
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    numbers = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
-    state_type = STATE_TYPE if levels or numbers.any() else BOOL_TYPE
+    state_type = STATE_TYPE if levels or trajectory.trigger_brush.any() else BOOL_TYPE
     # (time, rank at equal times, content): the trigger before the pose.
     entries: list[tuple[int, int, Any]] = [
-        (time_ns, 0, (*gun, trajectory.set_points_of(row)))
-        for row, (time_ns, *gun) in enumerate(trajectory.triggers)
+        (time_ns, 0, gun) for time_ns, *gun in trajectory.triggers
     ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
@@ -202,15 +200,15 @@ def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = Fal
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 
-def _state(
-    types: Typestore, kind: str, header: Any, flow: float, brush: int, set_points: tuple
-) -> Any:
-    """A Bool or an AtomizerState with relative flow, brush and set-points."""
+def _state(types: Typestore, kind: str, header: Any, flow: float, brush: int) -> Any:
+    """A Bool or an AtomizerState with relative flow and brush."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
+    # Neither set-points nor a programmed speed.
     unknown = float('nan')
-    wet, *others = set_points or (unknown,) * 4
-    return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
+    return types.types[STATE_TYPE](
+        header, flow > 0.0, flow, *(unknown,) * 3, brush, unknown, unknown
+    )
 
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:

@@ -30,8 +30,6 @@ class RecordedTrigger:
     flow: np.ndarray  # (M,) relative flow from then on
     brush: np.ndarray  # (M,) int64 brush from then on; empty if it is not recorded
     log_times_ns: np.ndarray  # (M,) int64 when they came, in this order
-    # (M, 4) as in a trajectory; empty if none are recorded.
-    set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     # Median of each setting while the gun sprays.
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
@@ -108,14 +106,12 @@ def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
                 settings.setdefault(name, []).append(value)
     if refused:
         bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
-    set_points = np.array([change.set_points or (0.0,) * 4 for change in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return RecordedTrigger(
         np.array([change.stamp_ns for change in changes], dtype=np.int64),
         np.array([change.flow for change in changes], dtype=float),
         numbered([change.brush for change in changes]),
         np.array(logged, dtype=np.int64),
-        set_points if set_points.any() else np.empty((0, 4)),
         {name: float(np.median(values)) for name, values in settings.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),
