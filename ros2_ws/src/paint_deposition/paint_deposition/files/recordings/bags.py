@@ -12,7 +12,7 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bag_files import Bag, open_bag
+from paint_deposition.files.recordings.bag_files import Bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
@@ -34,12 +34,6 @@ JOINT_TOPIC = '/joint_trajectory'
 # robot have the same clock.
 MAX_CLOCK_OFFSET_S = 1.0
 QUEUE_DEPTH = 500
-
-
-def read_trajectory(path: Path | str, *args: Any, **kwargs: Any) -> Trajectory:
-    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a single .mcap."""
-    with open_bag(path) as bag:
-        return trajectory_of(bag, *args, **kwargs)
 
 
 def trajectory_of(

@@ -194,11 +194,6 @@ class ModelSpace:
         found = {cause: float(np.logaddexp.reduce(values)) for cause, values in terms.items()}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
-    def inclusion(self, cause: str) -> float:
-        """Posterior probability that a cause acts, if one acts at the most."""
-        total = np.logaddexp.reduce([0.0, *self.alone.values()])
-        return float(np.exp(self.alone[cause] - total))
-
     def by_law(self, cause: str) -> Effect:
         """An effect in its best shape with the amplitudes that it has if nothing else acts."""
         best, found = -np.inf, None
