@@ -14,8 +14,6 @@ EGM_LOG = {
     **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
     **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
 }
-EGM_GROUPS = ('R_FB_', 'R_PL_', 'S_REF_')
-EGM_NOTE = 'a log of abb_libegm: what the robot measured (R_FB)'
 
 
 def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
@@ -30,7 +28,7 @@ def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
         if meaning := EGM_LOG.get(heading.text):
             words = Heading.of(meaning)
             heading = Heading(heading.text, words.words, words.unit)
-        elif heading.text.startswith(EGM_GROUPS):
+        elif heading.text.startswith(('R_FB_', 'R_PL_', 'S_REF_')):
             heading = Heading(heading.text, ())
         usual.append(heading)
-    return usual, EGM_NOTE
+    return usual, 'a log of abb_libegm: what the robot measured (R_FB)'

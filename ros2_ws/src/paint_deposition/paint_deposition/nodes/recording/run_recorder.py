@@ -40,7 +40,6 @@ from paint_deposition.nodes.runtime.topics import (
 )
 
 DISCOVERY_PERIOD_S = 0.1
-FLUSH_PERIOD_S = 0.1
 PROGRESS_PERIOD_S = 0.2
 POSES_PER_REPORT = 50
 POSE_QUEUE_DEPTH = 5000
@@ -107,7 +106,7 @@ class RunRecorder(ManagedNode):
         # Poses of these topics have not come since it left.
         self._behind: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
-        self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
+        self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 

@@ -28,7 +28,6 @@ PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
 # On a page a part is drawn no higher than this, with this room above and below [in].
 HIGHEST_IN, AROUND_IN = 4.2, 1.3
-WAY_OFF = '#3a4048'
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 
 
@@ -196,7 +195,7 @@ def draw_tool_path(
     for rows in np.split(np.arange(len(spray)), breaks):
         line = view.flat(spray.position_m[rows])
         if not on[rows].any():
-            axes.plot(*line.T, color=WAY_OFF, linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
+            axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
             continue
         number += 1
         axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)

@@ -8,8 +8,6 @@ from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
 from paint_deposition.report.style import ACCENT, INK, MUTED
 
-TITLE = 'Circle: the place to choose. Figures: how much of the motion is reached'
-
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:
     """Draw the share of the planned speed at each place, or how much of the motion is reached."""
@@ -19,7 +17,7 @@ def write_places(path: str | Path, places: PartPlaces) -> Path:
         axes,
         "x of the part in the robot's base [m]",
         'y [m]',
-        TITLE,
+        'Circle: the place to choose. Figures: how much of the motion is reached',
     )
     axes.grid(False)
     step = max(np.ptp(places.x_m) / max(len(places.x_m) - 1, 1), 1e-3)

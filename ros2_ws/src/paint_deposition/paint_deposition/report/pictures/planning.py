@@ -27,7 +27,6 @@ from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 PERCENT = 100.0
 POINTS = 600
 CHOSEN = '#c0392b'
-WITHIN_TOLERANCE = '#d9ecf0'
 # The colours span this share of both films about the target, to the next 5 %.
 SHOWN, STEP = 0.98, 0.05
 MOST_CHARTS, SAMPLES = 12, 120
@@ -57,7 +56,7 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
                 color=MUTED,
             )  # fmt: skip
         for low, high in answer.windows_m:
-            axes.axvspan(MM * low, MM * high, color=WITHIN_TOLERANCE, linewidth=0.0, zorder=0)
+            axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
     axes.plot(
         MM * answer.curve.index_m, PERCENT * answer.curve.sigma_n, color=ACCENT, linewidth=1.8
     )
