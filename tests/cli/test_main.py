@@ -13,8 +13,7 @@ import pytest
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.cli.examples import EXAMPLES
-from paint_deposition.cli.main import COMMANDS
+from paint_deposition.cli.main import COMMANDS, EXAMPLES
 from paint_deposition.cli.main import paint as group
 
 

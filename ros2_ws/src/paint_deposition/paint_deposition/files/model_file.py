@@ -14,8 +14,13 @@ from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.effect_source import file_name, needs_file, source_of
-from paint_deposition.files.model_text import LEARNED_ID, model_text
+from paint_deposition.files.model_text import (
+    LEARNED_ID,
+    file_name,
+    model_text,
+    needs_file,
+    source_of,
+)
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.repeated_samples import RepeatedSamples
+from paint_deposition.motion.stream_figures import RepeatedSamples
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 

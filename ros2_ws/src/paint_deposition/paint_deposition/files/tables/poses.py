@@ -15,8 +15,8 @@ from paint_deposition.files.tables.pose_columns import (
     ROTATION_VECTOR,
     PoseTable,
     column_name,
+    translated,
 )
-from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.rotations import read_rotations
 from paint_deposition.files.tables.table import SWITCHED, find_table
 from paint_deposition.model.brush import MOST

@@ -17,9 +17,8 @@ from paint_deposition.files.tables.misleading import (
     refuse_rivals,
 )
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
-from paint_deposition.files.tables.reading_rows import orders_of, rows_of_readings
+from paint_deposition.files.tables.reading_rows import figures_at_end, orders_of, rows_of_readings
 from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.summary_figures import figures_at_end
 from paint_deposition.files.tables.table import Table
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.

@@ -18,7 +18,6 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.recording.initial_messages import TF, InitialMessages
-from paint_deposition.nodes.recording.part_runs import part_data, unused_name
 from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
     PARAMETER_EVENTS,
@@ -27,6 +26,8 @@ from paint_deposition.nodes.recording.recorder_parameters import (
     RECORDER,
     STATES,
     default_topics,
+    part_data,
+    unused_name,
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.messages import header

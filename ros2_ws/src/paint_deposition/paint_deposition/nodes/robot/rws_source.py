@@ -15,6 +15,7 @@ from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while
 TIMEOUT_S = 5.0
 POLL_S = 0.2
 PATH = '/rw/iosystem/signals/'
+PROTOCOL = 'robapi2_subscription'
 # Of the three that RWS has, the one for signals that are wanted at once.
 HIGH = 2
 
@@ -63,8 +64,7 @@ class RwsSource(SignalSource):
                 raise PaintError(f'events are said to be at {told}, which is another host')
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
             more = {'Cookie': kept}
-            protocols = ['robapi2_subscription']
-            with connect(events, subprotocols=protocols, additional_headers=more) as socket:  # type: ignore[list-item]
+            with connect(events, subprotocols=[PROTOCOL], additional_headers=more) as socket:  # type: ignore[list-item]
                 self.connected()
                 self._take_all(first)
                 while not stopped():
