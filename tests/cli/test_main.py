@@ -73,7 +73,7 @@ def test_completing_a_command_loads_none():
     )
     *offered, loaded = done.stdout.splitlines()
     assert offered == [f'plain,{name}' for name in COMMANDS]
-    assert ast.literal_eval(loaded) == [f'paint_deposition.cli.{n}' for n in ('examples', 'main')]
+    assert ast.literal_eval(loaded) == ['paint_deposition.cli.main']
 
 
 @pytest.mark.parametrize('command', COMMANDS)

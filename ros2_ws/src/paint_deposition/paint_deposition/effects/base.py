@@ -148,11 +148,6 @@ class Effect(BaseModel):
         """Whether all amplitudes are at the value at which the effect is absent."""
         return all(getattr(self, name) == value for name, value in self._neutral().items())
 
-    @property
-    def acts_on_the_finished_film(self) -> bool:
-        """Whether it acts on the film after it has arrived, or on the gauge."""
-        return self.acts('on_film', 'on_gauge')
-
     @classmethod
     def acts(cls, *places: str) -> bool:
         """Whether it defines one of these places where effects act."""

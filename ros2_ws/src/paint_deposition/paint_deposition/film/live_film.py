@@ -162,7 +162,10 @@ class LiveFilm:
             self._brushes.add(change.brush)
         self._restore_carried_trigger(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
-            self._restart_with(change)
+            log = self.log
+            self._clear()
+            self._take_change(change)
+            self.replay(log.events())
             return
         newest = self.newest_ns
         if newest is not None and newest - change.stamp_ns > STREAM_RESTART_NS:
@@ -218,12 +221,6 @@ class LiveFilm:
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
-
-    def _restart_with(self, first_change: TriggerChange) -> None:
-        log = self.log
-        self._clear()
-        self._take_change(first_change)
-        self.replay(log.events())
 
     def _restore_carried_trigger(self, stamp_ns: int) -> None:
         """After a reset, add the trigger changes from before it, unless the stream restarted."""

@@ -132,12 +132,9 @@ class RepeatedSamples:
             elif stamp_ns > self._last_ns:
                 self._waiting += 1
                 soon = stamp_ns - self._since_ns <= LONGEST_REPEAT_NS
-                new[row] = not (soon and self._is_habit)
+                share = LEAST_SHARE * (self._seen + self._moved)
+                is_habit = self._seen >= FEWEST_REPEATS and self._seen >= share
+                new[row] = not (soon and is_habit)
             self._last_ns = stamp_ns
         self.count += int(np.count_nonzero(~new))
         return new
-
-    @property
-    def _is_habit(self) -> bool:
-        share = LEAST_SHARE * (self._seen + self._moved)
-        return self._seen >= FEWEST_REPEATS and self._seen >= share

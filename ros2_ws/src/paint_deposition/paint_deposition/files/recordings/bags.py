@@ -119,8 +119,6 @@ def motion_of(
 def write_pose_bag(
     folder: Path | str,
     trajectory: Trajectory,
-    pose_topic: str = POSE_TOPIC,
-    state_topic: str = STATE_TOPIC,
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
     drive: Drive | None = None,
@@ -146,9 +144,9 @@ def write_pose_bag(
     ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
-        _add_topic(run, pose_topic, POSE_TYPE)
+        _add_topic(run, POSE_TOPIC, POSE_TYPE)
         if len(trajectory.trigger_stamps_ns):
-            _add_topic(run, state_topic, state_type)
+            _add_topic(run, STATE_TOPIC, state_type)
         if part:
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
             begin_ns, (child, place) = min(time_ns for time_ns, *_ in entries), part
@@ -170,7 +168,7 @@ def write_pose_bag(
                 cdr = types.serialize_cdr(types.types[POSE_TYPE](header, pose), POSE_TYPE)
             else:
                 cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
-            run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
+            run.write(POSE_TOPIC if is_pose else STATE_TOPIC, bytes(cdr), time_ns, time_ns)
     return run.folder
 
 
