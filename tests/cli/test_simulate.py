@@ -141,14 +141,6 @@ def refused(tmp_path, *arguments):
     return done
 
 
-def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
-    inputs = ('--mesh', panel, '--trajectory', DOOR_BAG)
-    done = refused(tmp_path, *inputs, '--pose-topic', '/robot/tcp')
-    assert_refused(done, '/robot/tcp', '/atomizer/pose')
-    done = refused(tmp_path, *inputs, '--state-topic', '/gun')
-    assert_refused(done, '/gun', '/atomizer/state')
-
-
 def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
     entries = pose_entries(level_pass())
     messages = Messages()

@@ -101,6 +101,7 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
 @pytest.mark.parametrize(
     ('bag', 'arguments', 'says'),
     [
+        ('evo_ROS_example.bag', (), 'name a pose topic; .*ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
         ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
