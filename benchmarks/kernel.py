@@ -27,7 +27,7 @@ from numba import njit, prange
 import paint_deposition
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel import threads
 from paint_deposition.motion.path import SprayPath
@@ -87,7 +87,7 @@ def dense() -> Case:
 def sample() -> Case:
     """The sample door at 10 mm, painted along the sample recording."""
     surface = read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.01)
-    log = read_trajectory(SAMPLES / 'door_horizontal', None, '/atomizer/state')
+    log = read_recording(SAMPLES / 'door_horizontal', None, '/atomizer/state')
     path = spray_path(log, max_step_m=MODEL.max_step_m)[0]
     return Case('sample door', surface.points(), path.select(path.flow > 0.0))
 

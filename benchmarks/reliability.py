@@ -31,7 +31,8 @@ import numpy as np
 import trimesh
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -168,7 +169,7 @@ def _problem_of_run(way: str, run: Path) -> str:
             # Killed before the first chunk was old enough to be written.
             return '' if 'nothing to recover' in str(error) else str(error)
     try:
-        stamps = read_trajectory(run).stamps_ns
+        stamps = read_recording(run).stamps_ns
     except PaintError as error:
         return (
             '' if 'no messages' in str(error) or 'name a pose topic' in str(error) else str(error)

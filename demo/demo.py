@@ -23,7 +23,7 @@ from std_srvs.srv import Trigger
 from what_next import settle
 
 from nodes import Cell
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 
 PACKAGE = 'paint_deposition'
 PREFIX = Path(get_package_prefix(PACKAGE)) / 'lib' / PACKAGE
@@ -83,7 +83,7 @@ def refuse(why: str) -> NoReturn:
 def paint_live(folder: Path) -> tuple[Path, Path]:
     """Paint the door through the nodes; returns the recorded run and the film's table."""
     say('Painting the same door live, through the nodes')
-    poses = len(read_trajectory(TRAJECTORY, state_topic='/atomizer/state'))
+    poses = len(read_recording(TRAJECTORY, state_topic='/atomizer/state'))
     with Cell(PREFIX) as cell:
         cell.start('deposition_simulator', mesh_file=DOOR, max_edge_length_m=0.01,
                    output_directory=folder)  # fmt: skip

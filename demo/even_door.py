@@ -21,7 +21,7 @@ from tests.virtual_paint_shop.programme import Evenness, Painted, driven
 from tests.virtual_paint_shop.shop import generate
 from tests.virtual_paint_shop.truths import choose
 
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.report.words import effect_name, joined
 
 SEED, HIDDEN, SCALE = 640001, 'standoff_efficiency~power+air_drift~by_height', 2.5
@@ -51,7 +51,7 @@ def level(folder: Path, paint: Paint, say: Callable[[str], None]) -> Path:
     judged = scatter(job.part, JUDGED, stream(SEED, 90), 0.0)
 
     def painted(name: str, trajectory: Path) -> Painted:
-        motion = driven(read_trajectory(trajectory, state_topic='/atomizer/state'))
+        motion = driven(read_recording(trajectory, state_topic='/atomizer/state'))
         return Painted(name, job.part, pattern, truths, motion, SEED, PARCELS)
 
     say('Calibrating a bell on a panel, and planning a door with it')

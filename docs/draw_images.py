@@ -69,9 +69,6 @@ def up_to(motion: pd.Trajectory, moment_ns: int) -> pd.Trajectory:
         trigger_stamps_ns=motion.trigger_stamps_ns[changes],
         trigger_flow=motion.trigger_flow[changes],
         trigger_brush=motion.trigger_brush[changes] if len(motion.trigger_brush) else changes[:0],
-        trigger_set_points=motion.trigger_set_points[changes]
-        if len(motion.trigger_set_points)
-        else motion.trigger_set_points,
     )
 
 

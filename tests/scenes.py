@@ -87,9 +87,7 @@ def poses(motion: Trajectory, rows: slice) -> PoseBatch:
 
 def changes_of(motion: Trajectory) -> list[TriggerChange]:
     """The changes of its trigger, with brush and set-points."""
-    return [
-        TriggerChange(*told, motion.set_points_of(row)) for row, told in enumerate(motion.triggers)
-    ]
+    return [TriggerChange(*told) for told in motion.triggers]
 
 
 def events(

@@ -13,8 +13,7 @@ import pytest
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.cli.examples import EXAMPLES
-from paint_deposition.cli.main import COMMANDS
+from paint_deposition.cli.main import COMMANDS, EXAMPLES
 from paint_deposition.cli.main import paint as group
 
 
@@ -74,7 +73,7 @@ def test_completing_a_command_loads_none():
     )
     *offered, loaded = done.stdout.splitlines()
     assert offered == [f'plain,{name}' for name in COMMANDS]
-    assert ast.literal_eval(loaded) == [f'paint_deposition.cli.{n}' for n in ('examples', 'main')]
+    assert ast.literal_eval(loaded) == ['paint_deposition.cli.main']
 
 
 @pytest.mark.parametrize('command', COMMANDS)

@@ -8,7 +8,6 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from cli.command import assert_refused, paint
 from files.recorded import Messages, write_bag
 from paint_deposition.files.rapid.writer import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -177,16 +176,3 @@ def campaign_of(write, panel, folder):
 def predicted(campaign) -> np.ndarray:
     """(P,) what the gauge should show [um]."""
     return Forward(pd.read_campaign(campaign)).predict_um(pd.DepositionModel())
-
-
-def test_a_real_module_is_taken_as_motion(shared_data):
-    """Ten moves over three metres at 0.1 m/s, without a gun."""
-    read = pd.read_recording(shared_data / 'rapid' / 'ECL_Grey_T_ROB1.mod')
-    assert read.duration_s == pytest.approx(3.03 / 0.1, rel=0.02)
-    assert read.notes.count(PROGRAMMED) == 1
-
-
-def test_a_real_recording_with_three_pose_topics_asks_which(panel, shared_data, tmp_path):
-    bag = shared_data / 'bags' / 'evo_ROS_example.bag'
-    done = paint('simulate', '--mesh', panel, '--trajectory', bag, '-o', tmp_path / 'out')
-    assert_refused(done, 'name a pose topic', 'ORB-SLAM', 'groundtruth')

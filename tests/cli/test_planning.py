@@ -11,8 +11,8 @@ from cli.command import assert_refused, paint
 from paint_deposition.cli.results_folder import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.rapid.program import read_program
-from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
@@ -127,7 +127,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     }  # fmt: skip
     program = read_program(tmp_path / 'plan' / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
-    assert len(read_trajectory(tmp_path / 'plan' / 'trajectory')) > 1000
+    assert len(read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
     assert is_picture(tmp_path / 'plan' / 'film.png')
 
 

@@ -9,7 +9,8 @@ import trimesh
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from files.recorded import straight_pass
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 
 
 @pytest.fixture
@@ -44,7 +45,7 @@ def test_recover_does_what_inspect_says_of_an_unfinished_run(cut_run, tmp_path):
     first, *_, last = done.stdout.splitlines()
     assert first.endswith('the end is missing')
     assert last.endswith('messages recovered: ' + str(tmp_path / 'run_recovered'))
-    assert len(read_trajectory(tmp_path / 'run_recovered')) > 2_000
+    assert len(read_recording(tmp_path / 'run_recovered')) > 2_000
     again = paint('recover', cut_run)
     assert_refused(again, 'run_recovered already exists; choose another name')
 

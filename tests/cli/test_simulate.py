@@ -16,7 +16,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -60,7 +61,7 @@ def test_the_door_is_painted(painted_door):
 @pytest.mark.slow
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
-    recorded = read_trajectory(DOOR_BAG, None, '/atomizer/state')
+    recorded = read_recording(DOOR_BAG, None, '/atomizer/state')
     assert (figures['poses']['received'], figures['poses']['rejected']) == (len(recorded), 0)
     changes = recorded.trigger_stamps_ns[1:]
     on_s = np.sum(changes[1::2] - changes[0::2]) * 1e-9
@@ -138,14 +139,6 @@ def refused(tmp_path, *arguments):
     done = paint('simulate', *arguments, '-o', tmp_path / 'out')
     assert not (tmp_path / 'out').exists()
     return done
-
-
-def test_a_missing_topic_is_refused_with_those_there_are(panel, tmp_path):
-    inputs = ('--mesh', panel, '--trajectory', DOOR_BAG)
-    done = refused(tmp_path, *inputs, '--pose-topic', '/robot/tcp')
-    assert_refused(done, '/robot/tcp', '/atomizer/pose')
-    done = refused(tmp_path, *inputs, '--state-topic', '/gun')
-    assert_refused(done, '/gun', '/atomizer/state')
 
 
 def test_bad_poses_are_dropped_and_counted(panel, tmp_path):

@@ -15,7 +15,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
 from paint_deposition.files.rapid.program import program_trajectory, read_program
 from paint_deposition.files.rapid.writer import module_text
-from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.motion.programmed import GunSwitch, Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
@@ -50,6 +49,7 @@ def test_brushes_are_written_and_read_back_without_loss(tmp_path: Path):
         ('brushes: {1: {planer: {}}}', "brushes, 1: unknown key 'planer'; did you mean 'planar'?"),
         ('brushes: {1: {planar: {}, solids: 45}}', 'brushes, 1: solids is 45; expected a number'),
         ('brushes: {1: {planar: {K2: 2}}}', 'brushes, 1: planar: K2 is 2; expected a number 0 '),
+        ('brushes: {1: {solids: 0.4}}', 'brushes, 1: planar is missing; calibrate the brush, or'),
         ('planar: {}\nbrushes: {1: {planar: {}}}', 'planar and brushes are both given; keep one'),
     ],
 )
@@ -145,4 +145,4 @@ def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: P
     entries = pose_entries(straight_pass(triggers=False))
     entries.insert(1, ('/state', START_NS + 1, messages.state(START_NS, True, 0.8)))
     bag = write_bag(tmp_path / 'old', entries)
-    assert read_trajectory(bag, None, '/state').triggers == [(START_NS, 0.8, 0)]
+    assert read_recording(bag, None, '/state').triggers == [(START_NS, 0.8, 0)]

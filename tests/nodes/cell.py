@@ -15,9 +15,7 @@ from rclpy.serialization import deserialize_message
 from rclpy.time import Time
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.recordings.headers import SET_POINTS
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -94,7 +92,7 @@ def offline_um(
     node, trajectory: Trajectory, model: DepositionModel | None = None, precision: str = 'single'
 ) -> np.ndarray:
     """The film that an offline run has at the node's points."""
-    trajectory, model = with_interpolated_brushes(trajectory, model or DepositionModel())
+    model = model or DepositionModel()
     path, _ = spray_path(
         trajectory, max_step_m=model.max_step_m, whole_strokes=model.needs_whole_strokes
     )
@@ -143,11 +141,8 @@ class Robot(Node):
         q.x, q.y, q.z, q.w = map(float, quaternion)
         self.pose_publisher.publish(message)
 
-    def send_state(self, stamp_ns, flow: float, brush: int = 0, set_points=()) -> None:
-        told = dict(zip(SET_POINTS, set_points, strict=False))
-        self.send_fields(
-            stamp_ns, spraying=bool(flow > 0.0), flow=float(flow), brush=brush, **told
-        )
+    def send_state(self, stamp_ns, flow: float, brush: int = 0) -> None:
+        self.send_fields(stamp_ns, spraying=bool(flow > 0.0), flow=float(flow), brush=brush)
 
     def send_fields(self, stamp_ns, **fields: object) -> None:
         """A state of which only these fields are filled."""
@@ -160,9 +155,9 @@ class Robot(Node):
         for row in np.arange(len(trajectory))[rows]:
             stamp = trajectory.stamps_ns[row]
             before = trajectory.stamps_ns[row - 1] if row else 0
-            for change, (changed_ns, *gun) in enumerate(trajectory.triggers):
+            for changed_ns, *gun in trajectory.triggers:
                 if before < changed_ns <= stamp:
-                    self.send_state(changed_ns, *gun, trajectory.set_points_of(change))
+                    self.send_state(changed_ns, *gun)
             self.send_pose(
                 stamp, trajectory.positions_m[row], trajectory.quaternions_xyzw[row], frame_id
             )

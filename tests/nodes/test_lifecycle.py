@@ -15,7 +15,7 @@ from rclpy.qos import QoSProfile
 
 from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
@@ -230,7 +230,7 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_conte
         assert managed.deactivate() == (True, 'inactive')
         run = recorder.run.folder
         assert (run / 'metadata.yaml').is_file()
-        recorded = read_trajectory(run, None, None)
+        recorded = read_recording(run, None, None)
         assert np.array_equal(recorded.stamps_ns, MOTION.stamps_ns[rows])
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2

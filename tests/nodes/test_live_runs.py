@@ -13,7 +13,8 @@ from nodes.cell import parameters, two_passes, write_own_model, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import topics
@@ -62,10 +63,10 @@ def test_a_replay_waits_for_who_is_still_loading_and_gives_the_offline_film(
         assert recorder.wait() == 0, recorder.err
         simulator.interrupt_as_launch_does()
         assert simulator.wait() == 0, simulator.err
-    assert len(read_trajectory(tmp_path / 'run')) == 300
+    assert len(read_recording(tmp_path / 'run')) == 300
     live_um = np.loadtxt(tmp_path / 'film.csv', delimiter=',', skiprows=1)[:, 3]
     integrator = FilmIntegrator(read_mesh(mesh, 1.0, EDGE_M).points(), DepositionModel(), 'double')
-    integrator.add(spray_path(read_trajectory(bag, None, '/atomizer/state'))[0])
+    integrator.add(spray_path(read_recording(bag, None, '/atomizer/state'))[0])
     offline_um = integrator.film_um
     assert offline_um.max() > 1.0
     assert np.abs(live_um - offline_um).max() < 1e-6 * offline_um.max()

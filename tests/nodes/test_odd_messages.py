@@ -120,11 +120,9 @@ def test_odd_messages_spoil_no_film(made, robot, executor, wait_until, ros_conte
     for _ in range(MESSAGES):
         for publisher in (driver.pose_publisher, driver.state_publisher):
             publisher.publish(odd_message(publisher.msg_type, rng))
-    sent = MESSAGES
-    counted = node.inputs[0]
-    wait_until(lambda: counted.poses_received == sent and counted.states_received == sent)
-    driver.send_state(MOTION.stamps_ns[0], 0.0)
-    wait_until(lambda: counted.states_received == sent + 1)
+    driver.send_fields(MOTION.stamps_ns[0], spraying=False, programmed_speed_m_per_s=0.123)
+    heard = node.inputs[0]
+    wait_until(lambda: heard.poses_received == MESSAGES and heard.programmed_m_per_s == 0.123)
     call(driver, Trigger, '/deposition_simulator/reset', Trigger.Request())
     driver.send(MOTION)
     wait_until(lambda: node.film.counts.received >= len(MOTION))

@@ -10,7 +10,6 @@ from paint_msgs.srv import ChangePart
 from nodes.cell import Robot, offline_um, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import TRUST_TOPIC
 
@@ -49,7 +48,7 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
         recorder.interrupt_as_launch_does()
         assert recorder.wait() == 0, recorder.err
         assert 'file complete: ' in recorder.err.splitlines()[-1]
-    assert np.array_equal(read_trajectory(tmp_path / 'run').stamps_ns, MOTION.stamps_ns)
+    assert np.array_equal(read_recording(tmp_path / 'run').stamps_ns, MOTION.stamps_ns)
 
 
 def test_a_recorder_that_stalls_at_a_change_has_each_pose_in_the_run_of_its_part(

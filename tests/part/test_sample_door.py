@@ -8,7 +8,7 @@ import pytest
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
@@ -25,7 +25,7 @@ def door(samples):
 
 
 def motion(samples, name):
-    return read_trajectory(samples / name, '/atomizer/pose', '/atomizer/state')
+    return read_recording(samples / name, '/atomizer/pose', '/atomizer/state')
 
 
 def film_um(points: SurfacePoints, trajectory) -> np.ndarray:

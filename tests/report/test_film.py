@@ -14,7 +14,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.view import View
+from paint_deposition.report.pictures.part import View
 from paint_deposition.report.style import BELOW, HIGH, WITHIN
 
 X, Y, Z = np.eye(3)

@@ -11,7 +11,7 @@ from files.recorded import POSE, START_NS, Messages, pose_entries, straight_pass
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, Definition, standard
 from paint_deposition.motion.part_frame import Rigid
@@ -33,7 +33,7 @@ def same(read: Trajectory, written: Trajectory) -> bool:
 
 def refusal(*arguments) -> str:
     with pytest.raises(RecordingError) as refused:
-        read_trajectory(*arguments)
+        read_recording(*arguments)
     text = str(refused.value)
     assert '\n' not in text
     return text
@@ -46,7 +46,7 @@ def test_every_storage_and_spelling_of_the_topic(tmp_path, storage):
     name = 'made.bag' if storage == 'ros1' else 'made'
     path = write_bag(tmp_path / name, entries, storage)
     for topic in ('atomizer/pose', '/atomizer/pose', None):
-        assert same(read_trajectory(path, topic), written)
+        assert same(read_recording(path, topic), written)
 
 
 def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
@@ -61,17 +61,17 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
         ('/state', START_NS + 5_002, messages.state(START_NS + 95, True, float('nan'), 64.0))
     ]
     folder = write_bag(tmp_path / 'two_triggers', sorted(entries, key=lambda entry: entry[1]))
-    gun = read_trajectory(folder, None, 'gun')
+    gun = read_recording(folder, None, 'gun')
     assert gun.trigger_stamps_ns.tolist() == [START_NS + 700, START_NS + 900]
     assert gun.trigger_flow.tolist() == [1.0, 0.0]
-    state = read_trajectory(folder, None, '/state')
+    state = read_recording(folder, None, '/state')
     assert state.trigger_stamps_ns.tolist() == [START_NS + 70, START_NS + 90, START_NS + 95]
     assert state.trigger_flow.tolist() == [0.8, 0.0, 1.0]
     # While it sprayed; a flow that is not known is no setting.
     assert state.settings == {
         'flow': 0.8, 'shaping_air_l_per_min': 0.0, 'bell_speed_rpm': 0.0, 'voltage_kv': 62.0,
     }  # fmt: skip
-    unused = read_trajectory(folder)
+    unused = read_recording(folder)
     assert len(unused.trigger_stamps_ns) == 0
     assert unused.notes == (
         f'recording {folder}: /state (paint_msgs/msg/AtomizerState) and /gun (std_msgs/msg/Bool) '
@@ -84,7 +84,7 @@ def test_a_bool_counts_from_its_log_time_and_a_state_from_its_stamp(tmp_path):
 def test_a_state_that_sprays_with_flow_0_is_noted(tmp_path):
     entries = pose_entries(straight_pass(triggers=False))
     entries.insert(1, ('/state', START_NS + 1, Messages().state(START_NS, True, 0.0, 60.0)))
-    recorded = read_trajectory(write_bag(tmp_path / 'run', entries), None, '/state')
+    recorded = read_recording(write_bag(tmp_path / 'run', entries), None, '/state')
     assert recorded.trigger_flow.tolist() == [0.0]
     assert 'trigger /state says spraying with flow 0, which lays no paint' in recorded.notes[0]
 
@@ -94,13 +94,14 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
     entries = pose_entries(written, delay_ns=hour_ns)
     entries += [('/gun', START_NS + hour_ns, Messages().trigger(True))]
     folder = write_bag(tmp_path / 'other_clock', sorted(entries, key=lambda entry: entry[1]))
-    assert len(read_trajectory(folder)) == len(written)
+    assert len(read_recording(folder)) == len(written)
     assert '3.6e+03 s off its own stamps' in refusal(folder, None, '/gun')
 
 
 @pytest.mark.parametrize(
     ('bag', 'arguments', 'says'),
     [
+        ('evo_ROS_example.bag', (), 'name a pose topic; .*ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('/truth',), 'topics: ORB-SLAM S-PTAM groundtruth'),
         ('evo_ROS_example.bag', ('S-PTAM', '/gun'), 'no topic /gun; it has no state topic'),
         ('evo_ROS_example.bag', ('S-PTAM', 'ORB-SLAM'), 'not paint_msgs/msg/AtomizerState or std'),
@@ -108,7 +109,7 @@ def test_a_bool_is_refused_when_the_poses_keep_another_clock(tmp_path):
         ('rosbag2_topics_and_services.mcap', (), 'it has no PoseStamped topic'),
         ('evo_none.mcap', (), 'no bag at .*evo_none.mcap'),
         ('../README.md', (), 'is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap'),
-        ('../rapid', (), 'is not a rosbag2 folder'),
+        ('..', (), 'is not a rosbag2 folder'),
     ],
 )
 def test_what_real_bags_do_not_have(shared_data, bag, arguments, says):
@@ -126,7 +127,7 @@ def test_poses_beside_service_events_are_read(tmp_path):
         run.write('/add/_service_event', b'\0\1\0\0', START_NS, START_NS)
         for message in bag.messages():
             run.write('/p', message.cdr, message.log_time_ns, message.log_time_ns)
-    assert same(read_trajectory(tmp_path / 'mixed'), written)
+    assert same(read_recording(tmp_path / 'mixed'), written)
 
 
 def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_strict(tmp_path):
@@ -235,7 +236,7 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
         flipped[position] ^= 1 << int(rng.integers(8))
         damaged.write_bytes(flipped)
         try:
-            assert same(read_trajectory(damaged, None, '/atomizer/state'), written)
+            assert same(read_recording(damaged, None, '/atomizer/state'), written)
         except RecordingError:
             refused += 1
     assert refused > 8
@@ -244,6 +245,6 @@ def test_no_flipped_bit_goes_unnoticed(tmp_path):
 def test_flows_of_their_own_are_written_as_states_and_read_back(tmp_path):
     half = replace(straight_pass(5), trigger_flow=np.array([0.5, 0.0]))
     bag = write_pose_bag(tmp_path / 'half', half)
-    assert same(read_trajectory(bag, state_topic='/atomizer/state'), half)
+    assert same(read_recording(bag, state_topic='/atomizer/state'), half)
     with open_bag(bag) as opened:
         assert opened.find('/atomizer/state').type == STATE_TYPE

@@ -12,7 +12,8 @@ from rosbags.rosbag2 import Reader
 
 from files.recorded import straight_pass
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import standard
@@ -138,11 +139,11 @@ def test_a_flipped_bit_costs_one_chunk(tmp_path):
     content[chunk.chunk_start_offset + chunk.chunk_length // 2] ^= 0x10
     path.write_bytes(content)
     with pytest.raises(RecordingError, match='is damaged'):
-        read_trajectory(folder)
+        read_recording(folder)
     recovery = recover(folder, tmp_path / 'recovered')
     assert recovery.damaged_chunks == 1
     assert 2_000 < recovery.message_count < 4_002
-    read = read_trajectory(tmp_path / 'recovered', None, '/atomizer/state')
+    read = read_recording(tmp_path / 'recovered', None, '/atomizer/state')
     assert set(read.stamps_ns.tolist()) < set(written.stamps_ns.tolist())
 
 

@@ -118,7 +118,7 @@ def test_panels_of_two_brushes_give_both_patterns_back(calibrated):
 
 
 @pytest.mark.slow
-def test_a_calibration_tells_transfer_efficiency_and_exponents(calibrated):
+def test_a_calibration_tells_the_transfer_efficiency(calibrated):
     settled = [Brush(number=b.number, planar=b.planar, **SETTINGS[b.number])
                for b in calibrated.model.brushes]  # fmt: skip
     figures = brush_figures(DepositionModel.of_brushes(settled), calibrated.parameters)
@@ -127,7 +127,6 @@ def test_a_calibration_tells_transfer_efficiency_and_exponents(calibrated):
         share = brush.planar.K1_cm3_per_s * 60.0 / (brush.flow_cm3_per_min * brush.solids)
         assert told['transfer_efficiency'] == pytest.approx(share, rel=0.02)
         assert 0.0 < told['transfer_efficiency_sigma'] < 0.02
-    assert set(figures['exponents']['width']) == {'flow_cm3_per_min', 'bell_speed_rpm'}
 
 
 @pytest.mark.slow

@@ -22,7 +22,6 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.bags import read_trajectory
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
@@ -320,7 +319,7 @@ def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, chan
     node.close()
     for number, motion in enumerate((MOTION, later(MOTION)), start=1):
         run = folder / f'47-{number}'
-        recorded = read_trajectory(run, None, '/atomizer/state')
+        recorded = read_recording(run, None, '/atomizer/state')
         assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
         with open_bag(run) as bag:
             messages = {topic.name: topic.message_count for topic in bag.topics}

@@ -16,13 +16,6 @@ PLAIN = two_passes()
 STAMPS = [*PLAIN.trigger_stamps_ns, PLAIN.stamps_ns[-100]]
 # The first pass with brush 2, the way back with brush 1 and, from its middle on, with 2.
 MOTION = replace(PLAIN, **switched(STAMPS, (1.0, 2), (0.0, 2), (0.8, 1), (1.0, 2)))
-# The same without a brush: set-points, between those of the brushes.
-MIDDLE, NEARER = (280.0, 0.0, 41_000.0, 0.0), (220.0, 0.0, 47_500.0, 0.0)
-BETWEEN = replace(
-    PLAIN,
-    **switched(STAMPS, (1.0, 0), (0.0, 0), (0.8, 0), (1.0, 0)),
-    trigger_set_points=np.array([MIDDLE, (0.0,) * 4, NEARER, MIDDLE]),
-)
 POSES = 'deposition_simulator: poses'
 
 
@@ -32,17 +25,13 @@ def node(simulator, tmp_path):
     return simulator(model_file=str(tmp_path / 'brushes.yaml'))
 
 
-@pytest.mark.parametrize(
-    ('motion', 'brush'), [(MOTION, '2'), (BETWEEN, 'between those calibrated')]
-)
-def test_the_live_film_of_brushes_is_the_offline_film(node, robot, painted, onlooker, wait_until,
-                                                      motion, brush):  # fmt: skip
+def test_the_live_film_of_brushes_is_the_offline_film(node, robot, painted, onlooker, wait_until):
     viewer = onlooker()
-    robot(node).send(motion)
+    robot(node).send(MOTION)
     film = painted(node)
-    assert np.array_equal(film, offline_um(node, motion, MODEL))
+    assert np.array_equal(film, offline_um(node, MOTION, MODEL))
     assert film.max() > 1.0
-    gun = f'spraying, flow 1, brush {brush}'
+    gun = 'spraying, flow 1, brush 2'
     wait_until(lambda: viewer.value(POSES, 'gun') == gun, what=gun)
 
 

@@ -16,7 +16,7 @@ from files.recorded import START_NS
 from nodes.processes import NodeProcess
 from nodes.recording.runs import pose
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.bags import read_trajectory
+from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.mcap_recovery import recover
 
 MODULE = 'run_recorder'
@@ -59,7 +59,7 @@ def test_a_killed_recorder_keeps_what_came_a_moment_before(
     assert not (tmp_path / 'run/metadata.yaml').exists()
     recovery = recover(tmp_path / 'run', tmp_path / 'recovered')
     assert recovery.counts == {'/pose': 100}
-    assert len(read_trajectory(tmp_path / 'recovered')) == 100
+    assert len(read_recording(tmp_path / 'recovered')) == 100
     with Reader(tmp_path / 'recovered') as reader:
         (connection,) = reader.connections
         assert connection.digest.startswith('RIHS01_')

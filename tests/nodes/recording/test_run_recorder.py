@@ -16,7 +16,7 @@ from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.files.recordings.bags import read_trajectory, write_pose_bag
+from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes.planning.index_planner import IndexPlanner
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime import topics
@@ -39,7 +39,7 @@ def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_unti
     assert [m for m in messages(recorder.run.folder) if m[0] == '/atomizer/pose'] == [
         m for m in messages(bag) if m[0] == '/atomizer/pose'
     ]
-    again = read_trajectory(recorder.run.folder, None, '/atomizer/state')
+    again = read_recording(recorder.run.folder, None, '/atomizer/state')
     for name in ('stamps_ns', 'positions_m', 'trigger_stamps_ns', 'trigger_flow'):
         np.testing.assert_array_equal(getattr(again, name), getattr(written, name))
 

@@ -1,7 +1,6 @@
 """Errors that a user can act on: one line naming the thing, its value and the remedy."""
 
 import difflib
-import math
 from collections.abc import Iterable, Sequence
 
 # Names less alike than this share, as difflib measures it, are not taken for each other.
@@ -36,13 +35,6 @@ class PlanError(PaintError):
 
 class ManyError(PaintError):
     """A sweep over cases cannot be run."""
-
-
-def require_above_zero(**values: float) -> None:
-    """Refuse what is no number above 0, by its name. Raises PlanError: a value is not."""
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0.0):
-            raise PlanError(f'{name} is {value:g}; give a number above 0')
 
 
 def some(names: Sequence[str], most: int) -> str:

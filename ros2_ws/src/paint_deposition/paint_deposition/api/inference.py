@@ -11,8 +11,8 @@ from paint_deposition.effects.catalogue import EFFECTS, effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import PaintError
-from paint_deposition.files.effect_source import needs_file, source_of
 from paint_deposition.files.model_file import read_model, read_model_file
+from paint_deposition.files.model_text import needs_file, source_of
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
 from paint_deposition.inference.diagnosis.model_space import discrepancy_of

@@ -8,9 +8,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
-from paint_deposition.planning.driven_plan import driven
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.optimised_plan import optimise
+from paint_deposition.planning.optimised_plan import driven, optimise
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan

@@ -11,7 +11,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.motion_files import GunMotion
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import LiveFilms
-from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.statistics import (
     DEFAULT_PAINTED_ABOVE_UM,
@@ -59,15 +58,10 @@ class Replay:
         tolerance_um: float = 0.0,
     ) -> None:
         require_band(target_um, tolerance_um)
-        # Brushes between calibrated ones only for the look: live films make them as they come.
-        pairs = [
-            with_interpolated_brushes(m.trajectory, model)
-            for m, model in zip(motions, models, strict=True)
-        ]
-        for pair in pairs:
+        trajectories = [motion.trajectory for motion in motions]
+        for pair in zip(trajectories, models, strict=True):
             require_brushes(*pair)
-        trajectories, looked_with = zip(*pairs, strict=True)
-        seen = look_at_guns(surface, trajectories, looked_with, max_pose_gap_s=max_pose_gap_s)
+        seen = look_at_guns(surface, trajectories, models, max_pose_gap_s=max_pose_gap_s)
         self.warnings = tuple(
             w for gun in seen for w in (*gun.trajectory.warnings, *gun.geometry.warnings)
         )

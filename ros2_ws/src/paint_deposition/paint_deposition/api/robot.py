@@ -1,13 +1,15 @@
-"""The robot that is to drive a motion, and where the part may stand for it."""
+"""The robot that is to drive a motion, where the part may stand for it, and where it stands."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from paint_deposition.errors import PlanError
+from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.gauge_readings import read_points
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
+from paint_deposition.motion.part_location import PartPlace, locate
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.part_place import PartPlaces, part_places
@@ -60,3 +62,23 @@ def place(
     if not is_frame(trajectory.frame_id, 'part'):
         trajectory = at_part(trajectory, cell.part.values, 'part')
     return part_places(trajectory, cell, np.array(x_m), np.array(y_m), free_roll, progress)
+
+
+def locate_by_points(
+    touched: str | Path, points: str | Path, unit: str | None = None
+) -> PartPlace:
+    """The pose of a part from points that the robot touched.
+
+    Args:
+        touched: table of named points in the robot's frame.
+        points: table of the same points in the part's frame.
+        unit: 'm', 'mm' or 'cm' where headings tell none.
+
+    Raises:
+        PaintError: the tables cannot be read, or determine no pose.
+    """
+    given = read_points(Path(touched), unit), read_points(Path(points), unit)
+    try:
+        return locate(*given)
+    except RecordingError as error:
+        raise RecordingError(f'{touched} and {points}: {error}') from None

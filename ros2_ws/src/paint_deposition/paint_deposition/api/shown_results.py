@@ -98,7 +98,8 @@ def results_scenes(folder: Path) -> tuple[list[Scene], list[str]]:
             f'{folder}: its campaign {path} is not there; run the command in the folder in which '
             'the results were made'
         )
-    changed = [f.file for f in figures.provenance.files if not _unchanged(f)]
+    files = figures.provenance.files
+    changed = [f.file for f in files if not Path(f.file).exists() or sha256(f.file) != f.sha256]
     warnings = [f'{file} is not what {folder} was made from' for file in changed]
     campaign = read_campaign(path)
     if len(models) == 1:
@@ -186,10 +187,6 @@ def _model(folder: Path, name: str, values: dict[str, Any]) -> DepositionModel:
             f'{folder}: its {COMPARISON} does not describe the model {name} in full; compare again'
         )
     return model
-
-
-def _unchanged(file: _File) -> bool:
-    return Path(file.file).exists() and sha256(file.file) == file.sha256
 
 
 def _read(kind: type[Written], path: Path) -> Written:

@@ -12,7 +12,6 @@ from paint_deposition.film.coats import TOTAL, Coats
 from paint_deposition.film.common_film import CommonFilm, LayeredFilm, require_one_finish
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
-from paint_deposition.film.interpolated_brushes import with_interpolated_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
@@ -188,11 +187,8 @@ def simulate(
         for _, rows in laid.films_of(TOTAL):
             require_one_finish(dict(named[rows]))
         require_one_finish(dict(named), ['on_gauge'])
-    given = models
-    pairs = list(map(with_interpolated_brushes, motions, models))
-    for pair in pairs:
+    for pair in zip(motions, models, strict=True):
         require_brushes(*pair)
-    motions, models = map(list, zip(*pairs, strict=True))
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None
@@ -213,7 +209,7 @@ def simulate(
             laid_cm3, integrator.emitted_cm3,
         )
         for name, gun, its_model, laid_cm3, integrator in zip(
-            names or [''], seen, given, common.laid_cm3(surface.vertex_areas_m2).tolist(),
+            names or [''], seen, models, common.laid_cm3(surface.vertex_areas_m2).tolist(),
             common.guns, strict=True,
         )
     )  # fmt: skip

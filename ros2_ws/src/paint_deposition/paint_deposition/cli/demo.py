@@ -90,7 +90,10 @@ class _Story:
 
     def __init__(self, page: Path, opens: bool) -> None:
         self.page = page
-        self._opens = opens and has_display()
+        # Where a browser has somewhere to show a page.
+        desktop = sys.platform in ('darwin', 'win32')
+        desktop |= any(os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY'))
+        self._opens = opens and desktop
         self._told: list[tuple[Chapter, str]] = []
         self._command, self._folder, self._step = '', page.parent, ''
         self._underway = ''
@@ -133,10 +136,3 @@ class _Story:
     def end(self) -> None:
         """Write the page for the last time: it says where it was cut off, and waits no more."""
         self._write(ended=True)
-
-
-def has_display() -> bool:
-    """Whether a browser would have somewhere to show a page."""
-    return sys.platform in ('darwin', 'win32') or any(
-        os.environ.get(name) for name in ('DISPLAY', 'WAYLAND_DISPLAY')
-    )

@@ -9,7 +9,6 @@ import click
 from click.shell_completion import CompletionItem
 
 from paint_deposition import __version__
-from paint_deposition.cli.examples import EXAMPLES
 from paint_deposition.errors import PaintError, did_you_mean
 
 # As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
@@ -31,12 +30,34 @@ COMMANDS = {
     'refit': ('inference', 'Add an effect of your choice and refit.'),
     'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
-    'locate': ('locate', 'Find the pose of the part from touched points.'),
+    'locate': ('place', 'Find the pose of the part from touched points.'),
     'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
-    'view': ('view', 'Open a recorded run in Rerun, where that is installed.'),
+    'view': ('watch', 'Open a recorded run in Rerun, where that is installed.'),
     'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
     'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
     'doctor': ('doctor', 'Say what is installed, and test it.'),
+}
+
+# An example of each command, for its help: as it runs in the folder of the samples.
+EXAMPLES = {
+    'simulate': '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film',
+    'calibrate': 'panel_study/campaign.yaml -o bell',
+    'recommend': '--model bell/model.yaml --target-um 20 -o index',
+    'plan': '--mesh door.stl --model bell/model.yaml --target-um 20 -o passes',
+    'improve': '--mesh door.stl --trajectory passes/trajectory --model found/model.yaml -o better',
+    'measure': '--mesh door.stl --trajectory door_horizontal --points 40 -o points',
+    'compare': 'measured_door/campaign.yaml --model bell/model.yaml -o compared',
+    'diagnose': 'measured_door/campaign.yaml --model bell/model.yaml -o found',
+    'refit': 'measured_door/campaign.yaml --add incidence_attraction -o refitted',
+    'sweep': 'my_sweep.yaml -o swept',
+    'locate': '--touched my_touched.csv --points my_points.csv',
+    'inspect': 'door_horizontal --mesh door.stl --out door.png',
+    'recover': 'my_broken_run -o recovered',
+    'place': '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map',
+    'watch': 'door_horizontal --mesh door.stl --trigger /atomizer/state',
+    'view': 'door_horizontal',
+    'demo': '-o my_demo',
+    'doctor': '--json',
 }
 
 

@@ -98,15 +98,12 @@ def models_for(
 
 
 def model_words(path: Path, file: ModelFile) -> str:
-    """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2 (interpolated), effects: air_drift'."""
+    """'runs/model.yaml (1a2b3c4d5e6f), brushes: 1, 2, effects: air_drift'."""
     from paint_deposition.files.provenance import model_digest
 
     called = f" '{file.name}'" if file.name else ''
     effects = ', '.join(effect.id for effect in file.model.effects) or 'none'
     digest = model_digest(file.model)[:12]
-    brushes = ', '.join(
-        f'{brush.number} (interpolated)' if brush.interpolated else str(brush.number)
-        for brush in file.model.brushes
-    )
+    brushes = ', '.join(str(brush.number) for brush in file.model.brushes)
     of_brushes = f', brushes: {brushes}' if brushes else ''
     return f'{path}{called} ({digest}){of_brushes}, effects: {effects}'

@@ -1,9 +1,12 @@
-"""The command `watch`: a run, results or a live cell on a page in 3D."""
+"""The commands `watch` and `view`: a run, results or a live cell on a page in 3D, or in Rerun."""
 
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING, Any
@@ -14,12 +17,14 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import models_for
 from paint_deposition.cli.progress import Progress
+from paint_deposition.errors import PaintError
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
 
 NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
+RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
 
 
 @click.command('watch')
@@ -147,3 +152,19 @@ def _start_node(parameters: dict[str, object], token: str) -> None:
              for w in ('-p', f'{name}:={value}')]  # fmt: skip
     command = options.python(NODE, '--ros-args', *words)
     os.execv(command[0], command)
+
+
+@click.command('view')
+@click.argument('run', type=options.FILE)
+def view_command(run: Path) -> None:
+    """Open RUN, a recorded run or one of its .mcap files, in Rerun.
+
+    Rerun shows poses, states and the cloud of the film over time. `paint watch` needs nothing
+    else and shows the film itself.
+    """
+    files = sorted(run.glob('*.mcap')) if run.is_dir() else [run]
+    if not files or any(file.suffix != '.mcap' for file in files):
+        raise PaintError(f'{run}: no .mcap file; give a run that run_recorder recorded')
+    if find_spec('rerun') is None:
+        raise PaintError('Rerun is not installed; run: pip install rerun-sdk')
+    sys.exit(subprocess.run(options.python(RERUN, *map(str, files))).returncode)

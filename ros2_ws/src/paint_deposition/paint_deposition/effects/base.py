@@ -2,39 +2,18 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from math import prod
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, ClassVar, Literal, cast
+from typing import Any, ClassVar, cast
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, SerializerFunctionWrapHandler, model_serializer
+from pydantic import BaseModel, ConfigDict, Field
 
-from paint_deposition.errors import ModelError
 from paint_deposition.kernel.laws import Ray as Ray
-from paint_deposition.model.brush import Brush, SetPoints
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path import SprayPath as SprayPath
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import SurfacePoints as SurfacePoints
-
-
-class SetPointPower(BaseModel):
-    """A power law: the amplitudes as given hold at one value of the set-point."""
-
-    model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
-
-    setting: Literal['flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv']
-    at: float = Field(gt=0.0, description='value of the set-point at which the amplitudes hold')
-    exponent: float = Field(ge=-5.0, le=5.0, description='power of the set-point over that value')
-
-    def factor(self, set_points: SetPoints, whose: str) -> float:
-        """By how much the amplitudes grow at others, or ModelError that begins with ``whose``."""
-        value = getattr(set_points, self.setting)
-        if value is None:
-            raise ModelError(f'{whose} has no {self.setting}; add it to the brush')
-        return (value / self.at) ** self.exponent
-
 
 # Curvature at which the effects of curvature have their full amplitude: a radius of 250 mm.
 REFERENCE_CURVATURE_PER_M = 1.0 / 0.250
@@ -116,8 +95,7 @@ class Effect(BaseModel):
     * ``on_film``: the film changes after it has arrived.
     * ``on_gauge``: the gauge reads something else than the film.
 
-    An effect made without arguments is absent. One on the path or on the flux may follow the
-    set-points of the brushes by powers, ``follows``; its law is then that of each brush.
+    An effect made without arguments is absent.
     """
 
     model_config = ConfigDict(frozen=True, extra='forbid', allow_inf_nan=False)
@@ -145,18 +123,6 @@ class Effect(BaseModel):
     flux_factor: ClassVar[Callable[..., float] | None] = None
     pattern_scale: ClassVar[Callable[..., float] | None] = None
 
-    follows: tuple[SetPointPower, ...] = Field(
-        (), description='a list of set-points with the power by which the amplitudes follow each'
-    )
-
-    @model_serializer(mode='wrap')
-    def _without_nothing(self, written: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        """Leave ``follows`` out where it is empty."""
-        values = written(self)
-        if not self.follows:
-            values.pop('follows', None)
-        return values
-
     def on_path(self, path: SprayPath, context: PathContext) -> SprayPath:
         """Return the path that really was sprayed."""
         return path
@@ -177,33 +143,10 @@ class Effect(BaseModel):
         """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
         return 0.0
 
-    def of_brush(self, brush: Brush) -> 'Effect':
-        """The effect at the set-points of a brush, or ModelError if unknown or out of bounds."""
-        if not self.follows:
-            return self
-        whose = f'{self.id} follows a set-point, and brush {brush.number}'
-        factor = prod(power.factor(brush, whose) for power in self.follows)
-        described, values = self.parameters(), {}
-        for name, neutral in self._neutral().items():
-            info, value = described[name], neutral + factor * (getattr(self, name) - neutral)
-            if not info['low'] <= value <= info['high']:
-                raise ModelError(
-                    f'{self.id}: {name} would be {value:.4g} at the set-points of brush '
-                    f'{brush.number}, outside {info["low"]:g} to {info["high"]:g}; correct '
-                    'exponent or amplitude'
-                )
-            values[name] = value
-        return self.model_copy(update=values | {'follows': ()})
-
     @property
     def is_neutral(self) -> bool:
         """Whether all amplitudes are at the value at which the effect is absent."""
         return all(getattr(self, name) == value for name, value in self._neutral().items())
-
-    @property
-    def acts_on_the_finished_film(self) -> bool:
-        """Whether it acts on the film after it has arrived, or on the gauge."""
-        return self.acts('on_film', 'on_gauge')
 
     @classmethod
     def acts(cls, *places: str) -> bool:

@@ -9,7 +9,7 @@ from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import BETWEEN, Brush, listed
+from paint_deposition.model.brush import Brush, listed
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
@@ -63,7 +63,7 @@ class DepositionModel(BaseModel):
         """A copy with other patterns, in the order of ``patterns``."""
         new = tuple(patterns)
         brushes = tuple(
-            brush.calibrated.model_copy(update={'planar': planar})
+            brush.model_copy(update={'planar': planar})
             for brush, planar in zip(self.brushes, new, strict=False)
         )
         return self.model_copy(update={'planar': new[0], 'brushes': brushes})
@@ -79,7 +79,7 @@ class DepositionModel(BaseModel):
     def painting_with(self, number: int) -> 'DepositionModel':
         """The same for what a motion calls its brush: without ``brushes`` any number will do."""
         row = int(self.pattern_rows(np.array([number]))[0])
-        brushes = tuple(brush.calibrated for brush in self.brushes[row : row + 1])
+        brushes = self.brushes[row : row + 1]
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
 
     def of_numbers(self, numbers: Iterable[int]) -> 'DepositionModel':
@@ -89,7 +89,7 @@ class DepositionModel(BaseModel):
         if len(self.brushes) <= 1:
             return self
         return DepositionModel.of_brushes(
-            (brush.calibrated for brush in self.brushes if brush.number in wanted),
+            (brush for brush in self.brushes if brush.number in wanted),
             projection=self.projection, effects=self.effects,
         )  # fmt: skip
 
@@ -149,31 +149,10 @@ class DepositionModel(BaseModel):
         """Whether an effect depends on what lies ahead in the stroke."""
         return any(effect.needs_whole_strokes for effect in self.effects)
 
-    def effects_by_pattern(self) -> tuple[tuple[Effect, ...], ...]:
-        """The effects as they are for each of ``patterns``, or ModelError if one cannot follow."""
-        following = [effect for effect in self.effects if effect.follows]
-        for effect in following:
-            problem = (
-                'follows set-points, which a model with planar alone does not have; give brushes'
-                if not self.brushes
-                else 'has no amplitude that could follow set-points; take `follows` out'
-                if not effect.amplitudes()
-                else 'acts on the finished film, which all brushes share: it cannot follow '
-                'set-points; take `follows` out'
-                if effect.acts_on_the_finished_film
-                else ''
-            )
-            if problem:
-                raise ModelError(f'{effect.id} {problem}')
-        if not following:
-            return (self.effects,) * len(self.patterns)
-        return tuple(tuple(e.of_brush(brush) for e in self.effects) for brush in self.brushes)
-
     @property
     def widening(self) -> float:
         """How many times wider than the planar pattern the effects can make the spray."""
-        by_pattern = self.effects_by_pattern()
-        return max(math.prod(effect.reach() for effect in effects) for effects in by_pattern)
+        return math.prod(effect.reach() for effect in self.effects)
 
     @property
     def reach_m(self) -> float:
@@ -185,17 +164,14 @@ class DepositionModel(BaseModel):
         return planar.radius_of_flux_m(CUT_FLUX) * self.widening
 
     @property
-    def shadows(self) -> tuple[float, ...]:
-        """Share of the flux stopped where the line of sight is blocked, 0 to 1, by pattern."""
-        by_pattern = self.effects_by_pattern()
-        return tuple(max((e.shadow() for e in effects), default=0.0) for effects in by_pattern)
+    def shadow(self) -> float:
+        """Share of the flux that is stopped where the line of sight is blocked, 0 to 1."""
+        return max((effect.shadow() for effect in self.effects), default=0.0)
 
     @property
     def max_step_m(self) -> float:
         """Travel of a sub-step that keeps the integral's error below 0.1 % of the peak [m]."""
-        # Brushes that set-points stand for come and go while a motion is under way.
-        named = [brush.planar for brush in self.brushes if brush.number < BETWEEN]
-        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in named or [self.planar])
+        width = min(min(planar.sigma1_m, planar.sigma2_m) for planar in self.patterns)
         return min(DEFAULT_MAX_STEP_M, 0.1 * width)
 
     def effect(self, effect_id: str) -> Effect | None:

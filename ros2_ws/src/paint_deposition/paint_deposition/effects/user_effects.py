@@ -115,18 +115,15 @@ def _run(path: Path, source: bytes, digest: str) -> ModuleType:
         exec(compile(source, str(path), 'exec'), module.__dict__)
     except (Exception, SystemExit) as error:
         del sys.modules[module.__name__]
-        line = _line_in(error, path)
+        frames = traceback.extract_tb(error.__traceback__)
+        lines = [frame.lineno for frame in frames if frame.filename == str(path)]
+        if isinstance(error, SyntaxError):
+            lines = [error.lineno]
+        line = f', line {lines[-1]}' if lines else ''
         raise ModelError(
             f'{path}{line}: {type(error).__name__}: {_one_line(error)}; correct the file'
         ) from None
     return module
-
-
-def _line_in(error: BaseException, path: Path) -> str:
-    if isinstance(error, SyntaxError):
-        return f', line {error.lineno}'
-    frames = traceback.extract_tb(error.__traceback__)
-    return next((f', line {f.lineno}' for f in reversed(frames) if f.filename == str(path)), '')
 
 
 def _one_line(error: BaseException) -> str:

@@ -21,7 +21,6 @@ from paint_deposition.part.surface import Surface
 
 THINNEST_UM = -5.0
 THICKEST_UM = 5000.0
-MOST_LABELS_SHOWN = 6
 NO_LABEL = 'the point has no label'
 
 
@@ -143,7 +142,7 @@ class MeasuringPoints:
         rows = [places.get(label, 0) for label in wanted]
         words = f'{self.words}, joined {by}'
         if unmeasured := [label for label in self.labels if label not in set(wanted)]:
-            named = some(unmeasured, MOST_LABELS_SHOWN)
+            named = some(unmeasured, 6)
             words += f' ({len(unmeasured)} of them without a reading: {named})'
         normals = None if self.normals is None else self.normals[rows]
         return self.positions_m[rows], normals, np.array(wanted), words

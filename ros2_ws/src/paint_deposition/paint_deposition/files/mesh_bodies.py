@@ -30,7 +30,6 @@ STEP_READER = 'cascadio'
 # A binary STL: 80 bytes of anything, the number of triangles, and each with its normal.
 STL_HEAD = 84
 STL_TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('colour', '<u2')])
-SHOWN_NAMES = 8
 
 
 @dataclass(frozen=True)
@@ -79,7 +78,7 @@ def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> 
             notes.append(f'{path.name}: of its {len(found)} bodies {body!r} was taken')
         found = {body: found[body]}
     elif len(found) > 1:
-        names = some([*found], SHOWN_NAMES)
+        names = some([*found], 8)
         notes.append(
             f'{path.name}: its {len(found)} bodies were taken as one part: {names}; --body NAME '
             'takes one of them'

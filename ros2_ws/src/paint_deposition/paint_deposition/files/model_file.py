@@ -14,12 +14,17 @@ from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.effect_source import file_name, needs_file, source_of
-from paint_deposition.files.model_text import LEARNED_ID, model_text
+from paint_deposition.files.model_text import (
+    LEARNED_ID,
+    file_name,
+    model_text,
+    needs_file,
+    source_of,
+)
 from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.brush import MOST, Brush, BrushLaw, SetPoints
+from paint_deposition.model.brush import MOST, Brush, SetPoints
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 
@@ -126,6 +131,7 @@ def model_of(values: Mapping[str, Any]) -> DepositionModel:
     Raises:
         ModelError: it has an effect of a user's own, whose file is not named there.
     """
+    # Results of earlier versions also say whether a brush was interpolated.
     about = {'number', 'interpolated'}
     try:
         brushes = {
@@ -160,7 +166,6 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
         patterns = DepositionModel.of_brushes(_brushes(sections.brushes))
     eq_2 = Projection(**projection.model_dump(exclude={'occlusion'}))
     model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
-    model.effects_by_pattern()  # refuses what effects cannot follow
     posterior = None
     if sections.posterior:
         posterior = checked(Posterior, 'posterior', sections.posterior, ModelError)
@@ -170,29 +175,24 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
 
 
 def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
-    """The brushes of a section; those without a pattern are interpolated between the others."""
+    """The brushes of a section, each with its pattern."""
     if not section:
         raise ModelError('brushes is empty; give a brush by its number, or planar')
-    calibrated: list[Brush] = []
-    between: list[tuple[int, dict[str, Any]]] = []
+    brushes: list[Brush] = []
     for number, entry in section.items():
         if isinstance(number, bool) or not isinstance(number, int) or not 1 <= number <= MOST:
             raise ModelError(
                 f'brushes: {quoted(number)} is not a brush number; give 1, 2 and so on'
             )
         given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
-        at = given.model_dump(exclude={'planar'})
         if given.planar is None:
-            between.append((number, at))
-            continue
+            raise ModelError(
+                f'brushes, {number}: planar is missing; calibrate the brush, or take it out'
+            )
         planar = checked(PlanarPattern, f'brushes, {number}: planar', given.planar, ModelError)
-        calibrated.append(Brush(number=number, planar=planar, **at))
-    law = BrushLaw(tuple(calibrated))
-    patterns = [law.pattern(f'brushes, {number}', SetPoints(**at)) for number, at in between]
-    return calibrated + [
-        Brush(number=number, planar=planar, interpolated=True, **at)
-        for (number, at), planar in zip(between, patterns, strict=True)
-    ]
+        set_points = given.model_dump(exclude={'planar'})
+        brushes.append(Brush(number=number, planar=planar, **set_points))
+    return brushes
 
 
 def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect]]) -> Effect:

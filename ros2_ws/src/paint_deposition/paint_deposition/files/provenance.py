@@ -13,7 +13,6 @@ from paint_deposition.files.atomic import require_file
 from paint_deposition.files.json_files import json_text, plain
 from paint_deposition.files.model_file import model_source
 from paint_deposition.files.version import git_version
-from paint_deposition.model.brush import BETWEEN
 
 BLOCK_BYTES = 1 << 20
 
@@ -65,8 +64,7 @@ def model_digest(model: DepositionModel) -> str:
 
 
 def _values(model: DepositionModel) -> dict[str, Any]:
-    named = (brush for brush in model.brushes if brush.number < BETWEEN)
-    brushes = {'brushes': [plain(brush.model_dump()) for brush in named]}
+    brushes = {'brushes': [plain(brush.model_dump()) for brush in model.brushes]}
     return {
         **(brushes if model.brushes else {'planar': plain(model.planar.model_dump())}),
         'projection': plain(model.projection.model_dump()),

@@ -18,7 +18,6 @@ from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
 SAME_COLOUR = 40
 # A triangle has a colour if that many of its corners have it.
 CORNERS = 2
-SHOWN_COLOURS = 5
 Corner = Annotated[list[Number], Field(min_length=3, max_length=3)]
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
 
@@ -139,5 +138,5 @@ def _coloured(mesh: Path, colour: str, found: Triangles) -> np.ndarray:
     if not chosen.any():
         there, count = np.unique(found.colours.reshape(-1, 3), axis=0, return_counts=True)
         names = ['#{:02x}{:02x}{:02x}'.format(*one) for one in there[np.argsort(-count)]]
-        raise PaintError(f'{mesh} has no {colour}; its colours are {some(names, SHOWN_COLOURS)}')
+        raise PaintError(f'{mesh} has no {colour}; its colours are {some(names, 5)}')
     return chosen

@@ -92,16 +92,14 @@ class FilmIntegrator:
         self._context = PathContext(
             model.projection, self.points.down, self.points.outward, self.points.centre_m
         )
-        self._shadowed = max(model.shadows) > 0.0 and self._occluder is not None
+        self._shadowed = model.shadow > 0.0 and self._occluder is not None
         if self._occluder is not None and self._shadowed and self._lines_of_sight is None:
             self._lines_of_sight = LinesOfSight(self._occluder, self.points, self._blocks)
         # Absent effects are left out rather than computed: they change nothing, to the bit.
         self._effects = [effect for effect in model.effects if not effect.is_neutral]
-        whole = model.effects_by_pattern()
-        acting = [[e for e in effects if not e.is_neutral] for effects in whole]
-        # Each effect as it is for every brush, mostly the same.
-        self._on_path = list(zip(*acting, strict=True))
-        *laws, parameters = compiled_laws(whole if self._keep_absent_laws else acting)
+        *laws, parameters = compiled_laws(
+            model.effects if self._keep_absent_laws else self._effects
+        )
         self._variant = (*laws, self._shadowed, self._real)
         self._parameters = parameters.astype(self._real)
 
@@ -156,20 +154,10 @@ class FilmIntegrator:
 
     def sprayed(self, path: SprayPath) -> tuple[SprayPath, np.ndarray]:
         """What is really sprayed of a path, effects on it applied, and the rows that it is."""
-        for effects in self._on_path:
-            path = self._moved(path, effects)
+        for effect in self._effects:
+            path = effect.on_path(path, self._context)
         rows = np.flatnonzero(path.flow * path.dwell_s)
         return path.select(rows), rows
-
-    def _moved(self, path: SprayPath, effects: Sequence[Effect]) -> SprayPath:
-        """The path under an effect as it is for each brush."""
-        kinds = list(dict.fromkeys(effects))
-        moved = [effect.on_path(path, self._context) for effect in kinds]
-        if len(kinds) == 1:
-            return moved[0]
-        # Before the first opening there is no brush, and nothing is sprayed.
-        row = np.searchsorted([brush.number for brush in self.model.brushes[:-1]], path.brush)
-        return SprayPath.by_row(moved, np.array([kinds.index(e) for e in effects])[row])
 
     def _steps(self, path: SprayPath, reach: float | None = None) -> Steps:
         """What the kernel reads; ``reach`` of lines of sight, if it is not the pattern's."""

@@ -19,11 +19,10 @@ NO_GAIN_UM_PER_S = 1e-30
 
 def model_constants(model: DepositionModel) -> np.ndarray:
     """(B, 11) constants of eqs. (1) and (2), a row a brush, as the kernel uses them."""
-    each = zip(model.patterns, model.shadows, strict=True)
-    return np.stack([_constants(model, planar, shadow) for planar, shadow in each])
+    return np.stack([_constants(model, planar) for planar in model.patterns])
 
 
-def _constants(model: DepositionModel, planar: PlanarPattern, shadow: float) -> np.ndarray:
+def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
     projection = model.projection
     ring = planar.K1_cm3_per_s * (1.0 - planar.K2) / planar.gamma_m2
     centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
@@ -37,24 +36,23 @@ def _constants(model: DepositionModel, planar: PlanarPattern, shadow: float) -> 
     c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
     c[kernel.NEAREST] = projection.nearest_m
     c[kernel.REACH] = model.reach_of_m(planar)
-    c[kernel.SHADOW] = shadow
+    c[kernel.SHADOW] = model.shadow
     return c
 
 
-def compiled_laws(effects: Sequence[Sequence[Effect]]) -> tuple[Laws, Laws, np.ndarray]:
-    """What the kernel inlines of effects, each as it is for every one of B brushes.
+def compiled_laws(effects: Sequence[Effect]) -> tuple[Laws, Laws, np.ndarray]:
+    """What the kernel inlines of effects.
 
-    Flux factors and pattern scales, each with how many parameters it takes; (B, n) parameters, one
+    Flux factors and pattern scales, each with how many parameters it takes; (n,) parameters, one
     unused number where there are none.
     """
     found: list[Laws] = []
-    values: list[list[float]] = [[] for _ in effects]
+    values: list[float] = []
     for kind in ('flux_factor', 'pattern_scale'):
-        chosen = [[e for e in each if getattr(type(e), kind) is not None] for each in effects]
-        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen[0]))
-        for row, each in zip(values, chosen, strict=True):
-            row += [value for effect in each for value in effect.values()]
-    return found[0], found[1], np.array([row or [0.0] for row in values])
+        chosen = [e for e in effects if getattr(type(e), kind) is not None]
+        found.append(tuple((getattr(type(e), kind), len(e.values())) for e in chosen))
+        values += [value for effect in chosen for value in effect.values()]
+    return found[0], found[1], np.array(values or [0.0])
 
 
 def term_constants(model: DepositionModel) -> np.ndarray:

@@ -3,7 +3,6 @@
 import copy
 from bisect import bisect_right, insort
 from collections.abc import Iterable
-from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
@@ -11,12 +10,6 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
-from paint_deposition.film.interpolated_brushes import (
-    uses_set_points,
-    with_brushes_of,
-    with_set_points,
-)
-from paint_deposition.model.brush import BETWEEN
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
 from paint_deposition.motion.pose_stream import (
     DEFAULT_POSE_MEMORY,
@@ -132,12 +125,9 @@ class LiveFilm:
             ModelError: the model does not have the brush that the gun sprays with.
         """
         carried = before._changes or before._carried
-        # A brush between the calibrated ones is interpolated again from its set-points.
-        sprayed = {change.brush for change in carried if change.flow > 0.0}
-        brushes = {brush for brush in sprayed if brush < BETWEEN}
+        brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)
         self._carried, self._brushes = carried, brushes
-        self._integrator.use(with_brushes_of(self.model, before.model))
         self._clear()
 
     def forget_trigger(self) -> None:
@@ -161,8 +151,7 @@ class LiveFilm:
         """Add a trigger change, early, in time or late.
 
         Raises:
-            ModelError: its brush is not in the model, or its set-points lie outside the calibrated
-                ones; the change is ignored.
+            ModelError: its brush is not in the model; the change is ignored.
             RecordingError: too many wait for poses; the change is ignored.
         """
         if len(self._changes) >= MOST_CHANGES:
@@ -171,12 +160,14 @@ class LiveFilm:
                 'the clocks'
             )
         if change.flow > 0.0:
-            change = self._with_brush_number(change)
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
         self._restore_carried_trigger(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
-            self._restart_with(change)
+            log = self.log
+            self._clear()
+            self._take_change(change)
+            self.replay(log.events())
             return
         if self._reached_ns - change.stamp_ns > STREAM_RESTART_NS:
             self._changes, self._reached_ns = [], change.stamp_ns
@@ -216,7 +207,6 @@ class LiveFilm:
         Raises:
             ModelError: the model lacks a brush that was used.
         """
-        model = with_brushes_of(model, self.model)
         always_on = self._sprays_without_trigger and self.flow is None
         model.require_brushes({ONLY_BRUSH} if always_on else self._brushes)
         builder = self._builder
@@ -235,21 +225,6 @@ class LiveFilm:
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
-
-    def _with_brush_number(self, change: TriggerChange) -> TriggerChange:
-        """The change with the number of an interpolated brush, where set-points select it."""
-        if not uses_set_points(self.model, change.brush, change.set_points):
-            return change
-        model, number = with_set_points(self.model, change.set_points)
-        if model is not self.model:
-            self._integrator.use(model)
-        return replace(change, brush=number)
-
-    def _restart_with(self, first_change: TriggerChange) -> None:
-        log = self.log
-        self._clear()
-        self._take_change(first_change)
-        self.replay(log.events())
 
     def _restore_carried_trigger(self, stamp_ns: int) -> None:
         """After a reset, add the trigger changes from before it, unless the stream restarted."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.model.brush import BETWEEN, Brush
+from paint_deposition.model.brush import Brush
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
@@ -76,12 +76,8 @@ class PaintUsed:
             'transfer_efficiency': self.transfer_efficiency(on_part_cm3),
             'mean_wet_film_um': mean_um / self.solids if self.solids else math.nan,
         }
-        by_brush: dict[str, float] = {}
-        for number, time_s in self.spraying_s.items():
-            name = str(number) if number < BETWEEN else 'between'
-            by_brush[name] = by_brush.get(name, 0.0) + time_s
         return {k: None if math.isnan(v) else v for k, v in known.items()} | {
-            'spraying_time_s_by_brush': by_brush
+            'spraying_time_s_by_brush': {str(n): time_s for n, time_s in self.spraying_s.items()}
         }
 
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import require_above_zero
+from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.model.eq3_collapse import (
     NEGLIGIBLE,
@@ -63,7 +63,9 @@ def collapse_um(
         PlanError: speed or standoff is not above zero.
     """
     standoff = model.projection.nominal_standoff_m if standoff_m is None else standoff_m
-    require_above_zero(speed_m_per_s=speed_m_per_s, standoff_m=standoff)
+    for name, value in (('speed_m_per_s', speed_m_per_s), ('standoff_m', standoff)):
+        if not (math.isfinite(value) and value > 0.0):
+            raise PlanError(f'{name} is {value:g}; give a number above 0')
     if model.effects:
         way = -1.0 if backwards else 1.0
         roll = travel_rad + (math.pi if turned else 0.0)

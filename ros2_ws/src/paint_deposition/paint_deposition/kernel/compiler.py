@@ -13,13 +13,8 @@ __all__ = ['njit']
 KIND = 'x86-64-v3'
 ITS_FEATURES = ('avx2', 'bmi2', 'f16c', 'fma', 'lzcnt', 'movbe')
 
-
-def _choose_processor() -> None:
-    """Choose the kind, unless the user's NUMBA_CPU_NAME names one or this processor is no such."""
-    has = llvm.get_host_cpu_features()
-    if config.CPU_NAME is None and all(has.get(feature) for feature in ITS_FEATURES):
-        config.CPU_NAME = KIND
-        config.CPU_FEATURES = ''
-
-
-_choose_processor()
+# Unless the user's NUMBA_CPU_NAME names another kind, or this processor is no such.
+_has = llvm.get_host_cpu_features()
+if config.CPU_NAME is None and all(_has.get(feature) for feature in ITS_FEATURES):
+    config.CPU_NAME = KIND
+    config.CPU_FEATURES = ''

@@ -95,7 +95,7 @@ def paint_block(
         yx, yy, yz = step[AXIS_Y], step[AXIS_Y + 1], step[AXIS_Y + 2]
         zx, zy, zz = step[AXIS_Z], step[AXIS_Z + 1], step[AXIS_Z + 2]
         shift_x, shift_y, speed = step[SHIFT], step[SHIFT + 1], step[SPEED]
-        weight, law = step[WEIGHT], to_fixed_tuple(parameters[brush[m]], parameter_count)
+        weight, law = step[WEIGHT], to_fixed_tuple(parameters, parameter_count)
         run = first[tracing[m], block]
         not_hidden = seen[run : run + len(px)]
         for i in range(len(px)):
@@ -170,7 +170,7 @@ def accumulate(
         tracing: (M,) row of ``first`` for each sub-step.
         brush: (M,) row of ``constants`` for each sub-step.
         constants: (B, 11) of each brush, from ``layout.model_constants``.
-        parameters: (B, n) of the laws for each brush, or one unused number.
+        parameters: (n,) of the laws, or one unused number.
     """
     for block in range(first_block, last_block):
         paint_block(

@@ -44,11 +44,9 @@ class _Motion:
         self.stamps_ns[row : row + is_known] = [stamp_ns]
         self.poses[row : row + is_known] = [(parent, pose)]
 
-    def forget_surplus(self) -> None:
-        del self.stamps_ns[:-MOST_POSES], self.poses[:-MOST_POSES]
-
     def forget(self, before_ns: int) -> None:
         row = bisect_left(self.stamps_ns, before_ns)
+        row = max(row, len(self.stamps_ns) - MOST_POSES)
         del self.stamps_ns[:row], self.poses[:row]
 
     def parent(self, stamp_ns: int) -> str:
@@ -143,7 +141,6 @@ class FrameTree:
         motion.add(stamp_ns, _name(parent), np.array(pose, dtype=float))
         if self._live:
             motion.forget(motion.stamps_ns[-1] - REMEMBERED_NS)
-            motion.forget_surplus()
         return restarted
 
     def _has_room(self, child: str) -> bool:

@@ -101,13 +101,6 @@ class SprayPath:
         return SprayPath.of(whole, none, none, vectors, axes, vectors)
 
     @staticmethod
-    def by_row(paths: list['SprayPath'], chosen: np.ndarray) -> 'SprayPath':
-        """Each row (M,) from one of several paths of the same sub-steps."""
-        rows, names = np.arange(len(chosen)), [item.name for item in fields(SprayPath)]
-        columns = ([getattr(path, name) for path in paths] for name in names)
-        return SprayPath(*(np.stack(column)[chosen, rows] for column in columns))
-
-    @staticmethod
     def joined(paths: list['SprayPath']) -> 'SprayPath':
         """Paths one after the other."""
         return SprayPath(

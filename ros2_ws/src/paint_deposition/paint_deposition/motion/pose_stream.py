@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.repeated_samples import RepeatedSamples
+from paint_deposition.motion.stream_figures import RepeatedSamples
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
@@ -17,15 +17,11 @@ BATCH_POSES = 256
 
 @dataclass(frozen=True)
 class TriggerChange:
-    """The flow (relative; 0 is gun off) from a time on, and the number of the brush.
-
-    ``set_points`` are a row of those of a trajectory, or none.
-    """
+    """The flow (relative; 0 is gun off) from a time on, and the number of the brush."""
 
     stamp_ns: int
     flow: float
     brush: int = ONLY_BRUSH
-    set_points: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -82,12 +78,12 @@ def events_of(
     begin, end = max(after, 0), len(motion) if until is None else until
     came = np.zeros(len(motion.trigger_flow), np.int64)
     came[1:] = motion.trigger_rows[1:] if len(motion.trigger_rows) else 0
-    for number, (row, change) in enumerate(zip(came.tolist(), motion.triggers, strict=True)):
+    for row, change in zip(came.tolist(), motion.triggers, strict=True):
         if after < row <= end:
             if row > begin:
                 yield batch.select(slice(begin, row))
                 begin = row
-            yield TriggerChange(*change, motion.set_points_of(number))
+            yield TriggerChange(*change)
     if begin < end:
         yield batch.select(slice(begin, end))
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
-from paint_deposition.motion.repeated_samples import RepeatedSamples
+from paint_deposition.motion.stream_figures import RepeatedSamples
 
 # Fewer samples a second blur the speed of the gun and cut its corners.
 LEAST_HZ = 10.0

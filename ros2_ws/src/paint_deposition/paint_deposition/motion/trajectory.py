@@ -61,9 +61,6 @@ class Trajectory:
         trigger_flow: (M,) from that time on, relative to the calibrated one; 0 is gun off, as it
             is before the first of them.
         trigger_brush: (M,) int number of the brush from that time on; empty: 0, the only one.
-        trigger_set_points: (M, 4) flow [cm3/min], shaping air [l/min], bell speed [rev/min] and
-            magnitude of the voltage [kV] from that time on; unknown where not above 0 or NaN.
-            Empty: all are unknown.
         frames: (N,) frame of each pose, where they are in several; else empty.
         trigger_rows: (M,) int number of poses that came before each change; empty: all changes
             came before the poses. It matters where a stream of poses begins again.
@@ -86,7 +83,6 @@ class Trajectory:
     source: str = 'trajectory'
     settings: Mapping[str, float] = field(default_factory=dict)
     trigger_brush: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
-    trigger_set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     trigger_rows: np.ndarray = field(default_factory=lambda: np.empty(0, np.int64))
     frames: tuple[str, ...] = ()
 
@@ -105,7 +101,6 @@ class Trajectory:
         for what, column, may_lack in (
             ('flow values', self.trigger_flow, False),
             ('brushes', self.trigger_brush, True),
-            ('rows of set-points', self.trigger_set_points, True),
             ('numbers of poses before', self.trigger_rows, True),
         ):
             if len(column) != changes and not (may_lack and not len(column)):
@@ -120,10 +115,6 @@ class Trajectory:
         brush = self.trigger_brush if len(self.trigger_brush) else np.zeros(len(self.trigger_flow))
         columns = (self.trigger_stamps_ns, self.trigger_flow, brush.astype(np.int64))
         return list(zip(*(column.tolist() for column in columns), strict=True))
-
-    def set_points_of(self, row: int) -> tuple[float, ...]:
-        """Those from a change of the trigger on, none where all are unknown."""
-        return tuple(map(float, self.trigger_set_points[row : row + 1].ravel()))
 
     @property
     def brushes(self) -> set[int]:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paint_deposition.part.orientation import CANCELLED, is_one_sided
+from paint_deposition.part.orientation import CANCELLED, ONE_SIDED, mean_normal
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
@@ -63,7 +63,8 @@ def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
             'triangles were turned round'
         )
         surface = replace(turned(surface), notes=(*surface.notes, note))
-    if is_one_sided(surface.normals, surface.vertex_areas_m2):
+    mean = mean_normal(surface.normals, surface.vertex_areas_m2)
+    if np.linalg.norm(mean) >= ONE_SIDED:  # it has one outward side by itself, as an open sheet
         return surface
     gun_side = -axes.mean(axis=0)
     if np.linalg.norm(gun_side) < CANCELLED:

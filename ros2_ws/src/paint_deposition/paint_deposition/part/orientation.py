@@ -38,11 +38,6 @@ def outward_side(
     return np.array([0.0, -1.0, 0.0]) if abs(down[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
 
 
-def is_one_sided(normals: np.ndarray, areas_m2: np.ndarray | None) -> bool:
-    """Whether the surface has one outward side by itself, as an open sheet has."""
-    return bool(np.linalg.norm(mean_normal(normals, areas_m2)) >= ONE_SIDED)
-
-
 def mean_normal(normals: np.ndarray, areas_m2: np.ndarray | None) -> np.ndarray:
     """(3,) mean of the (V, 3) normals, of length 1 on a plane and 0 on a closed body."""
     return np.average(normals, axis=0, weights=areas_m2) if len(normals) else np.zeros(3)

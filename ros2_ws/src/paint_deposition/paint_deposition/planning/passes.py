@@ -38,11 +38,6 @@ class PassStyle:
     brush: int = ONLY_BRUSH  # number of the brush that sprays; 0 is the only one
 
     @property
-    def lead_m(self) -> float:
-        """Travel from standstill to full speed, with the gun off [m]."""
-        return self.speed_m_per_s**2 / (2.0 * self.acceleration_m_per_s2) + SETTLING_M
-
-    @property
     def transfer_speed_m_per_s(self) -> float:
         """From a pass or a face to the next [m/s]."""
         return max(self.speed_m_per_s, LEAST_TRANSFER_SPEED_M_PER_S)
@@ -80,7 +75,9 @@ def plan_pass(
     The tool keeps its orientation about its axis whichever way the pass runs.
     """
     first, last = surface_map.extent_near_m(across_m, style.band_m)
-    beyond = style.overspray_m + style.lead_m
+    # From standstill to full speed with the gun off.
+    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + SETTLING_M
+    beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
     positions, rotations = tool_poses(surface_map, line, np.full(count, across_m), style)

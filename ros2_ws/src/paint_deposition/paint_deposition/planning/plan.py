@@ -121,7 +121,11 @@ def plan(
     height = ends[1] - ends[0]
     even = request.model_copy(update={'target_um': wanted.target_um})
     plane = recommend(model, even.for_plane(height, right - left))
-    index_range = _index_range(request, plane)
+    if request.index_m is not None:
+        index_range = request.index_m, request.index_m
+    else:
+        low, high = (share * plane.index_m for share in INDEX_SHARES)
+        index_range = request.index_min_m or low, request.index_max_m or high
     style = _style(model, request, plane)
     films = LineFilms(
         surface, surface_map, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
@@ -168,10 +172,3 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         one_way=request.one_way,
         brush=model.brush,
     )
-
-
-def _index_range(request: PlanRequest, plane: Recommendation) -> tuple[float, float]:
-    if request.index_m is not None:
-        return request.index_m, request.index_m
-    low, high = (share * plane.index_m for share in INDEX_SHARES)
-    return request.index_min_m or low, request.index_max_m or high

@@ -245,7 +245,7 @@ def _notes(
         notes.append(f'the target of {request.target_um:g} µm would need {right:.3g} m/s')
     if request.width_m is not None and request.length_m is None:
         notes.append('cycle time is for passes as long as the width')
-    on_film = [e.id for e in model.effects if e.acts_on_the_finished_film]
+    on_film = [e.id for e in model.effects if e.acts('on_film', 'on_gauge')]
     if on_film:
         notes.append(f'left out, for they act on the finished film: {", ".join(on_film)}')
     return notes

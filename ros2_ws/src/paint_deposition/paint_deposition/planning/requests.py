@@ -228,11 +228,6 @@ class ImproveRequest(Limits):
             raise PlanError(f'flow is {self.flow[0]:g} to {self.flow[1]:g}; swap the two')
         return self
 
-    @property
-    def flow_is_free(self) -> bool:
-        """Whether passes may have flows of their own."""
-        return self.flow[0] < self.flow[1]
-
 
 class MeasureRequest(Request):
     """Where to put the gauge on a part."""

@@ -12,10 +12,3 @@ COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
 MODELS = (ACCENT, *COMPONENTS, '#b5485f', '#8a7a2b')
 # 95 % of normally distributed readings lie within so many standard deviations.
 TWO_SIDED_95 = 1.96
-
-
-def charts_a_row(count: int) -> int:
-    """Two to four small charts in a row, so that few places stay empty."""
-    if count < 5:
-        return count if count < 4 else 2
-    return min((3, 4), key=lambda columns: -count % columns)

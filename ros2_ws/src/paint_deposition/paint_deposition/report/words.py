@@ -267,12 +267,6 @@ def count_words(study: Study) -> str:
     return f'{text} on {names}'
 
 
-def with_others(names: list[str]) -> str:
-    """'a (or b or c)': the likeliest of several, and those that are not distinguished from it."""
-    others = f' (or {joined(names[1:], "or")})' if names[1:] else ''
-    return f'{names[0]}{others}'
-
-
 def joined(words: list[str], last: str = 'and') -> str:
     """'a, b and c'."""
     if len(words) < 2:

@@ -12,7 +12,6 @@ from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Rou
 from paint_deposition.files.rapid.values import Datum, Unknown, Values
 
 MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
-LEAVING = ('return', 'exit', 'raise', 'goto')
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
 # What moves neither the robot nor the paint: settings of the motion that the film does not see,
 # outputs and inputs, text, waiting, interrupts, files.
@@ -190,7 +189,7 @@ class Interpreter(Values):
         return None
 
     def _while(self, word: Token, condition: Any, body: Node) -> None:
-        leaves = any(i.name in LEAVING for i in self.reached(body))
+        leaves = any(i.name in ('return', 'exit', 'raise', 'goto') for i in self.reached(body))
         for turn in count():
             self.line = line_of(word)
             self._step()

@@ -12,8 +12,6 @@ from lark import Lark, Token, Transformer, UnexpectedInput, v_args
 
 from paint_deposition.errors import RecordingError, quoted
 
-GRAMMAR = Path(__file__).with_name('rapid.lark')
-
 
 class Node(NamedTuple):
     """A statement or an expression: the name of its rule in the grammar, and its parts."""
@@ -139,7 +137,7 @@ def line_of(token: Token) -> int:
 
 @cache
 def _grammar() -> Lark:
-    text = GRAMMAR.read_text(encoding='utf-8')
+    text = Path(__file__).with_name('rapid.lark').read_text(encoding='utf-8')
     return Lark(text, parser='lalr', transformer=_Builder())
 
 

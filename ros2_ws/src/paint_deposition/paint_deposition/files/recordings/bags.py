@@ -12,7 +12,7 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.bag_files import Bag, open_bag
+from paint_deposition.files.recordings.bag_files import Bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
@@ -34,12 +34,6 @@ JOINT_TOPIC = '/joint_trajectory'
 # robot have the same clock.
 MAX_CLOCK_OFFSET_S = 1.0
 QUEUE_DEPTH = 500
-
-
-def read_trajectory(path: Path | str, *args: Any, **kwargs: Any) -> Trajectory:
-    """``trajectory_of`` a ROS 1 .bag, a rosbag2 folder (sqlite3 or MCAP) or a single .mcap."""
-    with open_bag(path) as bag:
-        return trajectory_of(bag, *args, **kwargs)
 
 
 def trajectory_of(
@@ -80,11 +74,11 @@ def trajectory_of(
         # Where the clock was set back, the order in which they came says of which stream they are.
         order = np.arange(len(order))
         rows = np.searchsorted(np.maximum.accumulate(log_times_ns), gun.log_times_ns)
-    columns = gun.stamps_ns, gun.flow, gun.brush, gun.set_points
-    stamps, flow, brush, points = (its[order] if len(its) else its for its in columns)
+    columns = gun.stamps_ns, gun.flow, gun.brush
+    stamps, flow, brush = (its[order] if len(its) else its for its in columns)
     return replace(
         trajectory, trigger_stamps_ns=stamps, trigger_flow=flow, trigger_brush=brush,
-        trigger_set_points=points, trigger_rows=rows, settings=gun.settings,
+        trigger_rows=rows, settings=gun.settings,
         notes=(*trajectory.notes, *gun.notes),
     )  # fmt: skip
 
@@ -125,8 +119,6 @@ def motion_of(
 def write_pose_bag(
     folder: Path | str,
     trajectory: Trajectory,
-    pose_topic: str = POSE_TOPIC,
-    state_topic: str = STATE_TOPIC,
     custom_data: Mapping[str, str] | None = None,
     part: tuple[str, Rigid] | None = None,
     drive: Drive | None = None,
@@ -145,18 +137,16 @@ def write_pose_bag(
         )
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
-    numbers = np.concatenate([trajectory.trigger_brush, trajectory.trigger_set_points.ravel()])
-    state_type = STATE_TYPE if levels or numbers.any() else BOOL_TYPE
+    state_type = STATE_TYPE if levels or trajectory.trigger_brush.any() else BOOL_TYPE
     # (time, rank at equal times, content): the trigger before the pose.
     entries: list[tuple[int, int, Any]] = [
-        (time_ns, 0, (*gun, trajectory.set_points_of(row)))
-        for row, (time_ns, *gun) in enumerate(trajectory.triggers)
+        (time_ns, 0, gun) for time_ns, *gun in trajectory.triggers
     ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
-        _add_topic(run, pose_topic, POSE_TYPE)
+        _add_topic(run, POSE_TOPIC, POSE_TYPE)
         if len(trajectory.trigger_stamps_ns):
-            _add_topic(run, state_topic, state_type)
+            _add_topic(run, STATE_TOPIC, state_type)
         if part:
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
             begin_ns, (child, place) = min(time_ns for time_ns, *_ in entries), part
@@ -178,7 +168,7 @@ def write_pose_bag(
                 cdr = types.serialize_cdr(types.types[POSE_TYPE](header, pose), POSE_TYPE)
             else:
                 cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
-            run.write(pose_topic if is_pose else state_topic, bytes(cdr), time_ns, time_ns)
+            run.write(POSE_TOPIC if is_pose else STATE_TOPIC, bytes(cdr), time_ns, time_ns)
     return run.folder
 
 
@@ -202,15 +192,15 @@ def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = Fal
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 
-def _state(
-    types: Typestore, kind: str, header: Any, flow: float, brush: int, set_points: tuple
-) -> Any:
-    """A Bool or an AtomizerState with relative flow, brush and set-points."""
+def _state(types: Typestore, kind: str, header: Any, flow: float, brush: int) -> Any:
+    """A Bool or an AtomizerState with relative flow and brush."""
     if kind == BOOL_TYPE:
         return types.types[BOOL_TYPE](flow > 0.0)
+    # Neither set-points nor a programmed speed.
     unknown = float('nan')
-    wet, *others = set_points or (unknown,) * 4
-    return types.types[STATE_TYPE](header, flow > 0.0, flow, *others, brush, wet, unknown)
+    return types.types[STATE_TYPE](
+        header, flow > 0.0, flow, *(unknown,) * 3, brush, unknown, unknown
+    )
 
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:

@@ -1,6 +1,5 @@
 """Where messages become numbers, decoded by rosbags or by rclpy: stamps, poses and states."""
 
-import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -11,9 +10,7 @@ from paint_deposition.motion.part_frame import is_pose
 from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 
-# Fields of AtomizerState with set-points, in the order of a trajectory's set-points.
 PLACED = ('translation', 'rotation')
-SET_POINTS = ('flow_cm3_per_min', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 
 
 def stamp_ns(header: Any) -> int:
@@ -65,10 +62,4 @@ def trigger_change(state: Any) -> TriggerChange:
     flow = relative_flow(bool(state.spraying), state.flow)
     if flow > 0.0 and brush < ONLY_BRUSH:
         raise RecordingError(f'atomizer state with brush {brush}: give 0 or more')
-    return TriggerChange(stamp, flow, brush, set_points_of(state))
-
-
-def set_points_of(state: Any) -> tuple[float, ...]:
-    """The set-points of a state in the order of a trajectory's; 0 for missing ones."""
-    known = (abs(float(getattr(state, name, 0.0))) for name in SET_POINTS)
-    return tuple(value if math.isfinite(value) else 0.0 for value in known)
+    return TriggerChange(stamp, flow, brush)

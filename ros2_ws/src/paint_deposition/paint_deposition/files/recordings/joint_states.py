@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.tables.headings import ANGLES, LENGTHS
 from paint_deposition.motion.arm import Arm
-from paint_deposition.motion.repeated_samples import RepeatedSamples
+from paint_deposition.motion.stream_figures import RepeatedSamples
 from paint_deposition.motion.stream_quality import StreamQuality
 from paint_deposition.motion.trajectory import Trajectory
 
@@ -104,20 +104,15 @@ class Robot:
                 frame = np.eye(4)
         axes = np.array([joint.joint_axis for joint in moving])
         lower, upper = np.array([joint.limits for joint in moving]).T
-        fastest = self._fastest()
+        root = ElementTree.parse(self.path).getroot()
+        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
+        fastest = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
         return Arm(
             tuple(self.moving_joints), np.array([*frames, frame]),
             axes / np.linalg.norm(axes, axis=1, keepdims=True),
             np.array([joint.joint_type == 'prismatic' for joint in moving]), lower, upper,
-            np.array([fastest.get(name, np.inf) for name in self.moving_joints]),
+            np.array([max(fastest.get(name, 0.0), 0.0) or np.inf for name in self.moving_joints]),
         )  # fmt: skip
-
-    def _fastest(self) -> dict[str, float]:
-        """Greatest speed of each joint that has one [rad/s or m/s]."""
-        root = ElementTree.parse(self.path).getroot()
-        limits = {joint.get('name', ''): joint.find('limit') for joint in root.iter('joint')}
-        speeds = {n: float(e.get('velocity', 0)) for n, e in limits.items() if e is not None}
-        return {name: speed for name, speed in speeds.items() if speed > 0.0}
 
     def recorded_joints(
         self, names: Mapping[str, T], where: str, numbered: bool = False

@@ -24,7 +24,6 @@ from paint_deposition.files.atomic import write_text
 from paint_deposition.files.recordings.bag_files import KEPT
 from paint_deposition.files.recordings.message_definitions import Definition
 
-METADATA_VERSION = 9
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
 # A killed process loses its open chunk, so chunks are closed by size and by age. At 250 Hz the
 # default megabyte of mcap would hold half a minute of poses.
@@ -230,7 +229,7 @@ class RunWriter:
             for name, topic in self._topics.items()
         ]  # fmt: skip
         return {
-            'version': METADATA_VERSION, 'storage_identifier': 'mcap', **times,
+            'version': 9, 'storage_identifier': 'mcap', **times,
             'topics_with_message_count': topics, 'compression_format': '', 'compression_mode': '',
             'relative_file_paths': [self.path.name],
             'files': [{'path': self.path.name, **times}],

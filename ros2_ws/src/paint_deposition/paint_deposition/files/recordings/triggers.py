@@ -1,6 +1,7 @@
 """The trigger of a recording: AtomizerState, Bool, or a number in a field of any message."""
 
 import math
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any
@@ -11,7 +12,6 @@ from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.files.recordings.signals import Signal
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import numbered
 from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
@@ -20,6 +20,54 @@ BOOL_TYPE = 'std_msgs/msg/Bool'
 # Fields of AtomizerState that are summarised while the gun sprays.
 SETTINGS = ('flow', 'shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 MOST_FIELDS = 12
+SYNTAX = re.compile(
+    r'(?P<topic>[\w/~]+)(?P<path>(\.\w+|\[\d+\])*)\s*((?P<side>[<>])\s*(?P<level>[-+.\deE]+))?'
+)
+STEP = re.compile(r'\.(\w+)|\[(\d+)\]')
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A signal such as ``/io.states[3]``, ``/io.level > 12`` or ``/io.closed < 1``.
+
+    ``path`` of the field is '' for the field ``data`` of std_msgs. The signal is on above
+    ``level``, or under it if ``below`` is set.
+    """
+
+    topic: str
+    path: str
+    below: bool = False
+    level: float = 0.0
+
+    @staticmethod
+    def parse(text: str) -> 'Signal | None':
+        """Parse a signal, None for other text; raises RecordingError for an invalid level."""
+        match = SYNTAX.fullmatch(text.strip())
+        if match is None:
+            return None
+        try:
+            level = float(match['level'] or 0.0)
+        except ValueError:
+            raise RecordingError(
+                f"{text}: '{match['level']}' is no number; give a level such as 12"
+            ) from None
+        return Signal(match['topic'], match['path'], match['side'] == '<', level)
+
+    def value(self, message: Any) -> float | None:
+        """The number in a message, None where there is none."""
+        value = message
+        # The messages of std_msgs have one field.
+        try:
+            for name, index in STEP.findall(self.path) or [('data', '')]:
+                value = getattr(value, name) if name else value[int(index)]
+        except (AttributeError, IndexError, TypeError):
+            return None
+        known = isinstance(value, bool | int | float | np.bool_ | np.number)
+        return float(value) if known else None
+
+    def is_on(self, values: Any) -> Any:
+        """Whether the signal is on at a value, or at each of an array."""
+        return values < self.level if self.below else values > self.level
 
 
 @dataclass(frozen=True)
@@ -30,8 +78,6 @@ class RecordedTrigger:
     flow: np.ndarray  # (M,) relative flow from then on
     brush: np.ndarray  # (M,) int64 brush from then on; empty if it is not recorded
     log_times_ns: np.ndarray  # (M,) int64 when they came, in this order
-    # (M, 4) as in a trajectory; empty if none are recorded.
-    set_points: np.ndarray = field(default_factory=lambda: np.empty((0, 4)))
     # Median of each setting while the gun sprays.
     settings: dict[str, float] = field(default_factory=dict)
     by_log_time: bool = False
@@ -108,14 +154,12 @@ def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
                 settings.setdefault(name, []).append(value)
     if refused:
         bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
-    set_points = np.array([change.set_points or (0.0,) * 4 for change in changes])
     notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
     return RecordedTrigger(
         np.array([change.stamp_ns for change in changes], dtype=np.int64),
         np.array([change.flow for change in changes], dtype=float),
         numbered([change.brush for change in changes]),
         np.array(logged, dtype=np.int64),
-        set_points if set_points.any() else np.empty((0, 4)),
         {name: float(np.median(values)) for name, values in settings.items()},
         topic.type == BOOL_TYPE,
         notes if without_flow else (),

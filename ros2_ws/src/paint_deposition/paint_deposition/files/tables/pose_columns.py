@@ -11,7 +11,6 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.headings import BESIDE, TIMES, Heading
-from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.sheets import text_of
 from paint_deposition.files.tables.table import Table, find_table, headings_in, rows_below
 
@@ -30,6 +29,12 @@ ROTATED = {
     **dict.fromkeys(('orientation', 'quaternion', 'quat', 'q'), 'q'),
     **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
     **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
+}
+EGM_LOG = {
+    'TIMESTAMP': 'time [ms]',
+    **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
+    **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
+    **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
 }
 
 
@@ -163,3 +168,21 @@ def _known(headings: list[Heading], robot: 'Robot | None') -> int:
         return len(robot.recorded_joints(_by_text(headings), '', numbered=True))
     except RecordingError:
         return 0
+
+
+def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
+    """The headings with the usual words and units for a log that is known, and a note; else ''.
+
+    What else such a log holds of the motion has no words left.
+    """
+    if not {'R_FB_POS_X', 'R_FB_POS_RJ1'} & {heading.text for heading in headings}:
+        return list(headings), ''
+    usual = []
+    for heading in headings:
+        if meaning := EGM_LOG.get(heading.text):
+            words = Heading.of(meaning)
+            heading = Heading(heading.text, words.words, words.unit)
+        elif heading.text.startswith(('R_FB_', 'R_PL_', 'S_REF_')):
+            heading = Heading(heading.text, ())
+        usual.append(heading)
+    return usual, 'a log of abb_libegm: what the robot measured (R_FB)'

@@ -15,8 +15,8 @@ from paint_deposition.files.tables.pose_columns import (
     ROTATION_VECTOR,
     PoseTable,
     column_name,
+    translated,
 )
-from paint_deposition.files.tables.robot_logs import translated
 from paint_deposition.files.tables.rotations import read_rotations
 from paint_deposition.files.tables.table import SWITCHED, find_table
 from paint_deposition.model.brush import MOST
@@ -35,7 +35,6 @@ TRIGGER = ('spraying', 'trigger', 'gun', 'gunon', 'on', 'spray', 'sprayon', 'pai
 FLOW = ('flow', 'relativeflow')
 BRUSH = ('brush', 'brushnumber', 'brushno')
 SPEED = ('speed', 'velocity', 'v', 'tcpspeed')
-FRAME = ('frame', 'frameid')
 
 
 @dataclass(frozen=True)
@@ -224,7 +223,7 @@ def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
 
 def _frame_id(table: PoseTable) -> str:
     """The frame that a column names, '' if there is none; several are refused."""
-    column = table.find(*FRAME)
+    column = table.find('frame', 'frameid')
     names = set() if column is None else {*table.texts(column)}
     if len(names) > 1:
         raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')

@@ -10,16 +10,18 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables import reading_columns as known_columns
 from paint_deposition.files.tables import table as cells_of
 from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
-from paint_deposition.files.tables.misleading import (
+from paint_deposition.files.tables.reading_columns import (
+    AXES,
+    NORMALS,
+    ON_FACE,
+    Layout,
     headings_again,
     refuse_cut_numbers,
     refuse_merged,
     refuse_rivals,
 )
-from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
-from paint_deposition.files.tables.reading_rows import orders_of, rows_of_readings
+from paint_deposition.files.tables.reading_rows import figures_at_end, orders_of, rows_of_readings
 from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.summary_figures import figures_at_end
 from paint_deposition.files.tables.table import Table
 
 # Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.

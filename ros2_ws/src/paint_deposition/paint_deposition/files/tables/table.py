@@ -14,7 +14,6 @@ from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_
 
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
-MOST_HEADINGS_SHOWN = 20
 MOST_COMPLAINTS_SHOWN = 8
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 # With one mark only, three digits behind it may be thousands.
@@ -269,7 +268,7 @@ def rows_below(
 def shown(headings: Sequence[Heading]) -> str:
     """The headings of a table in brackets, for a message."""
     named = [repr(heading.text) for heading in headings if heading.text]
-    return f'(columns: {some(named, MOST_HEADINGS_SHOWN) or "none"})'
+    return f'(columns: {some(named, 20) or "none"})'
 
 
 def is_comment(row: list[Cell]) -> bool:

@@ -11,7 +11,7 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.film.paint_used import efficiency
 from paint_deposition.inference.fitting.estimates import Estimate
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.model.brush import Brush, BrushLaw, SetPoints, listed
+from paint_deposition.model.brush import Brush, SetPoints, listed
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # What recordings hold of the process beside the flow, which is relative to the brush's.
@@ -60,7 +60,7 @@ def _set_points(campaign: Campaign, number: int) -> SetPoints:
 
 
 def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dict[str, Any] | None:
-    """Set-points and transfer efficiency of each brush, and the law between them.
+    """Set-points and transfer efficiency of each brush.
 
     None without brushes. The efficiency is that on a part which catches everything.
     """
@@ -78,8 +78,4 @@ def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dic
             'transfer_efficiency': share if known else None,
             'transfer_efficiency_sigma': share * relative[name] if known else None,
         }
-    exponents = {
-        of: {name: {'value': value, 'sigma': sigma} for name, (value, sigma) in each.items()}
-        for of, each in (BrushLaw(model.brushes).exponents() if several else {}).items()
-    }
-    return {'by_number': by_number, 'exponents': exponents}
+    return {'by_number': by_number}

@@ -180,7 +180,7 @@ class _Part:
             )  # fmt: skip
         integrator.use(model)
         moving = tuple(e for e in model.effects if e.acts('on_path'))
-        return integrator, self._steps(slope, model.projection, moving, max(model.shadows) > 0.0)
+        return integrator, self._steps(slope, model.projection, moving, model.shadow > 0.0)
 
     def _prepared(self, slope: bool, *_: object) -> list[Steps]:
         """The path of each wet film as the integrator's effects have it."""

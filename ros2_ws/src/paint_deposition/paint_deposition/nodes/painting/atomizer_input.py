@@ -52,7 +52,7 @@ class AtomizerInput:
         on_poses, on_state: callbacks; the latter raises PaintError to refuse a state.
 
     Attributes:
-        poses_received, states_received: since the node started.
+        poses_received: since the node started.
         newest_ns: stamp of the last pose that was passed on or dropped, 0 before the first.
         sent_ns: when the last pose received was sent, 0 before the first.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
@@ -80,7 +80,7 @@ class AtomizerInput:
         self.name = name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
-        self.poses_received = self.states_received = self.newest_ns = self.sent_ns = 0
+        self.poses_received = self.newest_ns = self.sent_ns = 0
         self.refused_s = self.pose_s = -math.inf
         self.spraying = False
         self.speed = SpeedNow()
@@ -286,7 +286,6 @@ class AtomizerInput:
     # --- states
 
     def _take_state(self, message: AtomizerState, sent_ns: int) -> None:
-        self.states_received += 1
         state_ns = stamp_ns(message.header)
         # Before its poses after a pause, too: the next pose tells.
         if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:

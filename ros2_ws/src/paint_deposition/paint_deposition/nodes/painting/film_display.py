@@ -7,6 +7,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from geometry_msgs.msg import Point, Vector3
 from paint_msgs.msg import ThicknessField, ThicknessStats
 from rclpy.duration import Duration
 from rclpy.event_handler import PublisherEventCallbacks
@@ -14,17 +15,17 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import PointCloud2, PointField
-from std_msgs.msg import Header
+from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.colour_scales import TABLE, ColourScale, film_scale
 from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.nodes.painting.film_files import shares, statistics_of, volume_by_gun
-from paint_deposition.nodes.painting.legend import legend
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
 from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 # The share of a core that building and publishing a large message may take.
@@ -36,6 +37,8 @@ STATS_FIELDS = (
     'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
+BAR_STEPS = 64
+BAR_LABELS = 5
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -212,3 +215,36 @@ class FilmDisplay:
         message.poses_received, message.poses_rejected, message.pose_gaps = now[:3]
         message.longest_gap_s = longest_s
         self._figures.publish(message)
+
+
+def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
+    """A bar in the scale's colours with values beside it, upright at the side of the part."""
+    across = across_axis(surface.outward, surface.down)
+    up = -downhill_axis(surface.outward, surface.down)
+    heights, widths = surface.vertices_m @ up, surface.vertices_m @ across
+    size = float(np.ptp(heights)) or float(np.ptp(widths))
+    corner = (
+        surface.vertices_m.mean(axis=0)
+        + (widths.max() + 0.08 * size - widths.mean()) * across
+        + (heights.min() - heights.mean()) * up
+    )
+    bar = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id)
+    for step in range(BAR_STEPS):
+        r, g, b, a = (scale.palette[step * TABLE // BAR_STEPS] / 255.0).tolist()
+        for right, over in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
+            place = corner + 0.04 * size * right * across + size * (step + over) / BAR_STEPS * up
+            bar.points.append(_point(place))
+            bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
+    markers = [bar]
+    for number, share in enumerate(np.linspace(0.0, 1.0, BAR_LABELS), start=1):
+        label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
+        label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
+        label.scale = Vector3(z=0.04 * size)
+        label.pose.position = _point(corner + share * size * up + 0.1 * size * across)
+        markers.append(label)
+    return MarkerArray(markers=markers)
+
+
+def _point(place_m: np.ndarray) -> Point:
+    x, y, z = place_m.tolist()
+    return Point(x=x, y=y, z=z)

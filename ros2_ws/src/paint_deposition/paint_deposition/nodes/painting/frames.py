@@ -23,7 +23,6 @@ CLOCK_REMEDY = 'publish tf without gaps and by the clock of the poses'
 # missing after so long is not waited for any longer.
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
 MAX_WAITING = 5000
-TF_QUEUE_DEPTH = 5000
 
 
 class PartFrame:
@@ -44,7 +43,7 @@ class PartFrame:
             from tf2_msgs.msg import TFMessage
 
             # Deep queues that are emptied before poses are judged: a busy node has its transforms.
-            subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=TF_QUEUE_DEPTH)
+            subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=5000)
             self._topics = [
                 subscribe('/tf_static', self._take_static, latched=True),
                 subscribe('/tf', self._take),

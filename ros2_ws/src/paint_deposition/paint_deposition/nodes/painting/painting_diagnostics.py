@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.model.brush import BETWEEN
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.topics import gun_topic
@@ -130,8 +129,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
 def _gun_text(film: LiveFilm) -> str:
     if film.flow is None:
         return NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
-    number = str(film.brush) if film.brush < BETWEEN else 'between those calibrated'
-    of_brush = f', brush {number}' if film.brush else ''
+    of_brush = f', brush {film.brush}' if film.brush else ''
     return f'spraying, flow {film.flow:g}{of_brush}' if film.flow else 'off'
 
 

@@ -31,7 +31,6 @@ from paint_deposition.nodes.runtime.model_parameters import models_from_paramete
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-UPDATE_PERIOD_S = 0.1
 # Batches over which the real-time factor is averaged.
 AVERAGED_BATCHES = 100
 MODEL_PARAMETERS = {'model_file', 'model_files'}
@@ -71,7 +70,7 @@ class PaintingNode(ManagedNode, ABC):
             self.hold()
         self._shown = None
         self.create_trigger_service('~/reset', self.reset)
-        self.create_steady_timer(UPDATE_PERIOD_S, self._update)
+        self.create_steady_timer(0.1, self._update)
         self._show_timer = self._new_show_timer()
 
     def _activate(self) -> None:

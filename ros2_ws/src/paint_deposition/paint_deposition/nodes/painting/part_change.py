@@ -200,7 +200,10 @@ class PartChange:
             self._publish(since_ns, request.part_pose)
             # After the part, so that a recorder knows whose pose it is.
             if len(request.part_pose):
-                unplaced = self._set_pose(list(request.part_pose))
+                kind, pose = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
+                told = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
+                if not told.successful:
+                    unplaced = f'it stands where the part before did: {told.reason}'
         finally:
             self.waiting = False
             node.release()
@@ -319,12 +322,6 @@ class PartChange:
         """Stamp of the newest pose of the part in the cell; without any the time now."""
         newest_ns = max(source.newest_ns for source in self._node.inputs)
         return newest_ns or self._node.get_clock().now().nanoseconds
-
-    def _set_pose(self, part_pose: list[float]) -> str:
-        """Place the part; why it stands as before, if it does."""
-        change = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, part_pose)
-        result = self._node.set_parameters_atomically([change])
-        return '' if result.successful else f'it stands where the part before did: {result.reason}'
 
     def _sentence(self) -> str:
         part = self.part

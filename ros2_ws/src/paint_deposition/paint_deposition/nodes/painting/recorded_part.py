@@ -15,8 +15,6 @@ from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.motion.trajectory import Trajectory
 
-PART_TYPE = 'paint_msgs/msg/Part'
-
 
 @dataclass(frozen=True)
 class RecordedPart:
@@ -36,7 +34,8 @@ def read_recorded_part(run: Path, guns: Sequence[str], frame_id: str) -> Recorde
         copy = recover(run, Path(folder) / 'run').folder
         with open_bag(copy) as bag:
             named = {topic.name for topic in bag.topics if topic.message_count}
-            parts = [topic.name for topic in bag.topics_of(PART_TYPE) if topic.message_count]
+            told_on = bag.topics_of('paint_msgs/msg/Part')
+            parts = [topic.name for topic in told_on if topic.message_count]
             told = [deserialize_message(m.cdr, Part) for m in bag.messages(parts)] if parts else []
         source = {'frame_id': frame_id}
         if list(guns) == ['']:

@@ -1,7 +1,14 @@
-"""The parameters of the recorder, and the topics that it records by default."""
+"""What the recorder keeps, under which name: its parameters, usual topics, and a part's run."""
 
+import itertools
+import os
+import time
 from collections.abc import Sequence
+from pathlib import Path
 
+from paint_msgs.msg import Part
+
+from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
@@ -10,6 +17,7 @@ from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizers_parameter,
     fixed_while_configured,
+    require_file_name,
 )
 from paint_deposition.nodes.runtime.topics import gun_topic
 
@@ -69,3 +77,21 @@ def default_topics(guns: Sequence[str]) -> list[str]:
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
     return [*motion, *shares, *CELL_TOPICS]
+
+
+def part_data(part: Part, model_file: str) -> dict[str, str]:
+    """The custom data of a part's run."""
+    data = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
+    if part.part_pose:
+        data['part_pose'] = ' '.join(map(str, part.part_pose))
+    # The mesh file of a simulator on another machine may not exist here.
+    mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
+    return provenance(mesh_file, model_file) | data
+
+
+def unused_name(folder: Path, run: str) -> str:
+    """The name of a run, with date and time appended if it already exists."""
+    require_file_name('run', run)
+    dated = run + time.strftime('_%Y%m%d_%H%M%S')
+    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
+    return next(name for name in names if not (folder / name).exists())

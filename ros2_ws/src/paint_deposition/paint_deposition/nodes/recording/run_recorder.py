@@ -18,7 +18,6 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.recording.initial_messages import TF, InitialMessages
-from paint_deposition.nodes.recording.part_runs import part_data, unused_name
 from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
 from paint_deposition.nodes.recording.recorder_parameters import (
     PARAMETER_EVENTS,
@@ -27,6 +26,8 @@ from paint_deposition.nodes.recording.recorder_parameters import (
     RECORDER,
     STATES,
     default_topics,
+    part_data,
+    unused_name,
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.messages import header
@@ -40,7 +41,6 @@ from paint_deposition.nodes.runtime.topics import (
 )
 
 DISCOVERY_PERIOD_S = 0.1
-FLUSH_PERIOD_S = 0.1
 PROGRESS_PERIOD_S = 0.2
 POSES_PER_REPORT = 50
 POSE_QUEUE_DEPTH = 5000
@@ -107,7 +107,7 @@ class RunRecorder(ManagedNode):
         # Poses of these topics have not come since it left.
         self._behind: set[str] = set()
         self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
-        self.create_steady_timer(FLUSH_PERIOD_S, lambda: self._guarded(self.run.close_old_chunk))
+        self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 

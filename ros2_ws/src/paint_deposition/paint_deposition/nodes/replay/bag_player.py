@@ -31,9 +31,6 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
-CLOCK_PERIOD_S = 0.01
-STOP_POLL_S = 0.05
-
 PLAYER = fixed_while_running(
     'the replay has begun with it; start another player',
     bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
@@ -102,7 +99,7 @@ class BagPlayer(PaintNode):
         self._time = ReplayClock(self.values['rate'], running=not self.values['start_paused'])
         if self.values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
-            self.create_steady_timer(CLOCK_PERIOD_S, self._publish_clock)
+            self.create_steady_timer(0.01, self._publish_clock)
         self.create_trigger_service('~/pause', self._pause)
         self.create_trigger_service('~/resume', self._resume)
         self._stopped = threading.Event()
@@ -223,7 +220,7 @@ class BagPlayer(PaintNode):
     def _wait_until_due(self, log_time_ns: int) -> None:
         """Wait for the end of a pause, the time of a message, and the flow control."""
         while not self._stopped.is_set():
-            if self._time.wait_for(log_time_ns, timeout_s=STOP_POLL_S):
+            if self._time.wait_for(log_time_ns, timeout_s=0.05):
                 break
         if self.values['rate'] == 0.0:
             self._flow_control.wait_for_room()

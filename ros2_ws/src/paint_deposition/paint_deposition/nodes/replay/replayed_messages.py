@@ -31,7 +31,6 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
-TF_DEPTH = 100
 STATE_FIELDS = AtomizerState.get_fields_and_field_types()
 DOUBLES = [name for name, kind in STATE_FIELDS.items() if kind == 'double']
 
@@ -140,7 +139,7 @@ class ReplayedTransforms:
         self._message = TFMessage
         for static in (False, True):
             durability = DurabilityPolicy.TRANSIENT_LOCAL if static else DurabilityPolicy.VOLATILE
-            profile = QoSProfile(depth=TF_DEPTH, durability=durability)
+            profile = QoSProfile(depth=100, durability=durability)
             topic = f'/{STATIC}' if static else '/tf'
             self._publishers[static] = node.create_publisher(TFMessage, topic, profile)
 

@@ -20,7 +20,6 @@ SILENT_S = 2.0
 POLL_S = 0.2
 # Another sender is reported for so long [ns].
 OTHER_NS = 10_000_000_000
-LARGEST_PACKET = 65_536
 
 SOURCE = fixed_while_running(
     'the stream is read with it; restart the node',
@@ -114,7 +113,7 @@ class EgmSource(PaintNode):
     def _listen(self) -> None:
         while not self._stopped.is_set():
             try:
-                packet, (sender, _) = self._socket.recvfrom(LARGEST_PACKET)
+                packet, (sender, _) = self._socket.recvfrom(65_536)
             except TimeoutError:
                 continue
             arrived_ns = time.time_ns()

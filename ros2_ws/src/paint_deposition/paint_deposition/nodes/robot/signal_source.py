@@ -27,7 +27,6 @@ FIELDS = {
     'flow': ('flow_cm3_per_min', 'cm3/min'), 'bell_speed': ('bell_speed_rpm', '1/min'),
     'shaping_air': ('shaping_air_l_per_min', 'l/min'), 'voltage': ('voltage_kv', 'kV'),
 }  # fmt: skip
-RETRY_S = 1.0
 # The gun stands and goes [m/s]; the opening of the gun belongs to a start that is so near [s].
 STANDS_M_PER_S, GOES_M_PER_S = 0.005, 0.02
 NEAR_S = 2.0
@@ -152,7 +151,7 @@ class SignalSource(PaintNode):
             except Exception as error:  # whatever a network and its libraries bring
                 text = ' '.join(str(error).split()) or type(error).__name__
                 self._problem = f'{self.values["url"]}: {text}'
-            self._stopped.wait(RETRY_S)
+            self._stopped.wait(1.0)
 
     def connected(self) -> None:
         """All signals are subscribed to."""

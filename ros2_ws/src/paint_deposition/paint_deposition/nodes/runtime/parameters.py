@@ -22,7 +22,6 @@ INT64_MAX = 2**63 - 1
 # Declared by rclpy itself, or read by it when publishers and subscriptions are created.
 RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
-RESERVED_PREFIX = 'qos_overrides.'
 LONGEST_SHOWN = 40  # letters of a name that is refused
 RUNS = 'runs'  # `fixed_while`: in every state
 # Room is left for what is appended: a date, the number of a coat, the ending of a file.
@@ -217,7 +216,7 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     # rclpy has no public access to overrides that are not declared, such as misspelt names.
     overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
     for name in overrides:
-        if name not in {*table, *RESERVED_NAMES} and not name.startswith(RESERVED_PREFIX):
+        if name not in {*table, *RESERVED_NAMES} and not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
     node.add_pre_set_parameters_callback(

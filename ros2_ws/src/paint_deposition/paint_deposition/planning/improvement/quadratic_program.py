@@ -140,7 +140,8 @@ def _step(problem: Problem, now: Density) -> Density:
         name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in LIMIT_NAMES
     ]
     flow = values[count:]
-    if not problem.request.flow_is_free:
+    least, most = problem.request.flow
+    if least >= most:
         flow = np.array([opening.flow for opening in problem.nodes.openings])
         binding = [name for name in binding if name != 'flow']
     return Density(np.maximum(values[:count], 0.0), flow, tuple(binding))

@@ -48,7 +48,8 @@ def effect_meanings(rows: list[dict]) -> str:
 
 
 def with_confounded(row: dict) -> str:
-    return words.with_others([row['name'], *row['others']])
+    others = f' (or {words.joined(row["others"], "or")})' if row['others'] else ''
+    return f'{row["name"]}{others}'
 
 
 def accepted_words(rows: list[dict]) -> str:

@@ -51,7 +51,9 @@ def report_html(data: ReportData) -> str:
         'capital': words.capital,
         'film': lambda value: '' if np.isnan(value) else words.fixed(value, 1),
         'step': words.step_words,
-        'shares': tables.shares_in_words,
+        'shares': lambda of: ', '.join(
+            f'{100 * share:.0f} % {band}' for band, share in of.items()
+        ),
     }
     drawn = [
         charts.parity_figure(data),
@@ -65,6 +67,7 @@ def report_html(data: ReportData) -> str:
     figures = [figure for figure in drawn if figure]
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
     films = tables.film_rows(data)
+    zone_films = {row['name']: row['film'].zones for row in films}
     (places, sprays), git = data.proposals, git_version()
     return from_template(
         'report.html.j2', filters,
@@ -73,7 +76,7 @@ def report_html(data: ReportData) -> str:
         key_figures=key_figures(data),
         head=list(data.study.campaign.head.items()),
         film=films,
-        zones=tables.zone_rows(data, films),
+        zones=[(z, zone_films[z.experiment][z.name]) for z in data.comparisons[-1].zones],
         cpk=CPK_MEANS,
         points=tables.point_rows(data),
         counts=words.count_words(data.study),

@@ -8,8 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
-from paint_deposition.inference.comparison.zone_readings import ZoneReadings
+from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
@@ -157,6 +156,8 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     rows = []
     for k, experiment in enumerate(data.experiments):
         measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
+        of_points = range(*data.rows_of(k).indices(len(data.study)))
+        bands = [band for row in of_points if (band := band_of(data, row))]
         target_um, tolerance_um = data.study.campaign.target_of(experiment)
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
@@ -165,24 +166,10 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
         areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}
         rows.append({
             'name': experiment.name, 'measured': measured, 'areas': areas, 'film': film,
-            'bands': band_shares(data, k),
+            # Shares of the points that are low, in and high; empty without a target.
+            'bands': {b: bands.count(b) / len(bands) for b in (LOW, IN, HIGH) if bands},
         })  # fmt: skip
     return rows
-
-
-def zone_rows(
-    data: ReportData, films: list[dict[str, Any]]
-) -> list[tuple[ZoneReadings, FilmStatistics]]:
-    """For each zone of each part its readings, and its film as the best model predicts it."""
-    of_part = {row['name']: row['film'].zones for row in films}
-    return [(z, of_part[z.experiment][z.name]) for z in data.comparisons[-1].zones]
-
-
-def band_shares(data: ReportData, index: int) -> dict[str, float]:
-    """Shares of an experiment's points that are low, in and high; empty without a target."""
-    rows = range(*data.rows_of(index).indices(len(data.study)))
-    bands = [band for row in rows if (band := band_of(data, row))]
-    return {name: bands.count(name) / len(bands) for name in (LOW, IN, HIGH) if bands}
 
 
 def band_of(data: ReportData, row: int) -> str:
@@ -190,11 +177,6 @@ def band_of(data: ReportData, row: int) -> str:
     target, tolerance = (wanted[row] for wanted in data.wanted_um)
     off = data.study.measured_um[row] - target
     return '' if np.isnan(off) else IN if abs(off) <= tolerance else LOW if off < 0.0 else HIGH
-
-
-def shares_in_words(shares: dict[str, float]) -> str:
-    """'20 % low, 75 % in, 5 % high'."""
-    return ', '.join(f'{100 * share:.0f} % {name}' for name, share in shares.items())
 
 
 def point_rows(data: ReportData) -> list[dict[str, Any]]:

@@ -21,7 +21,7 @@ from paint_deposition.report.pictures.chart import (
 )
 from paint_deposition.report.pictures.film import page_film
 from paint_deposition.report.pictures.part import HALO, PartPicture
-from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95, charts_a_row
+from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # As many letters of a title fit over a chart; one that is longer is written smaller.
@@ -83,8 +83,12 @@ def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> Non
 
 def comparison_figure(data: ReportData) -> Figure:
     """The film along each column or row, and the residual below it."""
-    columns = charts_a_row(len(data.profiles))
-    rows = -(-len(data.profiles) // columns)
+    # Two to four in a row, so that few places stay empty.
+    count = len(data.profiles)
+    columns = min((3, 4), key=lambda columns: -count % columns)
+    if count < 5:
+        columns = count if count < 4 else 2
+    rows = -(-count // columns)
     heights_in = (LEGEND_IN, rows * PROFILE_IN[1])
     figure = _free_figure(columns * PROFILE_IN[0], sum(heights_in))
     above, below = figure.subfigures(2, 1, height_ratios=heights_in)

@@ -15,14 +15,11 @@ from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.chart import new_figure, save_picture
-from paint_deposition.report.pictures.part import draw_triangles, dress
-from paint_deposition.report.pictures.view import View
+from paint_deposition.report.pictures.part import View, draw_triangles, dress
 from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
 
 PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
-WARNING_COLOUR = '#c0392b'
-SIZE_IN = (11.5, 8.0)
 TEXT_COLUMNS = 48
 # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
 AXIS_SHARE, AXES_APART = 0.09, 0.04
@@ -38,7 +35,7 @@ def write_geometry_picture(
     views = (front, front.from_the_right(), front.from_above())
     corners = np.concatenate([surface.vertices_m, spray.position_m])
     sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
-    figure = new_figure(*SIZE_IN)
+    figure = new_figure(11.5, 8.0)
     grid = figure.add_gridspec(
         2, 2, width_ratios=_ratios(sizes[0][0], sizes[1][0]),
         height_ratios=_ratios(sizes[0][1], sizes[2][1]),
@@ -53,7 +50,7 @@ def write_geometry_picture(
     key.set_axis_off()
     key.legend(handles=_key(), loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
     text = '\n'.join(fill(f'warning: {line}', TEXT_COLUMNS) for line in geometry.warnings)
-    key.text(0.0, 0.0, text, fontsize=9, color=WARNING_COLOUR, transform=key.transAxes)
+    key.text(0.0, 0.0, text, fontsize=9, color='#c0392b', transform=key.transAxes)
     figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
 

@@ -1,4 +1,4 @@
-"""A part as a flat picture from the gun's side, with the gun's way over it."""
+"""A part as a flat picture from the sides of the gun, with the gun's way over it."""
 
 from dataclasses import dataclass
 
@@ -14,10 +14,10 @@ from matplotlib.tri import Triangulation
 
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
+from paint_deposition.part.orientation import downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
-from paint_deposition.report.pictures.view import SNAP_COSINE, View
 from paint_deposition.report.style import INK, MUTED
 
 # Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
@@ -28,8 +28,59 @@ PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
 # On a page a part is drawn no higher than this, with this room above and below [in].
 HIGHEST_IN, AROUND_IN = 4.2, 1.3
-WAY_OFF = '#3a4048'
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
+# A view this close to an axis of the mesh is along it and has the mesh's coordinates.
+SNAP_COSINE = 0.9
+
+
+@dataclass(frozen=True)
+class View:
+    """Directions of a picture in the mesh frame, unit vectors: right, up, and to the viewer."""
+
+    right: np.ndarray
+    up: np.ndarray
+    toward: np.ndarray
+    labels: tuple[str, str]  # names of the axes to the right and up
+
+    @staticmethod
+    def of_front(outward: np.ndarray, down: np.ndarray) -> 'View':
+        """Along the mean normal, gravity downward; along the mesh's axes where it nearly is."""
+        toward, down = _snapped(outward), _snapped(down)
+        up = -down + (down @ toward) * toward
+        if np.linalg.norm(up) < 0.1:  # a part seen from straight above, a hood: its front below
+            up = -_snapped(downhill_axis(outward, down))
+            up = up - (up @ toward) * toward
+        up /= np.linalg.norm(up)
+        right = np.cross(up, toward)
+        return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
+
+    def from_the_right(self) -> 'View':
+        """The same part seen from the right of this picture."""
+        return View(
+            -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
+        )
+
+    def from_above(self) -> 'View':
+        """The same part seen from the top of this picture, its front below."""
+        return View(
+            self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
+        )
+
+    def flat(self, points_m: np.ndarray) -> np.ndarray:
+        """(..., 2) where points (..., 3) lie in the picture [m]."""
+        return np.stack([points_m @ self.right, points_m @ self.up], axis=-1)
+
+
+def _snapped(direction: np.ndarray) -> np.ndarray:
+    largest = np.abs(direction).argmax()
+    if abs(direction[largest]) < SNAP_COSINE:
+        return direction
+    return np.sign(direction[largest]) * np.eye(3)[largest]
+
+
+def _name(direction: np.ndarray, otherwise: str) -> str:
+    along = np.isclose(np.abs(direction), 1.0, atol=1e-9)
+    return f'{"xyz"[along.argmax()] if along.any() else otherwise} [m]'
 
 
 @dataclass(frozen=True)
@@ -196,7 +247,7 @@ def draw_tool_path(
     for rows in np.split(np.arange(len(spray)), breaks):
         line = view.flat(spray.position_m[rows])
         if not on[rows].any():
-            axes.plot(*line.T, color=WAY_OFF, linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
+            axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
             continue
         number += 1
         axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)

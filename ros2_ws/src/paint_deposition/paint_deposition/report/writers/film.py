@@ -114,16 +114,12 @@ def _write_table(path: Path, columns: Mapping[str, np.ndarray], names: np.ndarra
     rows = np.column_stack([*columns.values()])
     heading, form = [*columns], ','.join(['%.9g'] * len(columns))
     if names is not None:
-        rows = np.column_stack([rows.astype(object), _in_table(names)])
+        each, of = np.unique(names, return_inverse=True)
+        fields = [name and table_text([[name]]).removesuffix('\n') for name in each]
+        rows = np.column_stack([rows.astype(object), np.array(fields)[of]])
         heading, form = [*heading, 'zone'], f'{form},%s'
     with replacing(path) as temporary, temporary.open('w', encoding='utf-8') as file:
         file.write(table_text([heading]))
         for start in range(0, len(rows), ROWS_AT_ONCE):
             some = rows[start : start + ROWS_AT_ONCE]
             file.write(f'{form}\n' * len(some) % tuple(some.ravel().tolist()))
-
-
-def _in_table(names: np.ndarray) -> np.ndarray:
-    """Names (V,) as fields of a CSV table."""
-    each, of = np.unique(names, return_inverse=True)
-    return np.array([name and table_text([[name]]).removesuffix('\n') for name in each])[of]

@@ -26,8 +26,11 @@ from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
-from paint_deposition.report.pictures.places import write_places
-from paint_deposition.report.pictures.planning import write_improvement_picture, write_uniformity
+from paint_deposition.report.pictures.planning import (
+    write_improvement_picture,
+    write_places,
+    write_uniformity,
+)
 from paint_deposition.report.writers.film import write_film
 from paint_deposition.report.writers.passes import Passes, write_passes
 from paint_deposition.report.writers.write import input_files, with_provenance, written
