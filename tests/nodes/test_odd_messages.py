@@ -19,7 +19,8 @@ from paint_deposition.nodes.painting.deposition_simulator import DepositionSimul
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
+from paint_deposition.nodes.robot.rws_source import SOURCE
+from paint_deposition.nodes.robot.signal_source import SignalSource
 from paint_deposition.nodes.viewing.web_view import WebView
 from robot_arm import urdf
 
@@ -30,7 +31,7 @@ MOTION = two_passes()
 class IdleSource(SignalSource):
     """A source of signals whose controller says nothing."""
 
-    PARAMETERS = SIGNALS
+    PARAMETERS = SOURCE
 
     def follow(self, stopped) -> None:
         while not stopped():

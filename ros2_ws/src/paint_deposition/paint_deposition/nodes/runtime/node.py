@@ -147,8 +147,9 @@ class PaintNode(Node):
 
         Otherwise whoever can reach the node could read the files of this machine.
         """
-        path = Path(file).expanduser().resolve()
-        if path.exists() and not any(map(path.is_relative_to, self._input_folders)):
+        # None of these functions minds a name that is too long, a loop of links, an unknown user.
+        path = Path(os.path.realpath(os.path.expanduser(file)))
+        if os.path.exists(path) and not any(map(path.is_relative_to, self._input_folders)):
             raise PaintError(
                 f'{quoted(file)} is in no folder that {self.get_name()} was given at its start; '
                 'restart it with that folder in input_folders'
