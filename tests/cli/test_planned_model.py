@@ -5,12 +5,12 @@ import shutil
 
 import numpy as np
 import pytest
+from rosbags.highlevel import AnyReader
 
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.planned_model import planned_model
 from paint_deposition.files.provenance import model_digest, origin
 from paint_deposition.motion.programmed import PROGRAMMED
@@ -95,9 +95,13 @@ def test_a_plan_in_the_robots_frame_lays_the_same_film(plan, placed):
     assert any(brought in note for note in told.notes)
     table = np.genfromtxt(placed / 'passes.csv', delimiter=',', names=True)
     first = np.array([table[0][name] for name in ('x_m', 'y_m', 'z_m')])
-    bag = read_recording(placed / 'trajectory')
-    assert bag.frame_id == 'base_link'
-    assert np.allclose(first, bag.positions_m[0], atol=1e-5)
+    with AnyReader([placed / 'trajectory']) as bag:
+        poses = [c for c in bag.connections if c.topic == '/atomizer/pose']
+        connection, _, data = next(bag.messages(poses))
+        pose = bag.deserialize(data, connection.msgtype)
+    assert pose.header.frame_id == 'base_link'
+    place = pose.pose.position
+    assert np.allclose(first, [place.x, place.y, place.z], atol=1e-5)
     module, same = (
         pd.read_recording(folder / 'passes.mod', part_pose=pose)
         for folder, pose in ((placed, PART_POSE), (plan, None))

@@ -59,7 +59,7 @@ def test_left_is_the_guns(study, side, from_left):
     aside = side * (study.campaign.positions_m @ right)
     rows = np.flatnonzero((study.campaign.experiment_of == 1) & (aside > 0.2))
     found = regions(study, planted(study, rows, -5.0))[0]
-    assert f' at {from_left} to ' in found.description
+    assert f' at {from_left} % of the width' in found.description
     assert found.description.partition(', ')[0].endswith(' % of the width from the left')
     assert 'µm high' in found.description
 

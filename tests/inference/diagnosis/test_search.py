@@ -17,7 +17,9 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.inference.diagnosis.model_space import (
+    COARSENED,
     PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
     SURE,
     log_odds,
 )
@@ -106,12 +108,16 @@ def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
     for name, (members, probability) in groups.items():
         assert members == (name,)
         assert probability > SURE
-        # Against the set without it, as it is or with something unknown beside it.
+        # Against the set without it, as it is or with something unknown beside it. The other
+        # effect is accepted: the evidence counts for less, the prior does not.
         others = search.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
-        weights = [search.with_effect(others, rival).log_weight for rival in rivals]
-        without = others.log_weight, others.log_weight_unknown
-        assert probability == pytest.approx(softmax([*weights, *without])[:-2].sum())
+        effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
+        gains = [search.with_effect(others, rival).log_evidence for rival in rivals]
+        odds = (np.array(gains) - others.log_evidence) / COARSENED + effect
+        gain = others.log_weight_unknown - others.log_weight - unknown
+        shares = softmax([*odds, 0.0, gain / COARSENED + unknown])
+        assert probability == pytest.approx(shares[:-2].sum())
 
 
 def test_effects_that_look_alike_share_one_group():

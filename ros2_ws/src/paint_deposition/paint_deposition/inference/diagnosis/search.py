@@ -29,6 +29,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     COARSENED,
     CREDIBLE,
     PRIOR_EFFECT,
+    PRIOR_UNKNOWN,
     SIZES,
     SURE,
     ModelSpace,
@@ -178,7 +179,7 @@ class EffectSet:
 
 
 # Share of the significance level that the test for causes has.
-OF_CAUSES = 0.8
+OF_CAUSES = 0.95
 # So many effects are added at most.
 MOST_EFFECTS = 4
 # Log evidence that two fits of one set may differ by and be the same.
@@ -359,6 +360,7 @@ class Search:
             + log_odds(PRIOR_EFFECT)
             for rival in rivals
         ]
-        unknown = others.log_weight_unknown - others.log_weight
+        prior = log_odds(PRIOR_UNKNOWN)
+        unknown = (others.log_weight_unknown - others.log_weight - prior) / scale + prior
         probability = inclusion_of(odds, [0.0, unknown])
         return tuple(members), probability
