@@ -2,7 +2,7 @@
 SHELL := /bin/bash
 .SHELLFLAGS := -eo pipefail -c
 .DEFAULT_GOAL := help
-.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure fuzz soak reliability cell numbers lint docs format lock audit sbom wheel clean distclean
+.PHONY: help build demo test test-fast bench bench-diagnosis bench-brushes bench-next bench-nature bench-loop bench-measure fuzz soak reliability cell many numbers lint docs format lock audit sbom wheel clean distclean
 
 PACKAGE := ros2_ws/src/paint_deposition
 IN_ENVIRONMENT := source setup/environment.sh;
@@ -50,6 +50,9 @@ cell: build  ## take 10,000 random steps in a cell: poses, states, parts, kills;
 
 soak: build  ## run a cell for half an hour; ARGS='--minutes 10 --rate 750' for as much in less
 	@$(IN_ENVIRONMENT) PYTHONPATH=tests:$$PYTHONPATH python -m benchmarks.page soak $(ARGS)
+
+many: build  ## diagnose 40 parts of several days, a minute
+	@$(IN_ENVIRONMENT) PAINT_LONG=1 pytest tests/inference/diagnosis/test_many_parts.py $(ARGS)
 
 numbers: build  ## try 10,000 random parts, paths and models; ARGS goes to pytest
 	@$(IN_ENVIRONMENT) PAINT_EXAMPLES=$${PAINT_EXAMPLES:-10000} pytest tests/film/test_random_paints.py --timeout 0 -o faulthandler_timeout=0 $(ARGS)

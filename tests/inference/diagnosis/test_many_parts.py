@@ -1,5 +1,6 @@
 """Forty parts over four days, alike but for an effect that grows from each morning to evening."""
 
+import os
 import time
 from dataclasses import replace
 
@@ -25,6 +26,7 @@ DOOR = {
 
 
 @pytest.mark.slow
+@pytest.mark.skipif('PAINT_LONG' not in os.environ, reason='over a minute: make many')
 def test_an_effect_that_grows_over_each_day_is_named_with_its_mean(tmp_path):
     (door,) = small_campaign(tmp_path, **DOOR).experiments
     painted = generated(**DOOR)
