@@ -29,20 +29,24 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.residuals import root_mean_square
 
 MOST_LAWS = 2
+# Degree of the polynomials in the ranks of a covariate.
+DEGREE = 4
+DRAWS = 1000
+CURVE_POINTS = 15
 
 
 @dataclass(frozen=True)
 class NullModels:
     """What a law of each kind must say more than."""
 
-    # For a footprint: pattern, nuisance, what the accepted laws may be off by, and what nature
-    # leaves over of parts and settings.
+    # For a footprint: pattern, nuisance, what the accepted laws may be off by, and the discrepancy
+    # of parts and settings.
     footprint: NullModel
     # For a correction of an accepted law: the same with the footprint, without what the laws may
     # be off by.
     correction: NullModel
-    # For a map: all of it, with what nature usually leaves over of parts and settings; the most
-    # probable may be what is unknown.
+    # For a map: all of it, with the usual discrepancy of parts and settings; the most probable may
+    # be what is unknown.
     place: NullModel
     nonparametric_laws: NullModel  # for all others: all of it
 
@@ -179,12 +183,6 @@ def _found_without(stages: Sequence[SearchStage], out: np.ndarray) -> EffectSet:
         if following is None or chosen.names != following.here.names:
             break
     return chosen
-
-
-# Degree of the polynomials in the ranks of a covariate.
-DEGREE = 4
-DRAWS = 1000
-CURVE_POINTS = 15
 
 
 def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) -> Unknown:

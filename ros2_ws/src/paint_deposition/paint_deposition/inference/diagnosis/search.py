@@ -47,6 +47,16 @@ TRIALS = 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each; and the share of a law of another form.
 LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
+# Share of the significance level that the test for causes has.
+OF_CAUSES = 0.95
+# So many effects are added at most.
+MOST_EFFECTS = 4
+# Log evidence that two fits of one set may differ by and be the same.
+SAME = 0.5
+# Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
+MIN_LOG_EVIDENCE_GAIN = 12.0
+# Effects that could stand in one place, most probable first, and the probability of one of them.
+Group = tuple[tuple[str, ...], float]
 
 
 @dataclass(frozen=True)
@@ -176,18 +186,6 @@ class EffectSet:
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
         return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
-
-
-# Share of the significance level that the test for causes has.
-OF_CAUSES = 0.95
-# So many effects are added at most.
-MOST_EFFECTS = 4
-# Log evidence that two fits of one set may differ by and be the same.
-SAME = 0.5
-# Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
-MIN_LOG_EVIDENCE_GAIN = 12.0
-# Effects that could stand in one place, most probable first, and the probability of one of them.
-Group = tuple[tuple[str, ...], float]
 
 
 @dataclass(frozen=True)
@@ -348,19 +346,17 @@ class Search:
         """
         others = self.without(trial, name)
         rivals = dict.fromkeys((name, *others.proposed))
-        weights = {rival: self.with_effect(others, rival).log_weight for rival in rivals}
+        tried = {rival: self.with_effect(others, rival) for rival in rivals}
+        weights = {rival: one.log_weight for rival, one in tried.items()}
         found = sorted(weights, key=lambda cause: -weights[cause])
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
         # Beside an accepted effect, whose law is no truer than that, evidence counts for less.
         scale = COARSENED if others.names else 1.0
+        effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
         odds = [
-            (self.with_effect(others, rival).log_evidence - others.log_evidence) / scale
-            + log_odds(PRIOR_EFFECT)
-            for rival in rivals
+            (one.log_evidence - others.log_evidence) / scale + effect for one in tried.values()
         ]
-        prior = log_odds(PRIOR_UNKNOWN)
-        unknown = (others.log_weight_unknown - others.log_weight - prior) / scale + prior
-        probability = inclusion_of(odds, [0.0, unknown])
-        return tuple(members), probability
+        outside = (others.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown
+        return tuple(members), inclusion_of(odds, [0.0, outside])
