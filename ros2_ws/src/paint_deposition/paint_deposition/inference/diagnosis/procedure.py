@@ -39,7 +39,7 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass,
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import is_worse
+from paint_deposition.inference.readings.residuals import beyond_noise_um, is_worse
 
 # Significance level of the test that something is missing.
 ALPHA = 0.05
@@ -109,7 +109,7 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
     first, noise_um = state.history[0], state.study.noise_floor_um
     options = of_footprint(state.study, state.fit)
     state = _learn(state, nothing, LeftOut([SearchStage(nothing, [])], options))
-    beyond_um = float(np.sqrt(max(state.history[-1].rmse_um ** 2 - noise_um**2, 0.0)))
+    beyond_um = beyond_noise_um(state.history[-1].rmse_um, noise_um)
     share = beyond_um / float(np.max(state.fit.predicted_um))
     beyond = (
         f'The model misses the readings by {beyond_um:.2f} µm beyond gauge and texture '

@@ -22,7 +22,11 @@ from paint_deposition.inference.fitting.posterior import PatternShift, posterior
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.readings.residuals import is_worse, root_mean_square
+from paint_deposition.inference.readings.residuals import (
+    beyond_noise_um,
+    is_worse,
+    root_mean_square,
+)
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -102,7 +106,7 @@ class Step:
 
     def beyond_noise_um(self, noise_um: float) -> float:
         """Error on what was left out, beyond gauge and texture [um]."""
-        return float(np.sqrt(max(self.holdout_rmse_um**2 - noise_um**2, 0.0)))
+        return beyond_noise_um(self.holdout_rmse_um, noise_um)
 
     @staticmethod
     def of(study: Study, added: str, fit: Fit, holdout_um: float | None = None) -> Step:

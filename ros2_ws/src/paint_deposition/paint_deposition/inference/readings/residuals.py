@@ -14,6 +14,11 @@ def root_mean_square(values: np.ndarray) -> float:
     return float(np.sqrt(np.mean(values**2))) if len(values) else 0.0
 
 
+def beyond_noise_um(rmse_um: float, noise_um: float) -> float:
+    """What an error is without the noise in it [um], 0 if that explains all of it."""
+    return float(np.sqrt(max(rmse_um**2 - noise_um**2, 0.0)))
+
+
 @dataclass(frozen=True)
 class Residuals:
     """Measured and predicted film; residual = measured minus predicted."""

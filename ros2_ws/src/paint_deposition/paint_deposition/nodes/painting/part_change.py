@@ -29,7 +29,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
 from paint_deposition.nodes.painting.recorded_part import RecordedPart, read_recorded_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, real_path
 from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
@@ -260,7 +260,7 @@ class PartChange:
                 'overwritten; give another serial, or move the folder away'
             )
         # Runs beside that of the part may be read, too.
-        run = Path(request.resume).expanduser().resolve()
+        run = real_path(request.resume)
         if request.resume and run.parent != folder.parent.resolve():
             self._node.require_named_folder(request.resume)
         return following
@@ -270,7 +270,7 @@ class PartChange:
         await self._settled(RECORDED_S)
         names, frame_id = self._node.gun_names, self._node.frame.frame_id
         return await self._node.result_of(
-            self._reading.submit(read_recorded_part, Path(path).expanduser(), names, frame_id)
+            self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
         )
 
     def _resume(self, run: RecordedPart, log: list[list[TriggerChange | PoseBatch]]) -> str:

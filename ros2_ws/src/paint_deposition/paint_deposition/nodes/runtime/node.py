@@ -147,8 +147,7 @@ class PaintNode(Node):
 
         Otherwise whoever can reach the node could read the files of this machine.
         """
-        # None of these functions minds a name that is too long, a loop of links, an unknown user.
-        path = Path(os.path.realpath(os.path.expanduser(file)))
+        path = real_path(file)
         if os.path.exists(path) and not any(map(path.is_relative_to, self._input_folders)):
             raise PaintError(
                 f'{quoted(file)} is in no folder that {self.get_name()} was given at its start; '
@@ -212,6 +211,14 @@ class PaintNode(Node):
         self.values |= {change.name: change.value for change in changes}
         if self.configured:
             self._on_change({change.name for change in changes})
+
+
+def real_path(file: str) -> Path:
+    """Where a file is that a peer named, whatever the name.
+
+    Unlike the methods of a path, these functions mind no unknown user and no loop of links.
+    """
+    return Path(os.path.realpath(os.path.expanduser(file)))
 
 
 @dataclass(frozen=True)
