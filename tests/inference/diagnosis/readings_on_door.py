@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from booth import MODEL, door, painted, panel, path_of, serpentine
-from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
@@ -65,9 +65,4 @@ def plate_with_a_back() -> Experiment:
 def at_model(study: Study, model=MODEL) -> Fit:
     """A fit that has found this model."""
     parameters = FreeParameters.of(model, *model.effects)
-    vector, predicted_um = parameters.encode(model), study.forward.predict_um(model)
-    residual = (study.measured_um - predicted_um) / study.sigma_um
-    jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
-    return Fit(
-        parameters, vector, model, predicted_um, residual, jacobian, True, study.nuisance
-    )  # fmt: skip
+    return study.beside(parameters, parameters.encode(model))

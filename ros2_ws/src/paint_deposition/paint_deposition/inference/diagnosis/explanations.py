@@ -140,8 +140,9 @@ LARGEST = 0.95
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
 # A law of any form, chosen among some dozens, is learned if it raises the log evidence by this
-# much, and a footprint, of which there is one, beside an effect if by this.
-WORTH_LEARNING, WORTH_FOOTPRINT = 6.0, 3.0
+# much. A footprint beside an effect is learned if it predicts what is left out: there is one, and
+# its amplitudes are as small as the readings want them.
+WORTH_LEARNING = 6.0
 # Their lengths of correlation: over a covariate in its standard deviations, over the part [m].
 LENGTHS = {'covariate': (0.35, 1.0), PLACE: (0.1, 0.25)}
 
@@ -268,8 +269,16 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
+    off = _off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False)
+    elsewhere = np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
+    return np.hstack([own_law_errors(study, fit, kept, model), elsewhere])
+
+
+def own_law_errors(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+) -> np.ndarray:
+    """(P, n) directions of those errors of laws that run over their own covariates."""
     off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
-    off += list(_off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False))
     return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
 
 

@@ -96,6 +96,15 @@ class NullModel:
             return -0.5 * squares - half_log_det
         return -0.5 * (freedom + len(self.raw)) * np.log1p(squares / freedom) - half_log_det
 
+    def predicted(self, count: int) -> tuple[np.ndarray, np.ndarray]:
+        """Deviations of the last Q readings, given the first so many.
+
+        Returns:
+            Their mean (Q,), and the lower Cholesky factor (Q, Q) of their covariance.
+        """
+        known, more = self.lower[count:, :count], self.lower[count:, count:]
+        return known @ self.deviation[:count], more
+
     def whiten(self, columns: np.ndarray) -> np.ndarray:
         """(P, n) directions of the readings, whitened like the deviations."""
         return solve_triangular(self.lower, columns, lower=True, check_finite=False)

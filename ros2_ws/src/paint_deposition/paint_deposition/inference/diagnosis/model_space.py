@@ -105,6 +105,25 @@ class EffectEvidence:
         ]
         return np.logaddexp.reduce(terms)
 
+    @property
+    def by_cause(self) -> dict[str, float]:
+        """Log evidence of each cause, averaged over its shapes and sizes."""
+        found: dict[str, float] = {}
+        for explanation, factors in zip(self.explanations, self.of_readings, strict=True):
+            gain = float(np.logaddexp.reduce(factors)) + log_share(explanation)
+            found[explanation.cause] = np.logaddexp(found.get(explanation.cause, -np.inf), gain)
+        return found
+
+    def by_law(self, cause: str) -> tuple[float, Effect]:
+        """An effect in its best shape, with its log evidence there and its mean amplitudes."""
+        own = [k for k, explanation in enumerate(self.explanations) if explanation.cause == cause]
+        k = max(own, key=lambda k: float(self.of_readings[k].max()))
+        size = int(self.of_readings[k].argmax())
+        amounts = self.principal[k].amplitudes(self.null.deviation, SIZES[[size]])[0]
+        law = self.explanations[k].law
+        assert law is not None
+        return float(self.of_readings[k, size]), law.with_amplitudes(amounts)
+
     def null_draws(self, seed: int) -> np.ndarray:
         """(P, DRAWS) whitened deviations if no cause acted."""
         return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
@@ -196,31 +215,24 @@ class ModelSpace:
 
     def by_law(self, cause: str) -> Effect:
         """An effect in its best shape with the amplitudes that it has if nothing else acts."""
-        best, found = -np.inf, None
-        for one in self.evidences:
-            for k, explanation in enumerate(self.explanations):
-                if explanation.cause == cause and one.of_readings[k].max() > best:
-                    size = int(one.of_readings[k].argmax())
-                    best, found = one.of_readings[k, size], (one, k, size)
-        assert found is not None
-        one, k, size = found
-        amounts = one.principal[k].amplitudes(one.null.deviation, SIZES[[size]])[0]
-        law = self.explanations[k].law
-        assert law is not None
-        return law.with_amplitudes(amounts)
+        return max((evidence.by_law(cause) for evidence in self.evidences), key=lambda e: e[0])[1]
 
-    def p_value(self, seed: int) -> float:
+    def p_value(self, seed: int, refitted: float = -np.inf) -> float:
         """Probability of at least this much evidence for any cause if none acted.
 
         By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes at all sizes,
         which is computed for every draw as for the readings: nothing is chosen on the readings.
+
+        Args:
+            seed: of the draws.
+            refitted: log odds of any cause by models that were refitted, where they are higher.
         """
         random = np.random.default_rng(seed)
         draws = []
         for one, count in zip(self.nature, random.multinomial(DRAWS, self.share), strict=True):
             noise = simulated(len(one.null.raw), self.freedom, count, random)
             draws.append(one.null.lower @ noise)
-        found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
+        found = max(self._evidence(self.nature[0].null.raw[:, np.newaxis])[0], refitted)
         by_chance = self._evidence(np.hstack(draws))
         return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
 

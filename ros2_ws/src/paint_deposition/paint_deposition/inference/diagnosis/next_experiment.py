@@ -1,20 +1,24 @@
 """What to measure and what to spray next, to separate the explanations that compete.
 
-Their separation, see ``separation``, is computed for the readings at hand and for these together
-with those of a further experiment. The experiment after which most probably one explanation is
-left comes first; its cost decides between experiments that are about as good.
+For every experiment it is known beforehand how much its readings will tell, see ``contenders``.
+That after which most probably one explanation is left comes first; its cost decides between
+experiments that are about as good.
 """
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import permutations
 
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.inference.diagnosis.proposals import Place, Spray, chance_of_settling
-from paint_deposition.inference.diagnosis.rivals import Rivals, rivals_of
-from paint_deposition.inference.diagnosis.separation import Imitation, Predicted, imitate
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.inference.diagnosis.contenders import (
+    Contender,
+    Forecast,
+    Placement,
+    contenders_of,
+)
+from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
 from paint_deposition.inference.diagnosis.stationary_spray import (
     KEY,
@@ -36,9 +40,9 @@ EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-# Sprays that are named, parts on which they are tried, single changes of which two at once are
-# tried, and spots before which the gun stands still.
-PROPOSED_SPRAYS, TRIED_PARTS, COMBINED, SPOTS = 15, 2, 4, 5
+# Sprays that are named, single changes of which two at once are tried, and spots before which the
+# gun stands still.
+PROPOSED_SPRAYS, COMBINED, SPOTS = 15, 4, 5
 # What may be changed of a gun that stands still.
 OF_STANDING = ('roll', 'standoff', 'part', 'voltage', 'draught')
 # Chance of settling that one unit of cost is worth, as a share; that of spraying on one spot, and
@@ -47,19 +51,9 @@ WORTH_OF_COST, COST_OF_STANDING, COST_OF_SAG = 0.05, 1.0, 1.0
 
 
 @dataclass(frozen=True)
-class _Pair:
-    """Two explanations by number: the one shown, and the one that was refitted to imitate it."""
-
-    shown: int
-    imitator: int
-    imitation: Imitation
-
-
-@dataclass(frozen=True)
 class ScoredExperiment:
     """A spray that was tried in the model."""
 
-    experiment: Experiment
     change: Change
     spray: Spray
     worth: float
@@ -72,50 +66,33 @@ def with_proposals(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) ->
 
     Without two of them nothing is proposed.
     """
-    rivals = rivals_of(diagnosis, library)
-    proposals = ((), ()) if rivals is None else propose(rivals)
+    contenders = contenders_of(diagnosis, library)
+    proposals = propose(diagnosis.study, contenders) if contenders else ((), ())
     return replace(diagnosis, library=library, proposals=proposals)
 
 
-def propose(rivals: Rivals, seed: int = 0) -> tuple[list[Place], list[Spray]]:
+def propose(
+    study: Study, contenders: Sequence[Contender], seed: int = 0
+) -> tuple[list[Place], list[Spray]]:
     """Places to measure on the parts at hand, and sprays, best first."""
-    return _places(rivals, seed), _sprays(rivals)
+    return _places(study, contenders, seed), _sprays(study, contenders)
 
 
-def compared(free: np.ndarray, predicted: Sequence[Predicted]) -> list[_Pair]:
-    """Each explanation beside each other, the two that are least apart first.
-
-    Args:
-        free: (P, k) directions of unit variance in which the readings may deviate anyway.
-        predicted: what each explanation predicts for these readings.
-    """
-    found = [
-        _Pair(shown, imitator, imitate(free, predicted[shown], predicted[imitator]))
-        for shown, imitator in permutations(range(len(predicted)), 2)
-    ]
-    return sorted(found, key=lambda pair: pair.imitation.separation)
-
-
-def _sprays(rivals: Rivals) -> list[Spray]:
-    free = np.hstack([rivals.free(rivals.fit.jacobian), rivals.study.nuisance])
-    now = compared(free, rivals.here)[0].imitation.separation
-    parts = _parts_that_show_most(rivals)
-    made = _best([_tried(rivals, part, change, now) for part in parts for change in MENU])
-    if made:
-        best = made[0].experiment
-        leading = [one.change for one in made if one.experiment is best][:COMBINED]
-        made += _best([_tried(rivals, best, change, now) for change in pairs(leading)])
-    families = {rival.effect.family for rival in rivals.found if rival.effect is not None}
-    if suits(rivals.fit.model, families):
-        still = _best([
-            _tried(rivals, part, AS_BEFORE, now, spot)
-            for part in parts for spot in spots(part, SPOTS)
-        ])  # fmt: skip
+def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
+    part = _part_that_differs_most(study, contenders)
+    made = _best([_tried(study, contenders, part, change) for change in MENU])
+    leading = [one.change for one in made[:COMBINED]]
+    made += _best([_tried(study, contenders, part, change) for change in pairs(leading)])
+    effects = (contender.fit.model.effect(contender.name) for contender in contenders)
+    families = {effect.family for effect in effects if effect is not None}
+    if suits(contenders[-1].fit.model, families):
+        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, SPOTS)]
+        still = _best(tried)
         made += still
         if still:
-            best, spot = still[0].experiment, still[0].spot
             changes = [change for change in MENU if change.kind in OF_STANDING]
-            made += _best([_tried(rivals, best, change, now, spot) for change in changes])
+            spot = still[0].spot
+            made += _best([_tried(study, contenders, part, change, spot) for change in changes])
     return [one.spray for one in _best(made)[:PROPOSED_SPRAYS]]
 
 
@@ -124,16 +101,20 @@ def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
 
-def _parts_that_show_most(rivals: Rivals) -> list[Experiment]:
-    """The experiments on which what competes shows most."""
-    campaign = rivals.study.campaign
-    shown = sum(predicted.change**2 for predicted in rivals.here)
-    by_part = np.bincount(campaign.experiment_of, shown)
-    return [campaign.experiments[k] for k in np.argsort(-by_part)[:TRIED_PARTS]]
+def _part_that_differs_most(study: Study, contenders: Sequence[Contender]) -> Experiment:
+    """The experiment on which the films of what competes differ most."""
+    campaign = study.campaign
+    films_um = np.array([contender.fit.predicted_um for contender in contenders])
+    by_part = np.bincount(campaign.experiment_of, (films_um / study.sigma_um).var(axis=0))
+    return campaign.experiments[int(by_part.argmax())]
 
 
 def _tried(
-    rivals: Rivals, experiment: Experiment, change: Change, now: float, spot: int | None = None
+    study: Study,
+    contenders: Sequence[Contender],
+    experiment: Experiment,
+    change: Change,
+    spot: int | None = None,
 ) -> ScoredExperiment | None:
     """How well the readings would separate with this spray, None where it cannot be done.
 
@@ -141,7 +122,7 @@ def _tried(
         change: what is done otherwise.
         spot: measured point before which the gun stands still; None: it runs the passes.
     """
-    study = rivals.study
+    model = contenders[-1].fit.model
     new = change.made(experiment)
     if new is None:
         return None
@@ -149,37 +130,37 @@ def _tried(
     if spot is not None:
         # The thickest film that may be sprayed on a spot: that wanted, else that measured.
         most_um = study.campaign.target_um or float(study.measured_um.max())
-        stand = StationarySpray.before(new, spot, rivals.fit.model, most_um)
+        stand = StationarySpray.before(new, spot, model, most_um)
         if stand is None:
             return None
         new = stand.sprayed(new)
     new = replace(new, name=f'{experiment.name}, next')
-    forward = Forward(Campaign((new,)), study.forward.effects)
-    film_um = forward.predict_um(rivals.fit.model)
+    film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(model)
     if film_um.mean() < PAINTED * study.measured_um.mean():
         return None
-    noise_um = study.noise.typical_um
-    new = _with_readings(new, new.measured_points.positions_m, film_um, noise_um)
-    together = Study.of(Campaign((*study.campaign.experiments, new)))
+    noise_um = np.full(len(film_um), study.noise.typical_um)
+    new = _read(new, Readings.of(new.measured_points.positions_m, film_um, sigma_um=noise_um))
+    together = _together(study, (*study.campaign.experiments, new))
     if len(together) != len(study) + len(film_um):
         return None
-    sigma_um = together.sigma_um[len(study) :]
-    free = np.vstack([rivals.free(rivals.fit.jacobian), rivals.nuisance_at(forward, sigma_um)])
-    free = np.hstack([free, together.nuisance])
-    there = rivals.predictions_at(Campaign((new,)), forward, sigma_um)
-    predicted = [here.with_more(more) for here, more in zip(rivals.here, there, strict=True)]
-    apart = compared(free, predicted)
+    forecast = Forecast.of(contenders, together, np.arange(len(together)), len(study))
+    now, then = forecast.separations
     spray = Spray(
-        _in_words(study, experiment, change, stand), rivals.names, apart[0].imitation.separation,
+        _in_words(study, experiment, change, stand),
+        tuple(contender.name for contender in contenders), then,
         now, len(film_um), experiment.name, change.keys if stand is None else (KEY, *change.keys),
-        _chance(rivals, apart), stand.peak_um if stand else float(film_um.max()),
+        forecast.chance, stand.peak_um if stand else float(film_um.max()),
         float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip
     cost = change.cost + COST_OF_STANDING * (stand is not None)
     cost += COST_OF_SAG * bool(spray.film_words)
-    return ScoredExperiment(
-        experiment, change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot
-    )
+    return ScoredExperiment(change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
+
+
+def _together(study: Study, experiments: Sequence[Experiment]) -> Study:
+    """The study with the readings of these experiments, noise and texture as they are."""
+    campaign = Campaign(tuple(experiments))
+    return replace(Study.of(campaign, study.forward.effects), texture=study.texture)
 
 
 def _in_words(
@@ -193,74 +174,64 @@ def _in_words(
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
 
 
-def _chance(rivals: Rivals, apart: Sequence[_Pair]) -> float:
-    """Probability that the true effect is left alone, on average over which it is."""
-    left = {k: 1.0 for k, rival in enumerate(rivals.found) if rival.effect is not None}
-    for pair in apart:
-        if pair.shown in left:
-            separation = np.array(pair.imitation.separation)
-            left[pair.shown] *= float(chance_of_settling(separation))
-    return float(np.mean(list(left.values())))
-
-
-def _with_readings(
-    experiment: Experiment, positions_m: np.ndarray, film_um: np.ndarray, noise_um: float
-) -> Experiment:
-    """The experiment with predicted films (P,) [um] as its readings."""
-    readings = Readings.of(positions_m, film_um, sigma_um=np.full(len(film_um), noise_um))
+def _read(experiment: Experiment, readings: Readings) -> Experiment:
+    """The experiment with other films read at the same places."""
     return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
                    used=np.ones(len(readings), dtype=bool))  # fmt: skip
 
 
-def _places(rivals: Rivals, seed: int) -> list[Place]:
-    """Add one point after the other, on any part, each where it separates the least apart most."""
-    study = rivals.study
+def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Place]:
+    """Add one point after the other, each where it tells the leading effect from its rival."""
     parts = study.campaign.experiments
-    both = [_with_candidates(rivals, e, seed + k) for k, e in enumerate(parts)]
-    together = Study.of(Campaign(tuple(both)), study.forward.effects)
+    model = contenders[-1].fit.model
+    both = [_with_candidates(study, k, model, seed + k) for k in range(len(parts))]
+    together = _together(study, both)
     part, positions_m = together.campaign.experiment_of, together.campaign.positions_m
     taken = np.concatenate([np.arange(len(b)) < len(e) for b, e in zip(both, parts, strict=True)])
-    film_um, sigma_um = together.measured_um, together.sigma_um
-    if len(taken) != len(film_um):
+    if len(taken) != len(together):
         return []
-    free = rivals.nuisance_at(together.forward, sigma_um)
-    free = np.hstack([free, together.nuisance])
-    predicted = rivals.predictions_at(together.campaign, together.forward, sigma_um)
-    usable = ~taken & (film_um > PAINTED * np.mean(study.measured_um))
+    rows = np.flatnonzero(~taken)
+    order = np.concatenate([np.flatnonzero(taken), rows])
+    placement = Placement(Forecast.of(contenders, together, order, len(order) - len(rows)))
+    part, positions_m, film_um = part[rows], positions_m[rows], together.measured_um[rows]
+    usable = film_um > PAINTED * np.mean(study.measured_um)
     places: list[Place] = []
-    pair = compared(free[taken], [p.select(taken) for p in predicted])[0]
     while usable.any() and len(places) < PROPOSED_POINTS:
-        shown, imitator = pair.shown, pair.imitator
-        gains = pair.imitation.gains(free, predicted[shown], predicted[imitator])
-        best = int(np.argmax(np.where(usable, gains, -1.0)))
-        before = pair.imitation.separation
-        after = float(np.hypot(before, np.sqrt(gains[best])))
-        names = rivals.found[shown].name, rivals.found[imitator].name
+        pair = placement.nearest()
+        best = int(np.argmax(np.where(usable, placement.gains()[pair], -1.0)))
+        before = placement.separation(pair)
+        placement.take(best)
+        names = contenders[pair[0]].name, contenders[pair[1]].name
         why = (
-            f'separates {names[0]} from {names[1]}: {before:.1f} to {after:.1f} standard '
-            'deviations'
+            f'separates {names[0]} from {names[1]}: {before:.1f} -> '
+            f'{placement.separation(pair):.1f} standard deviations'
         )
         places.append(Place(positions_m[best], parts[part[best]].name, why, float(film_um[best])))
         near = np.linalg.norm(positions_m - positions_m[best], axis=1) < SPACING_M
         usable &= ~(near & (part == part[best]))
-        taken[best] = True
-        pair = compared(free[taken], [p.select(taken) for p in predicted])[0]
     return places
 
 
-def _with_candidates(rivals: Rivals, experiment: Experiment, seed: int) -> Experiment:
-    """The experiment with further readings at random points, clear of free edges."""
-    study, surface = rivals.study, experiment.surface
+def _with_candidates(study: Study, number: int, model: DepositionModel, seed: int) -> Experiment:
+    """A part with further readings at random points, clear of free edges, as a model predicts."""
+    experiment, own = study.campaign.experiments[number], study.campaign.experiment_of == number
+    surface, here = experiment.surface, experiment.measured_points
     count = CANDIDATES // len(study.campaign.experiments)
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
     inside = chosen[points.edge_distance_m > EDGE_MARGIN_M][:count]
-    here = experiment.measured_points
-    positions = np.vstack([here.positions_m, surface.vertices_m[inside]])
-    normals = np.vstack([here.normals, surface.normals[inside]])
-    new = experiment.with_readings(
-        Readings.of(positions, np.zeros(len(positions)), normals=normals)
+    session = experiment.readings.session[experiment.means.first]
+    readings = Readings.of(
+        np.vstack([here.positions_m, surface.vertices_m[inside]]),
+        np.concatenate([study.measured_um[own], np.zeros(len(inside))]),
+        normals=np.vstack([here.normals, surface.normals[inside]]),
+        sigma_um=np.concatenate(
+            [study.gauge_um[own], np.full(len(inside), study.noise.typical_um)]
+        ),
+        session=np.concatenate([session, np.resize(session, len(inside))]),
     )
-    film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(rivals.fit.model)
-    return _with_readings(new, positions, film_um, study.noise.typical_um)
+    new = experiment.with_readings(readings)
+    film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(model)
+    film_um[: len(here)] = readings.thickness_um[: len(here)]
+    return _read(new, replace(readings, thickness_um=film_um))

@@ -20,7 +20,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,
-    WORTH_FOOTPRINT,
     Explanation,
     nonparametric_laws_of,
     of_corrections,
@@ -81,11 +80,11 @@ def diagnose(
     search = Search(state)
     nothing = search.nothing
     state = replace(state, testable=search.testability, figures=nothing.space.figures)
-    p_value = nothing.p_value
+    p_value = nothing.p_value(search.singles)
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
     progress('refitting with what may be missing')
-    sought = nothing.p_value_of_causes < ALPHA
+    sought = nothing.p_value_of_causes(search.singles) < ALPHA
     stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
@@ -94,7 +93,7 @@ def diagnose(
         *of_corrections(state.study, fit, best.names),
         *nonparametric_laws_of(state.study, fit.model),
         *of_places(state.study, fit.model),
-        *of_footprint(state.study, fit, WORTH_FOOTPRINT),
+        *of_footprint(state.study, fit, worth=-np.inf),
     ]
     left_out = LeftOut(stages, options)
     state = replace(state, figures=best.space.figures, discrepancy=best.best.null.discrepancy)
@@ -188,17 +187,13 @@ def _predicting(
 ) -> list[tuple[Explanation, float]]:
     """The first of some laws, as far as readings left out bear them out.
 
-    A curve must predict whole parts better, a map or a footprint these or patches of the parts. A
-    footprint, which a bell has on any part, may also leave the error on parts as it is: of two
-    parts each says little of the other.
+    A curve must predict whole parts better, a map or a footprint these or patches of the parts.
     """
     kept = 0
     for count, (law, _) in enumerate(laws, start=1):
-        ways = [(False, 1.0 + (LEAST_GAIN if law.learns == FOOTPRINT else -LEAST_GAIN))]
-        if law.learns in (PLACE, FOOTPRINT):
-            ways.append((True, 1.0 - LEAST_GAIN))
-        errors = ((left_out.errors_um(without, patches), most) for patches, most in ways)
-        if any(errors_um[count] <= most * errors_um[kept] for errors_um, most in errors):
+        patches = (False, True) if law.learns in (PLACE, FOOTPRINT) else (False,)
+        errors = (left_out.errors_um(without, each) for each in patches)
+        if any(error_um[count] <= (1.0 - LEAST_GAIN) * error_um[kept] for error_um in errors):
             kept = count
     return laws[:kept]
 

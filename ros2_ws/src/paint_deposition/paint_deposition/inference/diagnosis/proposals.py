@@ -4,31 +4,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.special import ndtr
 
-from paint_deposition.inference.diagnosis.explanations import LAW_ERROR
-from paint_deposition.inference.diagnosis.model_space import CREDIBLE
 from paint_deposition.inference.diagnosis.stationary_spray import StationarySpray
 
 # A film so many times as thick as any that was measured may sag.
 MAY_SAG = 1.3
-# Relative deviations of an effect from its law, and their weights, after Gauss and Hermite.
-OFF, WEIGHTS = LAW_ERROR * np.sqrt([0.0, 3.0, 3.0]) * [0, 1, -1], np.array([4.0, 1.0, 1.0]) / 6.0
-
-
-def chance_of_settling(separation: np.ndarray) -> np.ndarray:
-    """Probability that the true one of two explanations is left alone.
-
-    The log evidence for it is normal, its mean half the squared separation and its standard
-    deviation the separation itself. It is left alone where that exceeds the odds of a group. The
-    effect may turn out smaller or larger than its law says, so that is averaged over.
-
-    Args:
-        separation: (...) standard deviations between them.
-    """
-    needed = np.log(CREDIBLE / (1.0 - CREDIBLE))
-    apart = np.maximum(np.multiply.outer(separation, 1.0 + OFF), 1e-9)
-    return ndtr(0.5 * apart - needed / apart) @ WEIGHTS
 
 
 @dataclass(frozen=True)
@@ -53,12 +33,12 @@ class Spray:
 
     what: str  # in words; names the part where there are several
     separates: tuple[str, ...]  # the explanations that it is to separate, effect ids or 'unknown'
-    separation: float  # standard deviations between the two that are least apart with it
+    separation: float  # standard deviations from the leading effect to its nearest rival with it
     now: float  # the same without it
     readings: int = 0  # number of points to be measured on the new part
     experiment: str = ''  # the part that is painted anew
     changes: tuple[str, ...] = ()  # what is done otherwise, by key
-    # Probability that one explanation is left, on average over which is the true one.
+    # Probability that the true effect is left alone, averaged over which it probably is.
     chance: float = float('nan')
     peak_um: float = float('nan')  # thickest film at these points
     peak_now_um: float = float('nan')  # as measured on that part

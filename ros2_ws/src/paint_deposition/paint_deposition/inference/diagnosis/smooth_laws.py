@@ -4,7 +4,7 @@ A law is a random function with a length of correlation, given by its values at 
 a covariate, a map over a part, or a deviation of the footprint.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -211,25 +211,20 @@ def map_bases(study: Study, model: DepositionModel, kind: str = 'factor') -> lis
 
 
 def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) -> Basis:
-    """Deviations of the pattern from eq. (1) at the points of a study."""
-    return footprint_along(study.rays(model), model.patterns, radii)
-
-
-def footprint_along(
-    parts: Sequence[Rays], patterns: Sequence[PlanarPattern], radii: int = RADII
-) -> Basis:
     """Deviations of the pattern from eq. (1), lengths of correlation in steps of the radius.
 
     Each harmonic of the angle is a random function of the radius by itself, the same for all
     brushes.
 
     Args:
-        parts: rays of each part. patterns: those that they come from.
+        study: the readings.
+        model: its patterns and projection.
         radii: how many knots from the middle to the end of the pattern.
     """
+    patterns = model.patterns
     reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
-    for rays in parts:
+    for rays in study.rays(model):
         radius = np.hypot(rays.x_m, rays.y_m) / reach * (radii - 1)
         angle = waves(rays.x_m, rays.y_m)
         films.append(np.stack([hat_sums(rays.share * wave, radius, radii) for wave in angle]))

@@ -20,7 +20,7 @@ from paint_deposition.inference.diagnosis.explanations import (
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.least_squares import Fit, derivatives
+from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
@@ -74,13 +74,7 @@ class UnmeasuredPart:
     def fit(self, study: Study) -> Fit:
         """The model beside readings that are as it predicts."""
         parameters = FreeParameters.of(self.model, *self.model.effects, known=self.known)
-        vector = parameters.encode(parameters.start)
-        jacobian = derivatives(study.forward, parameters, vector, study.sigma_um)
-        nothing = np.empty((len(study), 0))
-        return Fit(
-            parameters, vector, self.model, study.measured_um, np.zeros(len(study)), jacobian,
-            True, nothing,
-        )  # fmt: skip
+        return study.beside(parameters, parameters.encode(parameters.start))
 
     def sensitivities(self, study: Study, fit: Fit) -> list[Sensitivity]:
         """Of the readings to each effect that may be missing, in each of its shapes."""

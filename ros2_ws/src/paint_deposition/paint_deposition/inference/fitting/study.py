@@ -12,7 +12,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.facet_error import facet_errors_um
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.fitting.least_squares import Fit, fit_readings
+from paint_deposition.inference.fitting.least_squares import Fit, fit_at, fit_readings
 from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import RandomEffects, random_effects
@@ -143,6 +143,11 @@ class Study:
         """Fit these parameters to the points; see ``fit_readings``."""
         data = self.forward, self.measured_um, self.sigma_um
         return fit_readings(*data, parameters, starts, seed, nuisance, discrepancy, others)
+
+    def beside(self, parameters: FreeParameters, vector: np.ndarray) -> Fit:
+        """The model that a vector (k,) of parameters stands for, beside the points."""
+        data = self.forward, self.measured_um, self.sigma_um
+        return fit_at(*data, parameters, vector, self.nuisance)
 
     def residuals(self, predicted_um: np.ndarray) -> Residuals:
         """The P points beside predictions (P,) for them [um].

@@ -1,0 +1,272 @@
+"""The explanations that compete for a diagnosis, and how far further readings set them apart.
+
+Each is a model that was refitted to the readings at hand, with its own discrepancy: what it gives
+further readings is normal, with what the first readings say of its parameters and of the
+discrepancy. How much the logarithm of the odds between two of them will change is then known
+beforehand: on average by their Kullback-Leibler divergence (Lindley, Ann. Math. Stat. 27:986,
+1956).
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.linalg import solve_triangular
+from scipy.special import ndtr, softmax
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.inference.diagnosis.discrepancy import (
+    DiscrepancyHyperparameters,
+    ModelDiscrepancy,
+)
+from paint_deposition.inference.diagnosis.explanations import (
+    FACTOR,
+    FOOTPRINT,
+    LAW_LENGTH,
+    UNKNOWN,
+    neutral_shapes,
+    of_effects,
+    own_law_errors,
+)
+from paint_deposition.inference.diagnosis.gaussian import NullModel
+from paint_deposition.inference.diagnosis.model_space import (
+    COARSENED,
+    CREDIBLE,
+    LOG_ODDS_UNKNOWN,
+    PRIOR_EFFECT,
+    SIZES,
+    SURE,
+    EffectEvidence,
+    WeightedNull,
+    log_odds,
+)
+from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
+from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.parameters import FreeParameters
+from paint_deposition.inference.fitting.smooth_fields import field_over_values
+from paint_deposition.inference.fitting.study import Study
+
+# Effects that compete at the most.
+MOST_CONTENDERS = 6
+# Log odds between two effects beyond which one of them leaves the group, and against what is no
+# effect, beyond which it is accepted.
+ALONE, ACCEPTED = COARSENED * log_odds(CREDIBLE), log_odds(SURE)
+# Logarithm of the prior odds of what is no effect of the library.
+LOG_PRIOR = {UNKNOWN: LOG_ODDS_UNKNOWN, FOOTPRINT: 0.0}
+
+
+@dataclass(frozen=True)
+class Contender:
+    """One explanation that competes."""
+
+    name: str  # effect id, ``UNKNOWN`` or ``FOOTPRINT``
+    fit: Fit  # of the model refitted to it
+    sizes: DiscrepancyHyperparameters  # of the discrepancy beside it
+    covariate: str = ''  # of which something unknown is any smooth function
+
+    @property
+    def is_effect(self) -> bool:
+        """Whether it is an effect of the library."""
+        return self.name not in LOG_PRIOR
+
+    def null(self, study: Study, usual: ModelDiscrepancy) -> NullModel:
+        """What it gives the readings of a study, among them those that it was fitted to.
+
+        Args:
+            study: the readings.
+            usual: their discrepancy around one model of all contenders.
+        """
+        fit = study.beside(self.fit.parameters, self.fit.vector)
+        laws = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
+        columns = [study.nuisance, own_law_errors(study, fit, laws, usual.model)]
+        for covariate in study.covariates(usual.model):
+            if covariate.name == self.covariate:
+                away = (covariate.values - covariate.values.mean()) / covariate.values.std()
+                law = SIZES[-1] * FACTOR * field_over_values(away, LAW_LENGTH, NEGLIGIBLE)
+                columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
+        discrepancy = usual.around(study, fit).covariance(self.sizes)
+        return NullModel.around(fit, np.hstack(columns), discrepancy=discrepancy)
+
+
+def contenders_of(
+    diagnosis: Diagnosis, library: Mapping[str, type[Effect]]
+) -> tuple[Contender, ...]:
+    """What competes for a diagnosis: nothing if fewer than two explanations do.
+
+    These are the members of the first group that has several; else, where nothing is accepted,
+    the leading effects and the shapeless cause, if that is what the verdict names. A pattern that
+    is no two Gaussians may always stand in their place.
+    """
+    names = _competing(diagnosis, library)
+    if not names:
+        return ()
+    study, fit = diagnosis.study, diagnosis.history[-1].fit
+    rest = tuple(effect for effect in fit.model.effects if effect.id not in names)
+    without = fit.model.model_copy(update={'effects': rest})
+    freedom = study.noise.degrees_of_freedom
+
+    def fitted(*effects: Effect, discrepancy: np.ndarray | None = None) -> Fit:
+        model = without.model_copy(update={'effects': (*rest, *effects)})
+        parameters = FreeParameters.of(model, *model.effects, known=fit.parameters.known)
+        return study.fit(parameters, nuisance=study.nuisance, discrepancy=discrepancy)
+
+    base = fitted()
+    usual, plain = ModelDiscrepancy.of(study, base), NullModel.around(base, study.nuisance)
+    nature = (
+        WeightedNull.of(plain, usual, sizes, freedom)
+        for sizes in usual.choices()
+        if not sizes.is_beyond_nature
+    )
+    best = max(nature, key=lambda one: one.log_weight)
+    shapes = {name: neutral_shapes(library[name]) for name in names}
+    laws = EffectEvidence(best.null, [*of_effects(study, base, shapes)], freedom)
+    base, found = fitted(discrepancy=best.null.discrepancy), []
+    for name in names:
+        effect = fit.model.effect(name) or laws.by_law(name)[1]
+        found.append(
+            Contender(name, fitted(effect, discrepancy=best.null.discrepancy), best.sizes)
+        )
+    if diagnosis.unknown is not None:
+        found.append(Contender(UNKNOWN, base, best.sizes, diagnosis.unknown.covariate))
+    return (*found, Contender(FOOTPRINT, base, best.sizes))
+
+
+def _competing(diagnosis: Diagnosis, library: Mapping[str, type[Effect]]) -> tuple[str, ...]:
+    several = [
+        tuple(m for m in found.members if m in library)
+        for found in diagnosis.classes
+        if len(found.members) > 1
+    ]
+    if several:
+        return several[0][:MOST_CONTENDERS]
+    if any(found in library for found in diagnosis.accepted):
+        return ()
+    return tuple(c.best for c in diagnosis.classes if c.best in library)[:MOST_CONTENDERS]
+
+
+@dataclass(frozen=True)
+class Forecast:
+    """What contenders give the last Q readings of a study, given the others, over their noise."""
+
+    contenders: Sequence[Contender]
+    log_weight: np.ndarray  # (n,) logarithm of the posterior weight of each by the others
+    means: np.ndarray  # (n, Q)
+    factors: np.ndarray  # (n, Q, Q) lower Cholesky factors of their covariances
+
+    @staticmethod
+    def of(
+        contenders: Sequence[Contender], study: Study, order: np.ndarray, known: int
+    ) -> 'Forecast':
+        """Forecast readings of a study.
+
+        Args:
+            study: all readings; what those that are to be forecast measured has no influence.
+            order: (P,) rows of the study, those that are known first.
+            known: how many are.
+        """
+        base = contenders[-1].fit
+        usual = ModelDiscrepancy.of(study, study.beside(base.parameters, base.vector))
+        weights, means, factors = [], [], []
+        for contender in contenders:
+            null = contender.null(study, usual).select(order)
+            mean, factor = null.predicted(known)
+            expected = (study.measured_um / study.sigma_um)[order] - null.raw
+            here = null.select(np.arange(known))
+            deviation, freedom = here.deviation[:, np.newaxis], study.noise.degrees_of_freedom
+            prior = LOG_PRIOR.get(contender.name, log_odds(PRIOR_EFFECT))
+            weights.append(prior + float(here.log_evidence(deviation, freedom)[0]))
+            means.append(expected[known:] + mean)
+            factors.append(factor)
+        return Forecast(contenders, np.array(weights), np.array(means), np.array(factors))
+
+    @cached_property
+    def odds(self) -> np.ndarray:
+        """(n, n) logarithm of the odds of each against each other by the known readings."""
+        return self.log_weight[:, np.newaxis] - self.log_weight
+
+    @cached_property
+    def gains(self) -> np.ndarray:
+        """(2, n, n) mean and variance of what the readings add to the log odds of the true one."""
+        count = len(self.contenders)
+        found = np.zeros((2, count, count))
+        for true, other in np.ndindex(count, count):
+            if true == other:
+                continue
+            factor, away = self.factors[true], self.means[other] - self.means[true]
+            both = np.column_stack([factor, away])
+            seen = solve_triangular(self.factors[other], both, lower=True)
+            turned, shift = seen[:, :-1], seen[:, -1]
+            scale = np.log(np.diag(self.factors[other]) / np.diag(factor)).sum()
+            excess = turned.T @ turned - np.eye(len(factor))
+            found[0, true, other] = scale + 0.5 * (np.trace(excess) + shift @ shift)
+            found[1, true, other] = 0.5 * np.sum(excess**2) + np.sum((turned.T @ shift) ** 2)
+        return found
+
+    @cached_property
+    def leading(self) -> int:
+        """Number of the most probable effect."""
+        effects = np.array([contender.is_effect for contender in self.contenders])
+        return int(np.where(effects, self.log_weight, -np.inf).argmax())
+
+    @property
+    def separations(self) -> tuple[float, float]:
+        """Standard deviations from the leading effect to the nearest of the others.
+
+        By the known readings and with all: two normal distributions so many standard deviations
+        apart have on average half the square of it as log odds.
+        """
+        mean, others = self.gains[0], np.arange(len(self.contenders)) != self.leading
+        now = np.abs(self.odds)[self.leading, others]
+        then = now + 0.5 * (mean + mean.T)[self.leading, others]
+        return float(np.sqrt(2.0 * now.min())), float(np.sqrt(2.0 * then.min()))
+
+    @property
+    def chance(self) -> float:
+        """Probability that the true effect is left alone, averaged over which it probably is."""
+        mean, variance = self.gains
+        effect = np.array([contender.is_effect for contender in self.contenders])
+        needed = np.where(effect, ALONE, ACCEPTED)
+        with np.errstate(divide='ignore', invalid='ignore'):
+            left = np.nan_to_num(ndtr((self.odds + mean - needed) / np.sqrt(variance)))
+        np.fill_diagonal(left, 1.0)
+        probable = softmax(self.log_weight[effect] / COARSENED)
+        return float(probable @ left[effect].prod(axis=1))
+
+
+class Placement:
+    """The forecast of single readings, as some of them are taken one after the other."""
+
+    def __init__(self, forecast: Forecast) -> None:
+        self.forecast = forecast
+        self._covariances = forecast.factors @ forecast.factors.transpose(0, 2, 1)
+        self._away = forecast.means - forecast.means[:, np.newaxis]  # n true, n others, Q
+        self._apart = np.abs(forecast.odds)  # log odds between each two
+
+    def nearest(self) -> tuple[int, int]:
+        """The leading effect, and the explanation from which the readings so far tell it least."""
+        leading = self.forecast.leading
+        others = np.arange(len(self._apart)) != leading
+        return leading, int(np.where(others, self._apart[leading], np.inf).argmin())
+
+    def separation(self, pair: tuple[int, int]) -> float:
+        """Standard deviations between two contenders by the readings so far."""
+        return float(np.sqrt(2.0 * self._apart[pair]))
+
+    def gains(self) -> np.ndarray:
+        """(n, n, Q) by how much each further reading adds to the log odds between each two."""
+        variance = np.diagonal(self._covariances, axis1=1, axis2=2)
+        ratio = variance[:, np.newaxis] / variance
+        gain = 0.5 * (ratio + self._away**2 / variance - 1.0 - np.log(ratio))
+        return 0.5 * (gain + gain.transpose(1, 0, 2))
+
+    def take(self, reading: int) -> None:
+        """Take one of the readings."""
+        self._apart = self._apart + self.gains()[:, :, reading]
+        column = self._covariances[:, :, reading]
+        slope = column / column[:, [reading]]
+        self._away = self._away - self._away[:, :, [reading]] * slope
+        self._covariances = self._covariances - slope[:, :, np.newaxis] * column[:, np.newaxis]
+        # Of a reading that was taken the noise is left: the same place, read again.
+        self._covariances[:, reading, reading] += 1.0

@@ -1,0 +1,90 @@
+"""How much further readings tell between explanations, against draws of these readings."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.stats import multivariate_normal
+
+from paint_deposition.inference.diagnosis.contenders import Forecast, Placement
+from paint_deposition.inference.diagnosis.gaussian import NullModel
+
+READINGS, DRAWS = 6, 40_000
+
+
+def forecast(spread: float = 1.0) -> Forecast:
+    """Two effects and the footprint: other means, and covariances as unlike as this."""
+    rng = np.random.default_rng(3)
+    means = rng.normal(size=(3, READINGS))
+    roots = spread * rng.normal(size=(3, READINGS, 2))
+    covariances = np.eye(READINGS) + roots @ roots.transpose(0, 2, 1)
+    contenders = [
+        SimpleNamespace(is_effect=True), SimpleNamespace(is_effect=True),
+        SimpleNamespace(is_effect=False),
+    ]  # fmt: skip
+    return Forecast(contenders, np.array([0.0, 0.4, 1.0]), means, np.linalg.cholesky(covariances))
+
+
+def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
+    """(DRAWS,) logarithm of the odds of the true one after readings that it gives."""
+    rng = np.random.default_rng(4)
+    laws = [
+        multivariate_normal(mean, factor @ factor.T)
+        for mean, factor in zip(told.means, told.factors, strict=True)
+    ]
+    readings = laws[true].rvs(DRAWS, rng)
+    return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
+
+
+def test_the_log_odds_are_those_of_readings_that_are_drawn():
+    told = forecast()
+    for true, other in ((0, 1), (1, 0), (0, 2)):
+        drawn = log_odds_drawn(told, true, other)
+        mean, variance = told.gains[:, true, other]
+        error = drawn.std() / np.sqrt(DRAWS)
+        assert told.odds[true, other] + mean == pytest.approx(drawn.mean(), abs=4.0 * error)
+        assert variance == pytest.approx(drawn.var(), rel=0.05)
+
+
+def test_nothing_tells_between_explanations_that_say_the_same():
+    told = forecast()
+    same = Forecast(
+        told.contenders, np.zeros(3), np.tile(told.means[0], (3, 1)),
+        np.tile(told.factors[0], (3, 1, 1)),
+    )  # fmt: skip
+    assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert same.chance == 0.0
+
+
+def test_equal_errors_leave_the_distance_of_the_means():
+    told = forecast(spread=0.0)
+    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+    away = float(np.linalg.norm(told.means[1] - told.means[0]))
+    assert two.separations == pytest.approx((0.0, away))
+
+
+def test_single_readings_add_up_to_all_of_them():
+    told = forecast(spread=0.0)
+    placement = Placement(told)
+    for reading in range(READINGS):
+        placement.take(reading)
+    pair = placement.nearest()
+    assert placement.separation(pair) == pytest.approx(told.separations[1])
+    # With errors that differ the mean of what is read so far goes on: about as much.
+    told = forecast(spread=0.5)
+    placement = Placement(told)
+    for reading in range(READINGS):
+        placement.take(reading)
+    assert placement.separation(placement.nearest()) == pytest.approx(
+        told.separations[1], rel=0.15
+    )
+
+
+def test_some_readings_are_predicted_from_others():
+    rng = np.random.default_rng(5)
+    columns, raw = rng.normal(size=(9, 4)), rng.normal(size=9)
+    mean, factor = NullModel.of(columns, raw).predicted(6)
+    covariance = np.eye(9) + columns @ columns.T
+    slope = covariance[6:, :6] @ np.linalg.inv(covariance[:6, :6])
+    assert mean == pytest.approx(slope @ raw[:6])
+    assert factor @ factor.T == pytest.approx(covariance[6:, 6:] - slope @ covariance[:6, 6:])
