@@ -133,11 +133,11 @@ def fit_readings(
         candidates = [result.x for result in rough[: REFINED_STARTS if starts > 1 else 1]]
     found = problem.differing([problem.search(start, MOST_STEPS) for start in candidates])
     data = forward, measured_um, sigma_um, parameters
-    best, *others = (
+    best, *elsewhere = (
         replace(fit_at(*data, result.x, nuisance, discrepancy), converged=bool(result.status > 0))
         for result in found
     )
-    return replace(best, elsewhere=tuple(others))
+    return replace(best, elsewhere=tuple(elsewhere))
 
 
 def fit_at(
