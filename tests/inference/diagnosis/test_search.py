@@ -98,8 +98,8 @@ def test_something_unknown_beside_a_set_competes_with_it(stages):
         gains.append(here.log_weight_unknown - here.log_weight)
     assert gains[-1] < 0.0
     assert gains[0] > gains[-1]
-    assert stages[0].here.p_value_of_causes() < 0.05 < stages[-1].here.p_value()
-    assert stages[0].here.p_value() <= stages[0].here.p_value_of_causes()
+    assert stages[0].here.p_value_of_causes < 0.05 < stages[-1].here.p_value
+    assert stages[0].here.p_value <= stages[0].here.p_value_of_causes
 
 
 def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):

@@ -105,15 +105,6 @@ class EffectEvidence:
         ]
         return np.logaddexp.reduce(terms)
 
-    @property
-    def by_cause(self) -> dict[str, float]:
-        """Log evidence of each cause, averaged over its shapes and sizes."""
-        found: dict[str, float] = {}
-        for explanation, factors in zip(self.explanations, self.of_readings, strict=True):
-            gain = float(np.logaddexp.reduce(factors)) + log_share(explanation)
-            found[explanation.cause] = np.logaddexp(found.get(explanation.cause, -np.inf), gain)
-        return found
-
     def by_law(self, cause: str) -> tuple[float, Effect]:
         """An effect in its best shape, with its log evidence there and its mean amplitudes."""
         own = [k for k, explanation in enumerate(self.explanations) if explanation.cause == cause]
@@ -217,22 +208,18 @@ class ModelSpace:
         """An effect in its best shape with the amplitudes that it has if nothing else acts."""
         return max((evidence.by_law(cause) for evidence in self.evidences), key=lambda e: e[0])[1]
 
-    def p_value(self, seed: int, refitted: float = -np.inf) -> float:
+    def p_value(self, seed: int) -> float:
         """Probability of at least this much evidence for any cause if none acted.
 
         By simulation (Davison & Hinkley 1997) of the averaged evidence of all causes at all sizes,
         which is computed for every draw as for the readings: nothing is chosen on the readings.
-
-        Args:
-            seed: of the draws.
-            refitted: log odds of any cause by models that were refitted, where they are higher.
         """
         random = np.random.default_rng(seed)
         draws = []
         for one, count in zip(self.nature, random.multinomial(DRAWS, self.share), strict=True):
             noise = simulated(len(one.null.raw), self.freedom, count, random)
             draws.append(one.null.lower @ noise)
-        found = max(self._evidence(self.nature[0].null.raw[:, np.newaxis])[0], refitted)
+        found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
         by_chance = self._evidence(np.hstack(draws))
         return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
 

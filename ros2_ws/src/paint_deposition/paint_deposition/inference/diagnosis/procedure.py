@@ -80,11 +80,11 @@ def diagnose(
     search = Search(state)
     nothing = search.nothing
     state = replace(state, testable=search.testability, figures=nothing.space.figures)
-    p_value = nothing.p_value(search.singles)
+    p_value = nothing.p_value
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
     progress('refitting with what may be missing')
-    sought = nothing.p_value_of_causes(search.singles) < ALPHA
+    sought = nothing.p_value_of_causes < ALPHA
     stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]

@@ -64,7 +64,7 @@ def refit(
     search = Search(state)
     nothing = search.nothing
     state = _beside(state, nothing)
-    p_value = nothing.p_value()
+    p_value = nothing.p_value
     missing = p_value < ALPHA
     if added is None:
         reason = 'The model was fitted as it is'

@@ -32,7 +32,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_UNKNOWN,
     SIZES,
     SURE,
-    EffectEvidence,
     ModelSpace,
     WeightedNull,
     inclusion_of,
@@ -43,8 +42,8 @@ from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
 from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.fitting.least_squares import Fit
 
-# So many proposals are refitted each time, and so many of the single effects.
-TRIALS, SINGLES = 5, 8
+# So many proposals are refitted each time.
+TRIALS = 5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each; and the share of a law of another form.
 LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
@@ -113,24 +112,19 @@ class EffectSet:
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
-    def p_value_of_causes(self, larger: Sequence['EffectSet'] = ()) -> float:
-        """Probability of at least this much evidence for any cause if none acted beside it.
+    @cached_property
+    def p_value_of_causes(self) -> float:
+        """Probability of at least this much evidence for any cause if none acted beside it."""
+        return min(1.0, self.space.p_value(self.state.seed) / OF_CAUSES)
 
-        Args:
-            larger: sets with one effect more that were refitted; where one is sure, that counts.
-        """
-        refitted = np.logaddexp.reduce([one.log_weight for one in larger], initial=-np.inf)
-        found = float(refitted - self.log_weight)
-        found = found if found > log_odds(SURE) else -np.inf
-        return min(1.0, self.space.p_value(self.state.seed, found) / OF_CAUSES)
-
-    def p_value(self, larger: Sequence['EffectSet'] = ()) -> float:
+    @property
+    def p_value(self) -> float:
         """The same, or of fields over the parts larger than those of usual sprays.
 
         Two tests are made, each with its share of the significance level (Bonferroni).
         """
         of_size = self.space.p_value_of_size(self.state.seed) / (1.0 - OF_CAUSES)
-        return min(self.p_value_of_causes(larger), of_size)
+        return min(self.p_value_of_causes, of_size)
 
     @cached_property
     def log_weight(self) -> float:
@@ -232,49 +226,14 @@ class Search:
         """What the readings can show beside the model as it is."""
         return testability(self.nothing.space.central, self.state.seed)
 
-    def with_effect(
-        self, parent: EffectSet, name: str, others: Sequence[DepositionModel] = ()
-    ) -> EffectSet:
-        """A set with one effect more, whose first amplitudes are those of its law alone.
-
-        Args:
-            parent: the set without it. name: id of the effect.
-            others: models whose patterns are starts of the fit, too.
-        """
+    def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
+        """A set with one effect more, whose first amplitudes are those of its law alone."""
         names = parent.names | {name}
         if names not in self._tried:
             self._tried.add(names)
             effects = parent.effects | {name: parent.space.by_law(name)}
-            self._refitted(effects, parent, (*self._patterns, *others))
+            self._refitted(effects, parent, self._patterns)
         return self._trials[names]
-
-    def larger(self, parent: EffectSet) -> list[EffectSet]:
-        """Sets with one effect more than another: those proposed, and others that were tried."""
-        for name in parent.proposed:
-            self.with_effect(parent, name)
-        return [
-            trial
-            for names, trial in self._trials.items()
-            if names > parent.names and len(names) == len(parent.names) + 1
-        ]
-
-    @cached_property
-    def singles(self) -> list[EffectSet]:
-        """Single effects, refitted from the pattern in which the evidence of each is highest.
-
-        Readings often allow several patterns, and a law may show beside one of them alone.
-        """
-        state, found = self.state, dict[str, tuple[float, DepositionModel]]()
-        for fit in (self.nothing.fit, *state.fit.elsewhere):
-            discrepancy = self.nothing.best.null.discrepancy
-            null = NullModel.around(fit, state.study.nuisance, discrepancy=discrepancy)
-            laws = [*of_effects(state.study, fit, state.candidates)]
-            of_null = float(null.log_evidence(null.deviation[:, np.newaxis], state.freedom)[0])
-            for name, gain in EffectEvidence(null, laws, state.freedom).by_cause.items():
-                if name not in found or of_null + gain > found[name][0]:
-                    found[name] = of_null + gain, fit.model
-        best = sorted(found, key=lambda name: -found[name][0])[:SINGLES]
-        return [self.with_effect(self.nothing, name, [found[name][1]]) for name in best]
 
     def without(self, trial: EffectSet, *names: str) -> EffectSet:
         """A set with some effects less, refitted from where the larger one has its pattern.
@@ -305,7 +264,9 @@ class Search:
         here = self._near_best()
         while True:
             room = len(here.names) < MOST_EFFECTS
-            stage = SearchStage(here, self.larger(here) if room else [])
+            stage = SearchStage(
+                here, [self.with_effect(here, name) for name in here.proposed if room]
+            )
             again = self._in_another_pattern(stage)
             if again is not here:
                 here = again
@@ -323,7 +284,8 @@ class Search:
         deviations of its footprint with it. All sets that are compared have the same.
         """
         nothing = self.nothing
-        best = max(self.singles, key=lambda one: one.log_weight, default=nothing)
+        tried = [self.with_effect(nothing, name) for name in nothing.proposed]
+        best = max(tried, key=lambda one: one.log_weight, default=nothing)
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
         others = self.state.fitted_with([*best.effects.values()], self.state.start, starts=STARTS)
@@ -348,10 +310,13 @@ class Search:
 
     def beside(self, trial: EffectSet) -> dict[str, float]:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
+        for name in trial.proposed:
+            self.with_effect(trial, name)
         weights = {
             name: larger.log_weight
-            for larger in self.larger(trial)
-            for name in larger.names - trial.names
+            for names, larger in self._trials.items()
+            if names > trial.names and len(names) == len(trial.names) + 1
+            for name in names - trial.names
         }
         without = trial.log_weight, trial.log_weight_unknown
         shares = softmax([*without, *weights.values()])[len(without) :]
@@ -380,9 +345,8 @@ class Search:
         None could whose model is less probable than the one without any.
         """
         others = self.without(trial, name)
-        self.with_effect(others, name)
-        larger = self.larger(others)
-        tried = {rival: one for one in larger for rival in one.names - others.names}
+        rivals = dict.fromkeys((name, *others.proposed))
+        tried = {rival: self.with_effect(others, rival) for rival in rivals}
         weights = {rival: one.log_weight for rival, one in tried.items()}
         found = sorted(weights, key=lambda cause: -weights[cause])
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]

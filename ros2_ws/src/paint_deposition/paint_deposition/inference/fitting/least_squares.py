@@ -25,8 +25,6 @@ CANDIDATES_PER_START = 8
 # Steps of the first search from each start; the number of best ones that are refined.
 SCREENING_STEPS = 6
 REFINED_STARTS = 4
-# Two fits differ if one entry does by this many prior standard deviations.
-DIFFERS = 0.5
 MOST_STEPS = 60
 # Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
 EVENNESS = 0.05
@@ -55,8 +53,6 @@ class Fit:
     # (P, P) covariance of the discrepancy, which the fit allowed for, or None if it did
     # not.
     discrepancy: np.ndarray | None = None
-    # The same model in other patterns, where another start led to one that fits less well.
-    elsewhere: tuple['Fit', ...] = ()
 
     @cached_property
     def marginal(self) -> 'Fit':
@@ -131,13 +127,10 @@ def fit_readings(
         rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
         rough.sort(key=lambda result: result.cost)
         candidates = [result.x for result in rough[: REFINED_STARTS if starts > 1 else 1]]
-    found = problem.differing([problem.search(start, MOST_STEPS) for start in candidates])
-    data = forward, measured_um, sigma_um, parameters
-    best, *elsewhere = (
-        replace(fit_at(*data, result.x, nuisance, discrepancy), converged=bool(result.status > 0))
-        for result in found
-    )
-    return replace(best, elsewhere=tuple(elsewhere))
+    found = [problem.search(start, MOST_STEPS) for start in candidates]
+    best = min(found, key=lambda result: result.cost)
+    fit = fit_at(forward, measured_um, sigma_um, parameters, best.x, nuisance, discrepancy)
+    return replace(fit, converged=bool(best.status > 0))
 
 
 def fit_at(
@@ -299,15 +292,6 @@ class _Problem:
             found[k2] = centre[row] / (ring[row] + centre[row])
         found[[COS, SIN]] = solved[0, 2:] / ring[0]
         return np.clip(found, self.low, self.high)
-
-    def differing(self, results: Sequence[OptimizeResult]) -> list[OptimizeResult]:
-        """Those that differ from every better one, best first."""
-        found: list[OptimizeResult] = []
-        for result in sorted(results, key=lambda one: one.cost):
-            away = [np.abs(result.x - better.x) / self.prior.width for better in found]
-            if all(one.max() > DIFFERS for one in away):
-                found.append(result)
-        return found
 
     def search(self, start: np.ndarray, most_steps: int) -> OptimizeResult:
         margin = 1e-9 * (self.high - self.low)
