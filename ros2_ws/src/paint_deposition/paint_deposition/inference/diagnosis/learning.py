@@ -6,6 +6,7 @@ and kept only if they improve the prediction of readings left out.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 
 import numpy as np
 
@@ -26,7 +27,6 @@ from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.residuals import root_mean_square
 
 MOST_LAWS = 2
 # Degree of the polynomials in the ranks of a covariate.
@@ -151,29 +151,22 @@ class LeftOut:
         key = without, patches
         if key not in self._known:
             study = self.stages[0].here.state.study
-            folds = study.patches() if patches else study.folds()
-            self._known[key] = self._errors_um(folds, without)
+            self._known[key] = study.errors_left_out_um(partial(self._predicted, without), patches)
         return self._known[key]
 
-    def _errors_um(self, folds: np.ndarray, without: frozenset[str]) -> np.ndarray:
+    def _predicted(self, without: frozenset[str], out: np.ndarray) -> np.ndarray:
+        """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
         state = self.stages[0].here.state
         options = [option for option in self.options if option.learns not in without]
-        predicted_um = np.empty((MOST_LAWS + 1, len(folds)))
-        for fold in np.unique(folds):
-            out = folds == fold
-            found = _found_without(self.stages, out)
-            nulls = NullModels.around(found, found.fit).select(~out)
-            kept = [option.select(~out) for option in options]
-            laws = choose_laws(nulls, kept, state.freedom)
-            learned = [size * options[k].columns for k, size in laws]
-            for count in range(MOST_LAWS + 1):
-                if count <= len(learned):
-                    free = np.hstack(learned[:count]) if count else None
-                    without_um = state.study.predicted_without_um(found.fit, out, free)
-                predicted_um[count, out] = without_um[out]
-        return np.array(
-            [root_mean_square(state.study.measured_um - each) for each in predicted_um]
-        )
+        found = _found_without(self.stages, out)
+        nulls = NullModels.around(found, found.fit).select(~out)
+        laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
+        learned = [size * options[k].columns for k, size in laws]
+        films_um = [state.study.predicted_without_um(found.fit, out)]
+        for count in range(1, len(learned) + 1):
+            free = np.hstack(learned[:count])
+            films_um.append(state.study.predicted_without_um(found.fit, out, free))
+        return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
 
 
 def _found_without(stages: Sequence[SearchStage], out: np.ndarray) -> EffectSet:

@@ -28,7 +28,6 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import root_mean_square
 
 
 @on_one_thread
@@ -149,13 +148,11 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
 
 def _holdout_um(state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]) -> float:
     """Error on points left out [um], the law's kind, length and size chosen without them."""
-    folds = state.study.folds()
-    predicted_um = np.empty(len(folds))
-    for fold in np.unique(folds):
-        out = folds == fold
+
+    def without(out: np.ndarray) -> np.ndarray:
         kept = [explanation.select(~out) for explanation in options]
         weights = _log_bayes_factors(state, nulls.select(~out), kept)
         explanation, size = _best(options, weights)
-        free = size * explanation.columns
-        predicted_um[out] = state.study.predicted_without_um(state.fit, out, free)[out]
-    return root_mean_square(state.study.measured_um - predicted_um)
+        return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
+
+    return float(state.study.errors_left_out_um(without))

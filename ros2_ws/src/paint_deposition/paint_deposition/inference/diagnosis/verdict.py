@@ -4,10 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, Literal
-
-import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -25,7 +23,6 @@ from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.residuals import (
     beyond_noise_um,
     is_worse,
-    root_mean_square,
 )
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
@@ -117,11 +114,8 @@ class Step:
                 made without them, too [um]; default: if the model was refitted without them.
         """
         if holdout_um is None:
-            predicted_um, folds = np.empty(len(study)), study.folds()
-            for fold in np.unique(folds):
-                out = folds == fold
-                predicted_um[out] = study.predicted_without_um(fit, out)[out]
-            holdout_um = root_mean_square(study.measured_um - predicted_um)
+            without = partial(study.predicted_without_um, fit)
+            holdout_um = float(study.errors_left_out_um(without))
         return Step(added, fit, study.residuals(fit.predicted_um).rmse_um, holdout_um)
 
 

@@ -1,6 +1,6 @@
 """A campaign prepared for inference: point means, noise, blocks and forward model."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -248,6 +248,24 @@ class Study:
         )  # fmt: skip
         amounts = found.amplitudes[0][:count]
         return found.predicted_um + self.sigma_um * (own @ amounts)
+
+    def errors_left_out_um(
+        self, predict: Callable[[np.ndarray], np.ndarray], patches: bool = False
+    ) -> np.ndarray:
+        """(...) root mean square errors on parts that are left out in turn [um].
+
+        Args:
+            predict: gives (..., P) films by models that were made without some readings, (P,)
+                bool [um].
+            patches: leave out patches of parts, even where there are several parts.
+        """
+        folds = self.patches() if patches else self.folds()
+        squares_um2 = 0.0
+        for fold in np.unique(folds):
+            out = folds == fold
+            away_um = (self.measured_um - predict(out))[..., out]
+            squares_um2 = squares_um2 + np.sum(away_um**2, axis=-1)
+        return np.sqrt(squares_um2 / len(self))
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
