@@ -103,7 +103,9 @@ def contenders_of(
     if not names:
         return ()
     study, fit = diagnosis.study, diagnosis.history[-1].fit
-    rest = tuple(effect for effect in fit.model.effects if effect.id not in names)
+    # Laws that were learned beside one of them would hide what tells them apart.
+    left_out = {*names, *(name for name in diagnosis.accepted if name not in library)}
+    rest = tuple(effect for effect in fit.model.effects if effect.id not in left_out)
     without = fit.model.model_copy(update={'effects': rest})
     freedom = study.noise.degrees_of_freedom
 
