@@ -1,9 +1,9 @@
-"""How often the diagnosis is right, on campaigns of three worlds with hidden causes.
+"""How often the diagnosis is right, on campaigns of two worlds with hidden causes.
 
-The droplet shop, the world of measured sprays and the world of drops in a jet share no law with
-the package or with each other. Each campaign is painted once and kept; each diagnosis is a line of
-the results, so that a run can be cut off and taken up again. After a change of the diagnosis give
-another file of results.
+The droplet shop and the world of measured sprays share no law with the package or with each
+other. Each campaign is painted once and kept; each diagnosis is a line of the results, so that a
+run can be cut off and taken up again. After a change of the diagnosis give another file of
+results.
 """
 
 import ast
@@ -40,7 +40,6 @@ from worlds.record import KINDS, Painted  # noqa: E402
 WORLDS = {
     'droplets': 'worlds.droplets',
     'semi_real': 'worlds.semi_real',
-    'jet': 'worlds.jet',
 }
 PAINTED = ROOT / 'runs' / 'bench-diagnosis'
 # Constants of the diagnosis that have another value in this run, for its processes.
@@ -206,9 +205,9 @@ def main(
 ) -> None:
     """Score the diagnosis on campaigns with hidden causes.
 
-    Worlds: droplets (traced droplets), semi_real (measured footprints and noise; needs the tables
-    beside the repository) and jet (drops in an air jet). Results of an earlier run in the same
-    file count as done: give another file after a change of the diagnosis.
+    Worlds: droplets (traced droplets) and semi_real (measured footprints and noise; needs the
+    tables beside the repository). Results of an earlier run in the same file count as done: give
+    another file after a change of the diagnosis.
     """
     chosen = {'generator': (generators.split(','), WORLDS), 'kind': (kinds.split(','), SHARES)}
     for what, (names, known) in chosen.items():

@@ -19,7 +19,7 @@ from benchmarks.scores import (
 
 def result(case, **fields):
     return {
-        'case': case, 'world': 'jet', 'unseen': [2.0, 1.1], 'kind': 'effect',
+        'case': case, 'world': 'droplets', 'unseen': [2.0, 1.1], 'kind': 'effect',
         'hidden': ['edge_build'], 'verdict': 'effect_missing', 'accepted': [], 'classes': [],
         'strength': 10.0, 'strengths': [10.0], 'readings': 100, 'unknown': None, 'amounts': [],
         'seconds': 3.0, 'facts': {'shape': 'round', 'noise_from': 'stated'},

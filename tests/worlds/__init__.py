@@ -1,5 +1,5 @@
-"""Worlds in which campaigns are painted to judge a diagnosis; none shares a law with another.
+"""Worlds in which campaigns are painted to judge a diagnosis.
 
-`semi_real` paints with measured footprints, remainders and noise, `jet` with drops in an air jet.
-Neither imports the package or the droplet shop's laws. `record` is what both hand over.
+`droplets` are those of the virtual paint shop; `semi_real` paints with measured footprints,
+remainders and noise, and shares no law with it or the package. `record` is what both hand over.
 """

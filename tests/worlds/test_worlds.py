@@ -8,7 +8,7 @@ import pytest
 import paint_deposition as pd
 from virtual_paint_shop.cases import draw_case
 from virtual_paint_shop.gauge import GaugeNoise
-from worlds import droplets, jet, jet_drops, semi_real
+from worlds import droplets, semi_real
 from worlds.record import KINDS, detectability
 
 WIDTH_M, FLOW = 0.09, 1.5
@@ -20,13 +20,10 @@ projection: {{model_plane_m: 0.3, emission_offset_m: 0.05}}
 measured = pytest.mark.skipif(
     not semi_real.available(), reason='measurements kept beside the repository'
 )
-worlds = pytest.mark.parametrize('world', [pytest.param(semi_real, marks=measured), jet])
 
 
-def gaussian(world):
+def gaussian():
     """A pattern of one Gaussian, for which eq. (1) is exact."""
-    if world is jet:
-        return {'bell': jet.Bell(FLOW, np.zeros(5), np.full(5, WIDTH_M))}
     line = np.linspace(-semi_real.HALF_M, semi_real.HALF_M, semi_real.GRID)
     u, v = np.meshgrid(line, line)
     table = np.exp(-(u**2 + v**2) / (2 * WIDTH_M**2)) / (2 * np.pi * WIDTH_M**2)
@@ -34,10 +31,10 @@ def gaussian(world):
 
 
 @pytest.mark.slow
-@worlds
-def test_with_nothing_hidden_the_film_follows_eq_2(world, tmp_path):
+@measured
+def test_with_nothing_hidden_the_film_follows_eq_2(tmp_path):
     """Up to each part's own level and its gauge's zero."""
-    painted = world.paint(2, 'clean', **gaussian(world))
+    painted = semi_real.paint(2, 'clean', **gaussian())
     folder = painted.write(tmp_path / 'campaign').parent
     (tmp_path / 'model.yaml').write_text(MODEL)
     for part in painted.parts:
@@ -54,9 +51,9 @@ def test_with_nothing_hidden_the_film_follows_eq_2(world, tmp_path):
 
 
 @pytest.mark.slow
-@worlds
-def test_a_seed_gives_one_campaign_of_its_kind(world):
-    campaigns = {kind: world.paint(3, kind) for kind in KINDS}
+@measured
+def test_a_seed_gives_one_campaign_of_its_kind():
+    campaigns = {kind: semi_real.paint(3, kind) for kind in KINDS}
     for kind, one in campaigns.items():
         assert len(one.hidden) == {'clean': 0, 'pair': 2}.get(kind, 1)
         assert (kind in ('unknown', 'footprint')) == any(':' in name for name in one.hidden)
@@ -67,19 +64,14 @@ def test_a_seed_gives_one_campaign_of_its_kind(world):
         if kind in ('effect', 'pair', 'unknown'):
             assert len(one.strengths) == len(one.hidden)
             assert one.strength > 0.0
-    again, other = (world.paint(seed, 'clean').parts[0].thickness_um for seed in (3, 4))
+    again, other = (semi_real.paint(seed, 'clean').parts[0].thickness_um for seed in (3, 4))
     np.testing.assert_array_equal(campaigns['clean'].parts[0].thickness_um, again)
     assert again[:5].tolist() != other[:5].tolist()
 
 
-def readings_of(world):
+def readings_of():
     """What a gauge shows at points of one curved part whose gun opens near its edges [um]."""
     rng = np.random.default_rng(5)
-    if world is jet:
-        bell, plate = jet.draw_bell(rng), jet.draw_plate(rng, True)
-        run = jet.draw_run(rng, plate, bell, 20.0, 0.2, False, 0.3, True)
-        x, z = (rng.uniform(-1.0, 1.0, (30, 2)) * plate.half_m).T
-        return lambda hidden: jet.shown_um(plate, run, bell, hidden, x, z)
     pattern, sheet = semi_real.draw_pattern(rng, 'fan', 0.15), semi_real.draw_sheet(rng, True)
     job = semi_real.draw_job(rng, sheet, pattern, 20.0, 0.3, 0.2, True)
     x, z = (rng.uniform([-0.5, 0.0], [0.5, 1.0], (30, 2)) * [sheet.width_m, sheet.height_m]).T
@@ -87,12 +79,12 @@ def readings_of(world):
 
 
 @pytest.mark.slow
-@worlds
-def test_every_effect_changes_the_readings(world):
-    shown, rng = readings_of(world), np.random.default_rng(6)
+@measured
+def test_every_effect_changes_the_readings():
+    shown, rng = readings_of(), np.random.default_rng(6)
     plain = shown({})
-    for name in [*world.EFFECTS, *(f'unknown:{name}' for name in world.UNKNOWN)]:
-        change = shown({name: world.draw_hidden(rng, name)}) - plain
+    for name in [*semi_real.EFFECTS, *(f'unknown:{name}' for name in semi_real.UNKNOWN)]:
+        change = shown({name: semi_real.draw_hidden(rng, name)}) - plain
         assert np.abs(change).max() > 0.1, name
 
 
@@ -103,16 +95,6 @@ def test_remainders_have_the_size_of_the_measured_ones():
     assert 0.005 < np.median([rest.std() for rest in remainders]) < 0.05
     neighbours = [np.corrcoef(rest[1:], rest[:-1])[0, 1] for rest in remainders]
     assert np.mean(neighbours) > 0.2
-
-
-def test_small_drops_go_with_the_wind_and_heavy_ones_do_not():
-    time, aside = jet_drops.flights()
-    assert (np.diff(aside, axis=0) < 0.0).all()
-    assert (np.diff(time, axis=1) > 0.0).all()
-    assert (np.diff(aside, axis=1) > 0.0).all()
-    near, far = jet_drops.arriving(np.array([0.2, 0.4]), 0.3).T
-    assert (near >= far).all()
-    assert (near[0] - far[0]) > (near[-1] - far[-1])
 
 
 def test_a_mark_that_what_is_free_explains_is_not_detectable():
