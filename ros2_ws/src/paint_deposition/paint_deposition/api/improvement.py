@@ -19,13 +19,13 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.films import simulated
+from paint_deposition.planning.films import evenness, simulated
 from paint_deposition.planning.improvement.improvement import (
     DEFAULT_TOLERANCE,
     FilmSummary,
     Improvement,
 )
-from paint_deposition.planning.improvement.programme import Programme, moves_of
+from paint_deposition.planning.improvement.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.improvement.retiming import retime_for_evenness
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.surface_map import painted_side, pass_axes
@@ -84,6 +84,8 @@ def improve(
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, original = seen.surface, Programme.of(trajectory)
+    if not request.spray_turns:
+        original = closed_beside(original, surface)
     begin = None
     point_zones = zones.on(surface) if zones else None
     if robot:
@@ -97,6 +99,9 @@ def improve(
         tool_z = seen.path.rotation[seen.path.flow > 0.0][:, :, 2]
         target_region = _target_region(surface, film_um, tool_z)
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
+    if sought.target_um is None:
+        mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
+        sought = replace(sought, target_um=mean_um)
     models = [model, *rivals]
     if posterior is not None:
         models += draw_models(model, posterior, DRAWS, seed)

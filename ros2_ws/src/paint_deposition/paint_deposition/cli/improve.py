@@ -89,7 +89,7 @@ def improve_command(
             result, made_from=made_from, part_pose=motion.get('part_pose'),
             paint_moves=paint_moves,
         )  # fmt: skip
-    options.print_all('note', [*result.surface.notes, *recorded.notes])
+    options.print_all('note', [*result.surface.notes, *recorded.notes, *result.notes])
     options.print_all('warning', result.warnings)
     results.print(_lines(result), model=chosen.words)
 

@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation, Slerp
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
 from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
@@ -118,8 +119,8 @@ class RobotCell:
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
-        opening = _openings(trajectory, times_s)
-        shares = pace.shares(opening)
+        spray_pass = _passes(trajectory, times_s)
+        shares = pace.shares(spray_pass)
         reached_s, seconds, driven, speeds = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
@@ -134,7 +135,7 @@ class RobotCell:
             quaternions_xyzw=rolled.as_quat(),
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
-        limits = pace.limits(opening, shares)
+        limits = pace.limits(spray_pass, shares)
         return Drive(arm, slowed, seconds, driven, speeds, limits, float(values[:, -1].min()))
 
     def allowed_speeds(
@@ -266,16 +267,16 @@ def _times(trajectory: Trajectory) -> np.ndarray:
     return np.linspace(0.0, trajectory.duration_s, count)
 
 
-def _openings(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
-    """(N,) number of the opening of the gun in which each time lies, -1 for none."""
-    found = np.full(len(times_s), -1)
-    stamps_s = 1e-9 * (trajectory.trigger_stamps_ns - trajectory.stamps_ns[0])
-    ends_s, number = np.append(stamps_s, times_s[-1]), 0
-    for k, flow in enumerate(trajectory.trigger_flow):
-        if flow > 0.0:
-            found[(times_s >= ends_s[k] - STEP_S) & (times_s <= ends_s[k + 1] + STEP_S)] = number
-            number += 1
-    return found
+def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
+    """(N,) number of the pass sprayed at each time, as a simulation counts; -1 for none."""
+    path, _ = spray_path(trajectory)
+    sprayed = path.select(path.flow > 0.0)
+    if not len(sprayed):
+        return np.full(len(times_s), -1)
+    at_s = 1e-9 * (sprayed.stamp_ns - trajectory.stamps_ns[0])
+    nearest = np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), times_s)
+    near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
+    return np.where(near, sprayed.spray_pass[nearest], -1)
 
 
 def _words(place_m: np.ndarray) -> str:

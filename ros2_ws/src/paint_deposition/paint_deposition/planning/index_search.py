@@ -185,9 +185,7 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
             f'{tolerance:g}; the closest is {closest.sigma_n:.4f} at {closest.index_m:.3f} m: '
             'allow that much, or search a smaller index'
         )
-    low, high = windows[-1]
-    inside = [m for m in minima if low <= m.index_m <= high]
-    if inside:
-        return min(inside, key=lambda m: m.sigma_n)
-    middle = 0.5 * (low + high)
-    return Minimum(middle, curve.parallel.sigma_n(middle))
+    low, high = max(windows, key=lambda window: window[1] - window[0])
+    ends = [Minimum(end, curve.parallel.sigma_n(end)) for end in (low, high)]
+    found = [m for m in minima if low <= m.index_m <= high] or ends
+    return min(found, key=lambda m: m.sigma_n)

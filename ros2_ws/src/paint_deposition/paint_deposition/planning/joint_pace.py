@@ -49,15 +49,18 @@ class JointPace:
     fastest: np.ndarray
     most: np.ndarray
 
-    def shares(self, opening: np.ndarray) -> np.ndarray:
+    def shares(self, spray_pass: np.ndarray) -> np.ndarray:
         """(N,) share of the planned speed at the times, the greatest that the joints allow.
+
+        Of each time (N,) the number of its pass is given, -1 between passes.
 
         With b the square of the share the joints' accelerations are linear in b and its slope
         (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
         share, or its film would be uneven.
         """
         count, step = len(self.times_s), self.times_s[1]
-        column = np.where(opening >= 0, opening, opening.max() + 1 + np.cumsum(opening < 0))
+        outside = spray_pass < 0
+        column = np.where(outside, spray_pass.max() + 1 + np.cumsum(outside), spray_pass)
         # The neighbours count too: the share changes evenly between the times.
         speed = maximum_filter1d(np.abs(self.joints(self.times_s, 1)), 3, axis=0) / (1.0 - MARGIN)
         highest = np.minimum(1.0, (self.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
@@ -111,13 +114,13 @@ class JointPace:
         slower = max(1.0, float(too_fast), math.sqrt((np.abs(rate) / self.most).max()))
         return slower * reached_s, slower * seconds, joints, slope * share / slower
 
-    def limits(self, opening: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
+    def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
         """Of the passes that are slower than planned, the joint that makes them so."""
         slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
         bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
         found = []
-        for number in range(opening.max() + 1):
-            inside = opening == number
+        for number in np.unique(spray_pass[spray_pass >= 0]).tolist():
+            inside = spray_pass == number
             share = float(shares[inside].min())
             if share > 1.0 - TOLD:
                 continue

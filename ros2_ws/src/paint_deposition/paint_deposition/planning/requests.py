@@ -218,6 +218,11 @@ class ImproveRequest(Limits):
         0.3, 'The gun opens later and closes earlier by this much at most [m].',
         '--trigger-cut', least=0.0,
     )  # fmt: skip
+    spray_turns: bool = given(
+        False,
+        'Keep spraying in turns beside the part where the programme does; default: the gun is '
+        'closed there.',
+    )
     film_min_um: float | None = given(None, 'Least film accepted anywhere [µm].', above=0.0)
     film_max_um: float | None = given(None, 'Greatest film accepted anywhere [µm].', above=0.0)
 

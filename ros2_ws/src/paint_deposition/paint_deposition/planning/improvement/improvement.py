@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -18,7 +17,12 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.films import evenness
 from paint_deposition.planning.improvement.nodes import BEND, JOINT, LEAD, ROBOT
-from paint_deposition.planning.improvement.programme import Programme, speed_along
+from paint_deposition.planning.improvement.programme import (
+    STANDING_M,
+    Programme,
+    Strokes,
+    speed_along,
+)
 from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.improvement.retiming import Retiming
 from paint_deposition.planning.requests import ImproveRequest
@@ -95,7 +99,8 @@ class FilmSummary:
 class PassChange:
     """What changes in a pass, in the robot's terms."""
 
-    number: int  # of the pass, from 1
+    number: int  # of the pass, from 1, as a simulation counts
+    place_m: tuple[float, float]  # travel of the TCP at its begin and at its end
     speed_m_per_s: tuple[float, float]  # mean speeds before and after
     # After.
     slowest_m_per_s: float
@@ -165,6 +170,19 @@ class Improvement:
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the user on what was done unasked."""
+        sprayed, closed = (
+            Programme.of(self.original).openings, self.retiming.original.openings
+        )  # fmt: skip
+        if sprayed == closed:
+            return ()
+        return (
+            'the programme sprays through turns beside the part; the gun is closed there now '
+            '(--spray-turns keeps it open)',
+        )
 
     @property
     def target_region(self) -> np.ndarray:
@@ -306,27 +324,37 @@ class Improvement:
 
 
 def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
-    """The changes of all passes; a pass is a straight stretch with the gun open."""
-    path, _ = spray_path(original.trajectory())
-    begins = 1 + np.flatnonzero(np.diff(path.stroke))
-    turns = original.travel_at_m(path.stamp_ns[begins]) - path.from_turn_m[begins]
+    """The changes of all passes, numbered as a simulation of the improved programme does."""
+    strokes = Strokes.of(improved)
+    passes = np.flatnonzero(strokes.begins_pass)
+    given = Programme.of(original.original).openings
+    opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
+    pairs = list(zip(original.openings, improved.openings, strict=True))
     found: list[PassChange] = []
-    for before, after in zip(original.openings, improved.openings, strict=True):
-        inside = turns[(turns > after.on_m + LEAST_PASS_M) & (turns < after.off_m - LEAST_PASS_M)]
-        ends = [after.on_m, *inside.tolist(), after.off_m]
-        for first, last in pairwise(ends):
-            earlier = before.on_m - after.on_m if first == after.on_m else 0.0
-            later = after.off_m - before.off_m if last == after.off_m else 0.0
-            whole = np.array([first, last])
-            old, new = (float(speed_along(p, whole)[0]) for p in (original, improved))
-            speed = speed_along(improved, np.linspace(first, last, SAMPLES + 1))
-            found.append(
-                PassChange(
-                    len(found) + 1,
-                    (old, new),
-                    float(speed.min()), float(speed.max()), earlier, later,
-                    earlier / float(speed[0]), later / float(speed[-1]),
-                    (before.flow, after.flow),
-                )
-            )  # fmt: skip
+    for begin, end, number in zip(
+        strokes.ends_m[passes], strokes.ends_m[passes + 1], strokes.spray_pass[passes], strict=True
+    ):
+        own = [
+            (before, after) for before, after in pairs
+            if min(after.off_m, end) - max(after.on_m, begin) > LEAST_PASS_M
+        ]  # fmt: skip
+        if not own:
+            continue
+        (first_before, first), (last_before, last) = own[0], own[-1]
+        on, off = max(first.on_m, begin), min(last.off_m, end)
+        inside = np.array([on + STANDING_M, off - STANDING_M])  # without a stay at either end
+        # A turn that the programme sprays through has no trigger that could be earlier or later.
+        earlier = first_before.on_m - on if first_before.on_m in opened_m else 0.0
+        later = off - last_before.off_m if last_before.off_m in closed_m else 0.0
+        old, new = (float(speed_along(p, inside)[0]) for p in (original, improved))
+        speed = speed_along(improved, np.linspace(*inside, SAMPLES + 1))
+        found.append(
+            PassChange(
+                int(number) + 1, (on, off),
+                (old, new),
+                float(speed.min()), float(speed.max()), earlier, later,
+                earlier / float(speed[0]), later / float(speed[-1]),
+                (first_before.flow, first.flow),
+            )
+        )  # fmt: skip
     return tuple(found)

@@ -231,10 +231,12 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     at = programme.positions_at_m(places)
     seconds = np.abs(np.diff(programme.seconds_at(places)))
     speed = np.diff(way) / np.maximum(seconds, 1e-9)
-    inner = from_m - side * way[1]
-    own = way[1] / max(float(np.ptp(programme.seconds_at(np.array([inner, from_m])))), 1e-9)
+    # The opening may end in a turn: it runs on straight as seen from inside.
+    inside = np.array([from_m - side * way[1], from_m])
+    own = way[1] / max(float(np.ptp(programme.seconds_at(inside))), 1e-9)
     good = speed >= STEADY * own
-    good &= np.linalg.norm(at[1:] - at[0], axis=1) >= STRAIGHT * way[1:]
+    off = np.linalg.norm(at[1:] - programme.positions_at_m(inside[:1]), axis=1)
+    good &= off >= STRAIGHT * (way[1:] + way[1])
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 

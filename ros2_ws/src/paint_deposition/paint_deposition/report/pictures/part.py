@@ -242,19 +242,25 @@ def draw_tool_path(
     """Draw passes as lines with number and arrows, the way between them dashed, within corners."""
     on = spray.flow > 0.0
     apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
-    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (apart_s > 1e-3))
-    number = 0
+    # Coats follow each other in one path: their clocks begin anew.
+    breaks = 1 + np.flatnonzero(
+        (on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0) | (np.abs(apart_s) > 1e-3)
+    )
+    drawn: set[int] = set()
     for rows in np.split(np.arange(len(spray)), breaks):
         line = view.flat(spray.position_m[rows])
         if not on[rows].any():
             axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
             continue
-        number += 1
+        number = int(spray.spray_pass[rows[0]]) + 1
         axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)
         room = 0.02 * (high - low).max()
         shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
-        if len(shown) > 1:
-            _draw_arrows(axes, shown, (high - low).max() / ARROWS_A_WIDTH)
+        if len(shown) < 2:
+            continue
+        _draw_arrows(axes, shown, (high - low).max() / ARROWS_A_WIDTH)
+        if number not in drawn:
+            drawn.add(number)
             axes.annotate(
                 str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
                 bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},

@@ -9,8 +9,8 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement
-from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
+from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement, PassChange
+from paint_deposition.planning.improvement.programme import STANDING_M, speed_along
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.chart import (
@@ -108,9 +108,9 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
     low, high = _window(part, result)
-    openings = result.retiming.programme.openings[:MOST_CHARTS]
-    columns = min(len(openings), 4)
-    rows = math.ceil(len(openings) / columns)
+    passes = result.changes[:MOST_CHARTS]
+    columns = min(len(passes), 4)
+    rows = math.ceil(len(passes) / columns)
     width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
     above, below = height + AROUND_IN[1], rows * CHART_IN[1]
     figure = new_figure(max(2.0 * width + AROUND_IN[0], 10.0), above + below)
@@ -136,11 +136,12 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         loc='outside lower right', frameon=False, fontsize=8.5, ncols=2,
     )  # fmt: skip
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
-    for chart in charts.ravel()[len(openings) :]:
+    for chart in charts.ravel()[len(passes) :]:
         chart.set_axis_off()
-    programmes = result.retiming.original, result.retiming.programme
-    for number, chart in enumerate(charts.ravel()[: len(openings)]):
-        _draw_speeds(chart, number, programmes)
+    for chart, change in zip(charts.ravel(), passes, strict=False):
+        _draw_speeds(chart, change, result)
+    for chart in charts[:, 0]:
+        chart.set_ylabel('speed [m/s]', color=MUTED, fontsize=9.0)
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
     legend(charts[0, 0], loc='best')
     return save_picture(figure, path)
@@ -182,18 +183,17 @@ def _title(name: str, laid: FilmSummary) -> str:
     )
 
 
-def _draw_speeds(axes: Axes, number: int, programmes: tuple[Programme, Programme]) -> None:
-    """The speeds along an opening of the gun, over the path from where it first opened."""
-    openings: list[Opening] = [programme.openings[number] for programme in programmes]
-    origin = openings[0].on_m
-    for programme, opening, colour, name in zip(
-        programmes, openings, (BEFORE, ACCENT), ('before', 'after'), strict=True
+def _draw_speeds(axes: Axes, change: PassChange, result: Improvement) -> None:
+    """The speeds along a pass, before and after."""
+    begin, end = change.place_m
+    places = np.linspace(begin + STANDING_M, end - STANDING_M, SAMPLES + 1)
+    middle = 0.5 * (places[1:] + places[:-1]) - begin
+    programmes = result.retiming.original, result.retiming.programme
+    for programme, colour, name in zip(
+        programmes, (BEFORE, ACCENT), ('before', 'after'), strict=True
     ):
-        places = np.linspace(opening.on_m, opening.off_m, SAMPLES + 1)
-        middle = 0.5 * (places[1:] + places[:-1]) - origin
         axes.plot(middle, speed_along(programme, places), color=colour, linewidth=1.6, label=name)
-    quiet(axes, 'along the pass [m]', 'speed [m/s]' if number % 4 == 0 else '',
-          f'pass {number + 1}', size=9.0)  # fmt: skip
+    quiet(axes, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
 
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:

@@ -20,7 +20,8 @@ from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.files.tool_path import write_tool_path
 from paint_deposition.motion.part_frame import Rigid, moved
-from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.driving import Drive
 
@@ -82,12 +83,9 @@ def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence
 def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
     """A line a move of the TCP: where it ends, how fast, and what the gun does."""
     yield COLUMNS
-    number, was_spraying = 0, False
-    for move in moves:
-        number += move.spraying and not was_spraying
-        was_spraying = move.spraying
+    for number, move in zip(pass_numbers(moves), moves, strict=True):
         yield [
-            max(number, 1),
+            number,
             *(f'{value:.6f}' for value in move.position_m),
             *(f'{value:.8f}' for value in move.quaternion_xyzw),
             f'{move.speed_m_per_s:.6g}',
@@ -95,6 +93,16 @@ def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
             f'{move.flow:.6g}' if move.spraying else 0,
             move.brush,
         ]
+
+
+def pass_numbers(moves: Sequence[Move]) -> list[int]:
+    """Number of the pass on which each move (M,) ends, from 1, as a simulation counts them."""
+    path, _ = spray_path(timed(moves, gun_known=True))
+    steps_m = np.linalg.norm(np.diff([move.position_m for move in moves], axis=0), axis=1)
+    middle_m = np.cumsum(steps_m) - 0.5 * steps_m
+    row = np.searchsorted(np.cumsum(path.dwell_s * path.speed_m_per_s), middle_m)
+    number = path.spray_pass[np.minimum(row, len(path) - 1)]
+    return [1, *np.maximum(number + 1, 1).tolist()]
 
 
 def _joint_table(drive: Drive) -> Iterator[Sequence[object]]:
