@@ -37,14 +37,14 @@ def recommend_command(
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     yield answer.sentence
     for minimum in answer.minima:
-        yield f'minimum: sigma_n {minimum.sigma_n:.4f} at {minimum.index_m:.4f} m'
+        yield f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
     for low, high in answer.windows_m:
-        yield f'within tolerance: {low:.4f} to {high:.4f} m'
+        yield f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'
     if answer.index_drift_m and answer.standoff_drift_m:
         index, standoff = answer.index_drift_m, answer.standoff_drift_m
         yield (
-            f'the index may drift to {index[0]:.3f} and {index[1]:.3f} m, the standoff by '
-            f'{standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
+            f'the index may drift to {1e3 * index[0]:.0f} and {1e3 * index[1]:.0f} mm, the '
+            f'standoff by {standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
         )
     for note in answer.notes:
         yield f'note: {note}'

@@ -182,8 +182,9 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
         closest = min([*minima, curve.best_end], key=lambda m: m.sigma_n)
         raise PlanError(
             f'no index from {curve.index_m[0]:g} to {curve.index_m[-1]:g} m keeps sigma_n within '
-            f'{tolerance:g}; the closest is {closest.sigma_n:.4f} at {closest.index_m:.3f} m: '
-            'allow that much, or search a smaller index'
+            f'{100 * tolerance:g} %; the closest is {100 * closest.sigma_n:.2f} % at '
+            f'{closest.index_m:.3f} m: allow that much (tolerance {1.01 * closest.sigma_n:.2g}), '
+            'or search a smaller index'
         )
     low, high = max(windows, key=lambda window: window[1] - window[0])
     ends = [Minimum(end, curve.parallel.sigma_n(end)) for end in (low, high)]

@@ -122,8 +122,9 @@ def plan_faces(
     sigma_n = found['sigma_n']
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
-            f'no passes on {len(faces)} face(s) keep sigma_n within {request.tolerance:g}; the '
-            f'closest is {sigma_n:.4f}: allow that much, or narrower faces (--face-angle-deg)'
+            f'no passes on {len(faces)} face(s) keep sigma_n within '
+            f'{100 * request.tolerance:g} %; the closest is {100 * sigma_n:.2f} %: '
+            'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
         **found, passes=tuple(planned for face in running for planned in face.passes),

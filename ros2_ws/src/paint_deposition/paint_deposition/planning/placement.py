@@ -61,9 +61,9 @@ def place_passes(
     if not good:
         raise PlanError(
             f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
-            f'sigma_n on this part within {tolerance:g}; the closest is {closest.sigma_n:.4f} '
-            f'with {closest.passes} at {closest.index_m:.3f} m: allow that much, or a smaller '
-            'index'
+            f'sigma_n on this part within {100 * tolerance:g} %; the closest is '
+            f'{100 * closest.sigma_n:.2f} % with {closest.passes} at {closest.index_m:.3f} m: '
+            'allow that much, or a smaller index'
         )
     return good[0]
 

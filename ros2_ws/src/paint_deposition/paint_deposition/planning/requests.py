@@ -61,8 +61,29 @@ class PassRequest(FilmBuild):
         return self
 
 
-class IndexRequest(PassRequest):
-    """An index between parallel passes on a plane."""
+class SpeedLimits(Request):
+    """How fast and how slow the gun may go."""
+
+    speed_min_m_per_s: float = given(
+        0.1, 'Least speed while spraying [m/s].', '--speed-min', above=0.0
+    )
+    speed_max_m_per_s: float = given(
+        1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
+    )
+
+    @model_validator(mode='after')
+    def _speeds_in_order(self) -> 'SpeedLimits':
+        self._require_order('speed_min_m_per_s', 'speed_max_m_per_s')
+        return self
+
+    def _require_order(self, low: str, high: str) -> None:
+        least, most = getattr(self, low), getattr(self, high)
+        if least is not None and most is not None and least > most:
+            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
+
+
+class IndexRequest(SpeedLimits, PassRequest):
+    """An index between parallel passes on a plane, at a speed or at one chosen for a target."""
 
     width_m: float | None = given(
         None, 'Width to paint across the passes [m].', '--width', above=0.0, most=100.0
@@ -91,29 +112,13 @@ class IndexRequest(PassRequest):
         return low, high
 
 
-class Limits(Request):
+class Limits(SpeedLimits):
     """What robot, gun and shop allow while the speeds along a path are chosen."""
 
-    speed_min_m_per_s: float = given(
-        0.1, 'Least speed while spraying [m/s].', '--speed-min', above=0.0
-    )
-    speed_max_m_per_s: float = given(
-        1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
-    )
     acceleration_m_per_s2: float = given(
         2.0, 'Acceleration of the robot along its path, and across it in bends [m/s2].',
         '--acceleration', above=0.0,
     )  # fmt: skip
-
-    @model_validator(mode='after')
-    def _in_order(self) -> 'Limits':
-        self._require_order('speed_min_m_per_s', 'speed_max_m_per_s')
-        return self
-
-    def _require_order(self, low: str, high: str) -> None:
-        least, most = getattr(self, low), getattr(self, high)
-        if least is not None and most is not None and least > most:
-            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
 
 
 class PlanRequest(Limits, PassRequest):
@@ -169,9 +174,12 @@ class PlanRequest(Limits, PassRequest):
         return ImproveRequest(**limits, target_um=target_um, trigger_cut_m=overspray_m, **weights)
 
     def for_plane(self, width_m: float, length_m: float) -> IndexRequest:
-        """The same for a plane of the part's size."""
+        """For a plane of the part's size, at any speed: a part needs another than its plane."""
         shared = {name: getattr(self, name) for name in PassRequest.model_fields}
-        return IndexRequest(**shared, width_m=width_m, length_m=length_m)
+        return IndexRequest(
+            **shared, width_m=width_m, length_m=length_m, speed_min_m_per_s=SLOWEST_M_PER_S,
+            speed_max_m_per_s=FASTEST_M_PER_S,
+        )  # fmt: skip
 
 
 class ImproveRequest(Limits):
