@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
@@ -20,11 +20,12 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.improvement.nodes import Nodes
 from paint_deposition.planning.improvement.programme import Programme
 from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_pass, trajectory_of
-from paint_deposition.planning.requests import PlanRequest
+from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
 from paint_deposition.planning.wanted_film import WantedFilm
 
@@ -71,9 +72,14 @@ def predicted(
         film[region], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target,
         zones=wanted.zones and wanted.zones.select(region),
     )  # fmt: skip
+    whole_part = film_statistics(
+        film, surface.vertex_areas_m2, paint.emitted_cm3, target_um=target,
+        target_tolerance_um=0.1 * target, zones=wanted.zones,
+    )  # fmt: skip
     return {
         'surface': surface, 'model': model, 'request': request, 'wanted': wanted,
         'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,
+        'whole_part': whole_part,
         'sigma_n': evenness(film[region] / wanted.share[region], area)[1],
     }  # fmt: skip
 
@@ -92,9 +98,12 @@ class PlannedFilm:
     film_um: np.ndarray  # (V,) on the refined part
     paint: PaintUsed
     statistics: FilmStatistics  # of the film where one is wanted
+    whole_part: FilmStatistics  # of the film on the whole part
     # Standard deviation over mean there, of the film over its own target, bare metal included.
     sigma_n: float
     drive: Drive | None = None  # of the robot that it was made for
+    contacts: tuple[Contact, ...] = ()  # where gun or spray come too close to the part
+    envelope: GunEnvelope = field(default_factory=GunEnvelope)  # of the gun
 
     @property
     def painted(self) -> np.ndarray:
@@ -106,6 +115,14 @@ class PlannedFilm:
         """Mean film on the painted part, bare metal included [um]."""
         area = self.surface.vertex_areas_m2[self.painted]
         return evenness(self.film_um[self.painted], area)[0]
+
+    @property
+    def region(self) -> str:
+        """Where its figures are taken, in words."""
+        area_m2 = self.surface.vertex_areas_m2[self.painted].sum()
+        return (
+            f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 that are to be painted, by area'
+        )
 
     @property
     def cycle_time_s(self) -> float:
@@ -135,6 +152,7 @@ class PlannedFilm:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
         yield from map(str, self.drive.limits if self.drive else ())
+        yield from map(str, self.contacts)
         yield from self.wanted.doubts(self.statistics)
         at_speed = request.speed_m_per_s and not self.wanted.zones
         if target and at_speed and abs(self.mean_um / target - 1.0) > NEAR:
@@ -162,8 +180,12 @@ class PlannedFilm:
             'cycle_time_s': self.cycle_time_s,
             'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
             'sigma_n': self.sigma_n,
+            'region': self.region,
             'film': self.statistics.to_dict(),
+            'whole_part': self.whole_part.to_dict(),
             'paint': paint_figures(self),
+            'gun': self.envelope.model_dump(),
+            'contacts': [contact.to_dict() for contact in self.contacts],
             'warnings': list(self.warnings),
             'robot': self.drive and self.drive.to_dict(),
         }

@@ -7,6 +7,8 @@ from typing import TypeVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from paint_deposition.errors import PlanError
+from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.films import PlannedFilm, predicted, simulated
 from paint_deposition.planning.improvement.programme import Programme, moves_of
@@ -19,6 +21,7 @@ from paint_deposition.planning.passes import (
 )
 from paint_deposition.planning.placement import Placement, best_placement
 from paint_deposition.planning.plan import INDEX_SHARES, Plan
+from paint_deposition.planning.requests import GunEnvelope
 
 # A further pass must save this share of the cost: neither rounding nor an immeasurable gain
 # decides the number of passes.
@@ -123,6 +126,23 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     wanted = request.improvement(0.0, request.target_um, move_min_m=SHORTEST_MOVE_M)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
     return replace(planned, **found, moves=moves, drive=drive)
+
+
+def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
+    """The plan with the places where gun or spray come too close to the part.
+
+    Raises:
+        PlanError: the gun touches the part, and the request does not allow it.
+    """
+    found = contacts(planned.surface, planned.trajectory, envelope)
+    touched = [contact for contact in found if contact.by_gun]
+    if touched and not planned.request.allow_contact:
+        raise PlanError(
+            f'{max(touched, key=lambda contact: contact.depth_m)}; give a greater standoff_m or '
+            'smoothing_radius_m, another side (outward), or plan it face by face (--faces auto); '
+            'allow_contact keeps it'
+        )
+    return replace(planned, contacts=found, envelope=envelope)
 
 
 def _is_round(planned: PlannedFilm) -> bool:

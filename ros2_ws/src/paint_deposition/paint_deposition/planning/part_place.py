@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.part_frame import Rigid
@@ -32,10 +33,19 @@ class PartPlaces:
     room: np.ndarray
 
     @property
+    def good(self) -> np.ndarray:
+        """(Y, X) bool, places from which the robot is as fast as it can be from any."""
+        return self.speed >= min(1.0, self.speed.max())
+
+    @property
+    def amid(self) -> np.ndarray:
+        """(Y, X) bool, those whose neighbours are good too: no part stands to the millimetre."""
+        return minimum_filter(self.good, 3, mode='nearest')
+
+    @property
     def best(self) -> tuple[int, int]:
-        """Row and column of the place to choose: in the midst of those that are fast enough."""
-        good = self.speed >= min(1.0, self.speed.max())
-        score = np.where(good, self.room, -1.0)
+        """Row and column of the place to choose: amid good ones if it can, with most room."""
+        score = np.where(self.amid if self.amid.any() else self.good, self.room, -1.0)
         return divmod(int(score.argmax()), len(self.x_m))
 
     @property
@@ -61,6 +71,7 @@ class PartPlaces:
             f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
             f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
             f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
+            f'{"" if self.amid[row, column] else ", yet not all places beside it do"}'
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import Contact, contacts
+from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.faces import blend, join_motions, order_faces
 from paint_deposition.planning.films import PlannedFilm, predicted
 from paint_deposition.planning.improvement.programme import Programme, moves_of
@@ -31,14 +31,11 @@ class PartPlan(PlannedFilm):
         faces: sprayed, the largest first.
         margin_m: by how much each face is sprayed less far than its seams.
         sigma_n_unblended: sigma_n without margins, each face for itself.
-        contacts: where gun or spray come too close to the part. envelope: of the gun.
     """
 
     faces: tuple[Face, ...]
     margin_m: float
     sigma_n_unblended: float
-    contacts: tuple[Contact, ...]
-    envelope: GunEnvelope
 
     @property
     def sentence(self) -> str:
@@ -73,8 +70,6 @@ class PartPlan(PlannedFilm):
             'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
-            'gun': self.envelope.model_dump(),
-            'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
 
 
@@ -129,8 +124,7 @@ def plan_faces(
     return PartPlan(
         **found, passes=tuple(planned for face in running for planned in face.passes),
         moves=moves, faces=faces, margin_m=margin_m,
-        sigma_n_unblended=unblended, contacts=contacts(surface, trajectory, envelope),
-        envelope=envelope,
+        sigma_n_unblended=unblended,
     )  # fmt: skip
 
 

@@ -56,12 +56,12 @@ def place_passes(
         if (placement := best_placement(films, extent_m, index_range_m, passes)) is not None
     ]
     closest = min(best, key=lambda placement: placement.sigma_n)
-    limit = SLACK * closest.sigma_n + LEAST_SLACK if tolerance is None else tolerance
+    limit = tolerance or SLACK * closest.sigma_n + LEAST_SLACK
     good = [placement for placement in best if placement.sigma_n <= limit]
     if not good:
         raise PlanError(
             f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
-            f'sigma_n on this part within {100 * tolerance:g} %; the closest is '
+            f'sigma_n on this part within {100 * limit:g} %; the closest is '
             f'{100 * closest.sigma_n:.2f} % with {closest.passes} at {closest.index_m:.3f} m: '
             'allow that much, or a smaller index'
         )

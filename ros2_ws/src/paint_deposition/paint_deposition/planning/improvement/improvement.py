@@ -44,22 +44,19 @@ FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 's
 
 @dataclass(frozen=True)
 class FilmSummary:
-    """A film where one is wanted, and the paint and time spent on it."""
+    """A film, its evenness where one is wanted, and the paint and time spent on it."""
 
     film_um: np.ndarray  # (V,) at the vertices of the surface
-    # Mean, and standard deviation over mean of the film over its own target, weighted by area.
+    statistics: FilmStatistics  # of the film where one is wanted, with those of its zones
+    whole_part: FilmStatistics  # of the film on the whole part
+    # Where a film is wanted, by area, bare metal included: its mean, standard deviation over mean
+    # of the film over its own target, and share of the area within the tolerance of the target.
     mean_um: float
     sigma_n: float
-    # Least and greatest.
-    min_um: float
-    max_um: float
-    within: float  # share of the area within the tolerance of the target
-    paint_cm3: float  # sprayed, as solids that a part which catches everything would get
-    on_part_cm3: float  # of it on the whole part
+    within: float
     # Time with the gun open, and from the first pose to the last.
     spraying_s: float
     cycle_s: float
-    statistics: FilmStatistics  # of the film there, with those of its zones
 
     @staticmethod
     def of(
@@ -77,22 +74,34 @@ class FilmSummary:
         path, _ = spray_path(trajectory)
         low, high = (limit[region] for limit in wanted.limits_um(target_um, tolerance))
         good = (film >= low) & (film <= high)
-        mean_um, _ = evenness(film, area)
-        _, sigma_n = evenness(film / wanted.share[region], area)
+        zones = wanted.zones
+        elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
         return FilmSummary(
-            film_um, mean_um, sigma_n, float(film.min()), float(film.max()),
-            float((area / area.sum())[good].sum()), emitted_cm3,
-            float(surface.vertex_areas_m2 @ film_um),
-            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
+            film_um,
+            film_statistics(film, area, emitted_cm3, zones=zones and zones.select(region)),
             film_statistics(
-                film, area, emitted_cm3, zones=wanted.zones and wanted.zones.select(region)
+                film_um, surface.vertex_areas_m2, emitted_cm3, target_um=elsewhere_um,
+                target_tolerance_um=tolerance * elsewhere_um, zones=zones,
             ),
+            evenness(film, area)[0],
+            evenness(film / wanted.share[region], area)[1],
+            float(area[good].sum() / area.sum()),
+            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
         )  # fmt: skip
 
+    @property
+    def paint_cm3(self) -> float:
+        """Paint sprayed, as solids that a part which catches everything would get [cm3]."""
+        return self.statistics.emitted_volume_cm3
+
     def figures(self) -> dict[str, float]:
-        """All but the film itself by name."""
-        apart = ('film_um', 'statistics')
-        return {name: value for name, value in vars(self).items() if name not in apart}
+        """Those of the region where a film is wanted, paint and time, by name."""
+        names = ('mean_um', 'sigma_n', 'within', 'spraying_s', 'cycle_s', 'paint_cm3')
+        return {name: getattr(self, name) for name in names} | {
+            'min_um': self.statistics.min_um,
+            'max_um': self.statistics.max_um,
+            'on_part_cm3': self.whole_part.painted_volume_cm3,
+        }
 
 
 @dataclass(frozen=True)
@@ -119,7 +128,7 @@ class PassChange:
         """The change in a line."""
         before, after = self.speed_m_per_s
         parts = [
-            f'{before:.3f} to {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
+            f'{before:.3f} → {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
             f'{self.fastest_m_per_s:.3f} m/s'
         ]
         for verb, metres, seconds, sides in (
@@ -132,7 +141,7 @@ class PassChange:
                     f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
                 )
         if abs(self.flow[1] - self.flow[0]) > 5e-4:
-            parts.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
+            parts.append(f'flow {self.flow[0]:.3f} → {self.flow[1]:.3f}')
         return f'pass {self.number}: ' + '; '.join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -204,15 +213,10 @@ class Improvement:
         """(V,) of the improved programme [um]."""
         return self.after.film_um
 
-    @cached_property
-    def statistics(self) -> FilmStatistics:
+    @property
+    def whole_part(self) -> FilmStatistics:
         """Of that film on the whole part."""
-        zones = self.wanted.zones
-        target = (self.wanted.elsewhere_um or 0.0) if zones else self.target_um
-        return film_statistics(
-            self.film_um, self.surface.vertex_areas_m2, self.after.paint_cm3,
-            target_um=target, target_tolerance_um=self.tolerance * target, zones=zones,
-        )  # fmt: skip
+        return self.after.whole_part
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
@@ -246,8 +250,8 @@ class Improvement:
             found.append(
                 f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
                 f'bound by {" and ".join(names) or "the path"}; '
-                f'{100 * self.before.within:.0f} to {100 * self.after.within:.0f} % of the area '
-                f'lie within the tolerance; allow {remedy}'
+                f'{100 * self.before.within:.0f} → {100 * self.after.within:.0f} % of the area '
+                f'within the tolerance; allow {remedy}'
             )
         if self.program_difference > ALIKE:
             found.append(
@@ -270,9 +274,19 @@ class Improvement:
         """The improvement in a sentence."""
         a, b = self.before, self.after
         return (
-            f'sigma_n {100 * a.sigma_n:.1f} to {100 * b.sigma_n:.1f} %, within {self.band} '
-            f'{100 * a.within:.0f} to {100 * b.within:.0f} % of the area, paint '
-            f'{a.paint_cm3:.1f} to {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} to {b.cycle_s:.1f} s'
+            f'sigma_n {100 * a.sigma_n:.1f} → {100 * b.sigma_n:.1f} %, within {self.band} '
+            f'{100 * a.within:.0f} → {100 * b.within:.0f} % of the area, paint '
+            f'{a.paint_cm3:.1f} → {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
+        )
+
+    @property
+    def region(self) -> str:
+        """Where its figures are taken, in words."""
+        area = self.surface.vertex_areas_m2
+        where = ' and a film is wanted' if self.wanted.zones else ''
+        return (
+            f'the {float(area[self.target_region].sum()):.2f} of {self.surface.area_m2:.2f} m2 '
+            f'that the programme paints{where}, by area'
         )
 
     @property
@@ -307,7 +321,9 @@ class Improvement:
         laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
+            'region': self.region,
             **both,
+            'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
             **{name: getattr(self, name) for name in FIGURES},
             'zones': [
                 {'name': before['name'], 'before': before, 'after': after}
@@ -342,11 +358,11 @@ def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
             continue
         (first_before, first), (last_before, last) = own[0], own[-1]
         on, off = max(first.on_m, begin), min(last.off_m, end)
-        inside = np.array([on + STANDING_M, off - STANDING_M])  # without a stay at either end
+        inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
         # A turn that the programme sprays through has no trigger that could be earlier or later.
         earlier = first_before.on_m - on if first_before.on_m in opened_m else 0.0
         later = off - last_before.off_m if last_before.off_m in closed_m else 0.0
-        old, new = (float(speed_along(p, inside)[0]) for p in (original, improved))
+        old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
         speed = speed_along(improved, np.linspace(*inside, SAMPLES + 1))
         found.append(
             PassChange(

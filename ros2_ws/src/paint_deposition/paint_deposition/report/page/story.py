@@ -130,10 +130,10 @@ def of_improvement(found: Improvement) -> Chapter:
         ('The path of the robot stays. The model with what was missing chooses the speeds along '
          'it, and where the gun opens and closes.',
          'Both films are predicted by that model. The new programme is written as a bag, a table '
-         'and a robot program, and its film is that of the files as read back.'),
+         f'and a robot program. The figures are of {found.region}.'),
         (both('Standard deviation', '% of the mean', 1, lambda f: 100 * f.sigma_n),
          both('Area', f'% {band}', 0, lambda f: 100 * f.within),
-         both('Least film', 'µm', 1, lambda f: f.min_um),
+         both('Least film', 'µm', 1, lambda f: f.statistics.min_um),
          both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
          both('Time', 's', 1, lambda f: f.cycle_s)),
         [(f'The film on the door, {when}; pink is thinner, red thicker than the bar',

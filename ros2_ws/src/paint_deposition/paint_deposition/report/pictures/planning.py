@@ -176,9 +176,10 @@ def _scale(result: Improvement) -> ColourScale:
 
 
 def _title(name: str, laid: FilmSummary) -> str:
+    s = laid.statistics
     return (
         f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-        f'{laid.min_um:.1f} to {laid.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
         f'{laid.cycle_s:.1f} s'
     )
 

@@ -45,6 +45,7 @@ class Passes:
     # frame then, and the program defines its work object so. None: the part's frame.
     part: tuple[str, Rigid] | None = None
     drive: Drive | None = None  # the joints that drive it
+    warnings: Sequence[str] = ()  # for the head of the program
     paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
 
 
@@ -61,7 +62,8 @@ def write_passes(folder: Path, passes: Passes) -> list[str]:
     write_table(folder / TABLE, _table(_in_frame(passes.moves, part)))
     comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
     at = part[1] if part else None
-    module = module_text(passes.moves, [comment], at, passes.paint_moves)
+    head = [comment, *(f'WARNING: {warning}' for warning in passes.warnings)]
+    module = module_text(passes.moves, head, at, passes.paint_moves)
     write_text(folder / PROGRAM, module)
     write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
     write_model(folder / MODEL_FILE, passes.model)

@@ -73,8 +73,10 @@ def _passes(
     surface, improved = result.surface, isinstance(result, Improvement)
     made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
+    touched = () if isinstance(result, Improvement) else tuple(map(str, result.contacts))
     passes = Passes(
-        result.trajectory, result.moves, result.model, made, part, result.drive, paint_moves,
+        result.trajectory, result.moves, result.model, made, part, result.drive, touched,
+        paint_moves,
     )  # fmt: skip
     files = [folder / one for one in (name, *write_passes(folder, passes))]
     given = result.original.notes if isinstance(result, Improvement) else ()
@@ -83,19 +85,19 @@ def _passes(
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
     zones = result.wanted.zones
     files += write_film(
-        folder, surface, result.film_um, result.statistics, zones=zones, overwrite=True
+        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True
     )
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(
-        surface, result.film_um, result.path, result.statistics, 'Planned passes and their film',
+        surface, result.film_um, result.path, result.whole_part, 'Planned passes and their film',
         result.sentence, zones,
     )  # fmt: skip
     if isinstance(result, PartPlan):
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
         geometry = spray_geometry(surface, result.path, result.model, frame_id)
-        geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
+        geometry = replace(geometry, warnings=touched)
         files.append(folder / f'passes.{pictures}')
         title = 'Planned passes over the faces'
         write_geometry_picture(files[-1], surface, result.path, geometry, title)
