@@ -178,7 +178,7 @@ def test_the_place_to_choose_has_good_neighbours(cell):
     assert found.best == (3, 1)
     alone = replace(found, speed=np.where(room > 0.23, 1.0, 0.5))
     assert alone.best == (1, 3)
-    assert 'yet not all places beside it do' in alone.sentence
+    assert 'not all places beside it were tried' in alone.sentence
 
 
 def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path):

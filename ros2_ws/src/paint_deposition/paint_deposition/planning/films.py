@@ -120,9 +120,7 @@ class PlannedFilm:
     def region(self) -> str:
         """Where its figures are taken, in words."""
         area_m2 = self.surface.vertex_areas_m2[self.painted].sum()
-        return (
-            f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 that are to be painted, by area'
-        )
+        return f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 to be painted'
 
     @property
     def cycle_time_s(self) -> float:
@@ -143,8 +141,8 @@ class PlannedFilm:
     def sentence(self) -> str:
         """The plan in a sentence."""
         return (
-            f'mean film {self.statistics.mean_um:.1f} µm, sigma_n {100 * self.sigma_n:.1f} %, '
-            f'{self.cycle_time_s:.1f} s'
+            f'mean film {self.statistics.mean_um:.1f} µm, sigma_n {100 * self.sigma_n:.1f} % on '
+            f'{self.region}, {self.cycle_time_s:.1f} s'
         )
 
     @property

@@ -39,8 +39,8 @@ class PartPlaces:
 
     @property
     def amid(self) -> np.ndarray:
-        """(Y, X) bool, those whose neighbours are good too: no part stands to the millimetre."""
-        return minimum_filter(self.good, 3, mode='nearest')
+        """(Y, X) bool, those all of whose neighbours were tried and are good too."""
+        return minimum_filter(self.good, 3, mode='constant', cval=False)
 
     @property
     def best(self) -> tuple[int, int]:
@@ -71,7 +71,11 @@ class PartPlaces:
             f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
             f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
             f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
-            f'{"" if self.amid[row, column] else ", yet not all places beside it do"}'
+            + (
+                ''
+                if self.amid[row, column]
+                else '; not all places beside it were tried and are as good'
+            )
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # As many letters of a title fit over a chart; one that is longer is written smaller.
-TITLE_LETTERS = 48
+TITLE_LETTERS = 41
 # A profile's two charts with the room around them, as shares of it, and that of the legend [in].
 PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
 PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
@@ -129,7 +129,7 @@ def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFi
     _draw_residual(residual, data, profile)
     bars_um = TWO_SIDED_95 * data.study.sigma_um
     tops_um = [(data.study.measured_um + bars_um).max()]
-    tops_um += [one.lines_um.max() for one in data.profiles if one.lines_um.size]
+    tops_um += [np.nanmax(one.lines_um) for one in data.profiles if one.lines_um.size]
     film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
     reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
     residual.set_ylim(-reach_um, reach_um)

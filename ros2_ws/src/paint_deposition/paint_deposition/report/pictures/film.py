@@ -20,7 +20,7 @@ from paint_deposition.report.style import BARE, BELOW, GRID, HIGH, INK, MUTED, W
 
 # The part's share of the picture, and the column beside it [in].
 PART_IN = (7.6, 7.6)
-BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 2.7, 1.0, 3.4
+BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 3.1, 1.0, 3.4
 BINS = 40
 NO_TARGET = GRID
 
@@ -111,18 +111,19 @@ def _draw_band(
 ) -> None:
     low, high = part.window(spray)
     part.dress(axes, low, high)
-    of_zone = part.zones(zones.number if zones else np.full(len(film_um), -1))
-    for number, shown in of_zone.items():
-        name = zones.zones.zones[number].name if zones and number >= 0 else ''
-        wanted = s.zones[name] if name else s
+    shares = part.zone_shares(zones) if zones else {}
+    # The first lies below all others, so that no gap is left between smoothed borders.
+    for below, number in enumerate(sorted(shares) or [-1]):
+        zone = zones.zones.zones[number].name if zones and number >= 0 else ''
+        wanted = s.zones[zone] if zone else s
         ends, colours = [s.painted_above_um], [BARE]
         for end, colour in zip(wanted.band_um, (BELOW, WITHIN), strict=True):
             if end > ends[-1]:
                 ends.append(end)
                 colours.append(colour)
         colours.append(HIGH if wanted.target_um else NO_TARGET)
-        part.draw_bands(axes, film_um, ends, colours, shown)
-    part.draw_zones(axes, zones)
+        part.draw_bands(axes, film_um, ends, colours, shares[number] if below else None)
+    part.draw_zones(axes, zones, spray)
     draw_tool_path(axes, spray, part.view, low, high)
 
 

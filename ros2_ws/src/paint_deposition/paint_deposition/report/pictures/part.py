@@ -11,6 +11,7 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
+from scipy.spatial import cKDTree
 
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
@@ -26,6 +27,8 @@ MARGIN_IN_PARTS = 1.0
 LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
+# Rounds of smoothing of a zone's border, over neighbours; a label is so much wider than high.
+SMOOTHINGS, LABEL_SHAPE = 3, np.array([5.0, 1.0])
 # On a page a part is drawn no higher than this, with this room above and below [in].
 HIGHEST_IN, AROUND_IN = 4.2, 1.3
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
@@ -150,45 +153,63 @@ class PartPicture:
         film_um: np.ndarray,
         ends_um: list[float],
         colours: list[str],
-        shown: np.ndarray | None = None,
+        within: np.ndarray | None = None,
     ) -> None:
         """The part with a colour for each band of the film, (V,) at the vertices [um].
 
-        ``shown`` (n, 3) are the triangles to draw; default: all that are seen.
+        Where ``within`` (V,) is below a half it is left out; default: nowhere.
         """
-        faces = self.faces[self.seen] if shown is None else shown
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], faces)
+        triangles = self._triangles()
         least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
         levels = [least - 1.0, *ends_um, most + 1.0]
-        axes.tricontourf(triangles, film_um, levels, colors=colours)
+        bands = axes.tricontourf(triangles, film_um, levels, colors=colours)
+        if within is not None:
+            outline = axes.tricontourf(triangles, within, [0.5, 2.0], alpha=0.0)
+            bands.set_clip_path(outline.get_paths()[0], axes.transData)
         self._draw_edges(axes)
 
-    def zones(self, number: np.ndarray) -> dict[int, np.ndarray]:
-        """The triangles (n, 3) that are seen of each zone, by numbers (V,) of the vertices."""
-        seen = self.faces[self.seen]
-        of = np.sort(number[seen], axis=1)[:, 1]  # that of two corners, if two agree
-        return {int(k): seen[of == k] for k in np.unique(of)}
+    def zone_shares(self, zones: PointZones) -> dict[int, np.ndarray]:
+        """(V,) 1 in each zone and 0 outside, smoothed: its border is at a half, not by triangles.
 
-    def draw_zones(self, axes: Axes, zones: PointZones | None) -> None:
-        """The borders of the zones of the vertices, with their names and targets."""
+        Zones that are not seen are left out.
+        """
+        seen = self.faces[self.seen]
+        corners = np.bincount(seen.ravel(), minlength=len(self.flat_m))
+        shares = {}
+        for number in np.unique(zones.number[seen]).tolist():
+            share = (zones.number == number).astype(float)
+            for _ in range(SMOOTHINGS):
+                of_face = np.repeat(share[seen].mean(axis=1), 3)
+                total = np.bincount(seen.ravel(), of_face, len(self.flat_m))
+                share = np.divide(total, corners, out=share, where=corners > 0)
+            shares[number] = share
+        return shares
+
+    def draw_zones(self, axes: Axes, zones: PointZones | None, spray: SprayPath) -> None:
+        """The borders of the zones of the vertices, with names and targets clear of the passes."""
         if zones is None:
             return
-        triangles = self.zones(zones.number)
-        for number, zone in enumerate(zones.zones.zones):
-            if number not in triangles:  # it is not seen from here
+        middles = self.flat_m[self.faces[self.seen]].mean(axis=1)
+        passes = self.view.flat(spray.position_m[spray.flow > 0.0])
+        for number, share in self.zone_shares(zones).items():
+            if number < 0:
                 continue
-            faces = triangles[number]
-            edges, of_face = edges_of(faces)
-            border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
-            lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
-            axes.add_collection(lines, False)
-            centres = self.flat_m[faces].mean(axis=1)
-            middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
-            label = axes.annotate(
-                f'{zone.name}\n{zone.target_um:g} ± {zone.tolerance_um:g} µm', centres[middle],
-                fontsize=8.5, color=INK, ha='center', va='center', zorder=5,
+            axes.tricontour(self._triangles(), share, [0.5], colors=INK, linewidths=1.4)
+            own = share[self.faces[self.seen]].mean(axis=1) > 0.5
+            if not own.any():
+                continue
+            obstacles = np.concatenate([passes, middles[~own], self.edges_m.mean(axis=1)])
+            away, _ = cKDTree(obstacles / LABEL_SHAPE).query(middles[own] / LABEL_SHAPE)
+            zone = zones.zones.zones[number]
+            axes.annotate(
+                f'{zone.name}  {zone.target_um:g} ± {zone.tolerance_um:g} µm',
+                middles[own][np.argmax(away)], fontsize=8.5, color=INK, ha='center', va='center',
+                zorder=5, path_effects=PALE_HALO,
             )  # fmt: skip
-            label.set_path_effects(PALE_HALO)
+
+    def _triangles(self) -> Triangulation:
+        """The triangles that are seen."""
+        return Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
@@ -196,8 +217,9 @@ class PartPicture:
         levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
         if not len(levels) or not self.seen.any():
             return
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
-        lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
+        lines = axes.tricontour(
+            self._triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
+        )
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
             label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
