@@ -130,7 +130,8 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
     whole = result.whole_part
     yield (
         f'film there {film.min_um:.1f} to {film.max_um:.1f} µm; on the whole part '
-        f'{whole.min_um:.1f} to {whole.max_um:.1f} µm, mean {whole.mean_um:.1f} µm, coverage {100 * whole.coverage:.0f} %, capture fraction '
+        f'{whole.min_um:.1f} to {whole.max_um:.1f} µm, mean {whole.mean_um:.1f} µm, coverage '
+        f'{100 * whole.coverage:.0f} %, capture fraction '
         f'{100 * whole.capture_fraction:.0f} %'
     )
     first = result.unoptimised if isinstance(result, pd.Plan) else None

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure, FigureBase
 from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
-from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.chart import (
     MM,
@@ -20,7 +19,7 @@ from paint_deposition.report.pictures.chart import (
     quiet,
 )
 from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PartPicture
+from paint_deposition.report.pictures.part import HALO, PartPicture, label_points
 from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
@@ -42,9 +41,17 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
     film_um = data.painted[index][-1].film_um
     title = f'film predicted, {data.model_names[-1]}'
     film, axes = page_film(part, film_um, experiment.path, title, film_scale(film_um))
-    for number, place in enumerate(data.proposals[0], start=1):
-        if place.experiment == experiment.name:
-            _draw_place(axes, part, number, place)
+    places = {
+        str(number): part.view.flat(place.position_m)
+        for number, place in enumerate(data.proposals[0], start=1)
+        if place.experiment == experiment.name
+    }
+    if places:
+        flat_m = np.array(list(places.values()))
+        axes.plot(*flat_m.T, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
+        per_m = 72.0 * PAGE_IN / np.ptp(axes.get_xlim())
+        label_points(axes, flat_m, list(places), 0.7 * per_m, fontsize=10, color='white',
+                     path_effects=HALO, zorder=6)  # fmt: skip
     return [*residual_figures(data, index, part), film]
 
 
@@ -70,15 +77,6 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
         colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
         figures.append(figure)
     return figures
-
-
-def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:
-    x, y = part.view.flat(place.position_m).tolist()
-    axes.plot(x, y, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
-    axes.annotate(
-        str(number), (x, y), xytext=(5, 5), textcoords='offset points', fontsize=10, color='white',
-        path_effects=HALO, zorder=6,
-    )  # fmt: skip
 
 
 def comparison_figure(data: ReportData) -> Figure:

@@ -13,7 +13,7 @@ from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
-from paint_deposition.report.pictures.part import PartPicture
+from paint_deposition.report.pictures.part import PartPicture, label_points
 from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK, MUTED
 
 LINE_POINTS = 600
@@ -137,11 +137,9 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
             *places[which].T, marker, markersize=6, color='white', markeredgecolor=INK,
             linestyle='', label=label,
         )  # fmt: skip
-    for name, place in zip(chosen.names, places, strict=True):
-        axes.annotate(
-            name.removeprefix('P').lstrip('0'), place, xytext=(4, 4), textcoords='offset points',
-            fontsize=8.5, color=INK, path_effects=HALO,
-        )  # fmt: skip
+    names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
+    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
+    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=HALO)
     axes.set_title(
         f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
         color=INK, pad=24,

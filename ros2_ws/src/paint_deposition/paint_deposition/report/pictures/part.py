@@ -1,6 +1,8 @@
 """A part as a flat picture from the sides of the gun, with the gun's way over it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,6 +29,10 @@ MARGIN_IN_PARTS = 1.0
 LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 ARROWS_A_WIDTH = 3.0
+# Where a label of a point may stand [pt], the best place first.
+AROUND_POINT = 9.0 * np.array(
+    [(1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.2), (0, -1.2)]
+)
 # Rounds of smoothing of a zone's border, over neighbours; a label is so much wider than high.
 SMOOTHINGS, LABEL_SHAPE = 3, np.array([5.0, 1.0])
 # On a page a part is drawn no higher than this, with this room above and below [in].
@@ -256,6 +262,24 @@ def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     axes.add_collection(
         TriMesh(triangles, facecolors=rgba.reshape(-1, 4), rasterized=True), autolim=False
     )
+
+
+def label_points(
+    axes: Axes, places_m: np.ndarray, words: Sequence[str], points_per_m: float, **style: Any
+) -> None:
+    """Write words beside places (n, 2) [m], each on the side with the most room."""
+    places = points_per_m * places_m
+    taken = [*places]
+    for row, (word, place) in enumerate(zip(words, places, strict=True)):
+        others = np.array(taken[:row] + taken[row + 1 :] or [place + 1e3])
+        spots = place + AROUND_POINT
+        away = np.linalg.norm(spots[:, np.newaxis] - others, axis=2).min(axis=1)
+        spot = spots[int(np.argmax(np.round(away)))]
+        taken.append(spot)
+        axes.annotate(
+            word, place / points_per_m, spot - place, textcoords='offset points', ha='center',
+            va='center', **style,
+        )  # fmt: skip
 
 
 def draw_tool_path(
