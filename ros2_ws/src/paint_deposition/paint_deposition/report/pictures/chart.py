@@ -10,6 +10,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure, FigureBase
 
+from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import replacing
 from paint_deposition.film.colour_scales import TABLE, ColourScale
 from paint_deposition.report.style import BEFORE, GRID, INK, MUTED
@@ -64,6 +65,8 @@ def colours_of(scale: ColourScale) -> ScalarMappable:
 def save_picture(figure: Figure, path: str | Path) -> Path:
     """Write the figure as PNG, SVG or PDF, by the suffix, replacing an older file at once."""
     path = Path(path)
+    if path.suffix not in ('.png', '.svg', '.pdf'):
+        raise PaintError(f'{path}: give a picture a name that ends in .png, .svg or .pdf')
     with replacing(path) as temporary:
         figure.savefig(
             temporary, format=path.suffix.removeprefix('.'), dpi=DOTS_PER_INCH, facecolor='white'
