@@ -17,8 +17,8 @@ from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
-from paint_deposition.planning.improvement.programme import Programme, moves_of
 from paint_deposition.planning.plan import plan
+from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import ImproveRequest, PlanRequest
 from planning.test_surface_map import sheet
 from scenes import stamps_ns, straight_pass

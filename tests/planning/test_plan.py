@@ -8,11 +8,11 @@ import pytest
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.planning.films import evenness
 from paint_deposition.planning.placement import place_passes
 from paint_deposition.planning.plan import plan
+from paint_deposition.planning.planned_film import evenness
 from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.report.writers.passes import Passes, write_passes
+from paint_deposition.report.writers.plans import Passes, write_passes
 from planning.test_surface_map import sheet
 from scenes import painted
 

@@ -17,17 +17,16 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.films import evenness, simulated
-from paint_deposition.planning.improvement.improvement import (
+from paint_deposition.planning.improvement import (
     DEFAULT_TOLERANCE,
     FilmSummary,
     Improvement,
 )
-from paint_deposition.planning.improvement.programme import Programme, closed_beside, moves_of
-from paint_deposition.planning.improvement.retiming import retime_for_evenness
+from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
+from paint_deposition.planning.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.retiming import retime_for_evenness
 from paint_deposition.planning.surface_map import painted_side, pass_axes
-from paint_deposition.planning.wanted_film import WantedFilm
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]

@@ -13,8 +13,17 @@ from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
-from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
+from paint_deposition.planning.joints import (
+    MARGIN,
+    REACHED,
+    JointPace,
+    PassLimit,
+    Start,
+    Ways,
+    follow,
+    settled,
+    starts,
+)
 
 # Joints are looked at this often along the planned motion [s].
 STEP_S = 0.02

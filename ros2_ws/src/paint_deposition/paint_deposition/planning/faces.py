@@ -21,7 +21,6 @@ from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import Face
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import evenness
 from paint_deposition.planning.passes import (
     PassStyle,
     PlannedPass,
@@ -30,9 +29,9 @@ from paint_deposition.planning.passes import (
     trajectory_of,
 )
 from paint_deposition.planning.plan import plan
+from paint_deposition.planning.planned_film import WantedFilm, evenness
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
-from paint_deposition.planning.wanted_film import WantedFilm
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)

@@ -13,11 +13,10 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.faces import blend, join_motions, order_faces
-from paint_deposition.planning.films import PlannedFilm, predicted
-from paint_deposition.planning.improvement.programme import Programme, moves_of
-from paint_deposition.planning.improvement.retiming import retime_for_evenness
+from paint_deposition.planning.planned_film import PlannedFilm, WantedFilm, predicted
+from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-from paint_deposition.planning.wanted_film import WantedFilm
+from paint_deposition.planning.retiming import retime_for_evenness
 
 # Faces that turn further from the side of the gun are its back.
 BACK_COSINE = -0.1

@@ -21,7 +21,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.residuals import root_mean_square
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
-from paint_deposition.report.writers.fitted_model import history_as_list
+from paint_deposition.report.writers.models import history_as_list
 
 
 class Change(NamedTuple):

@@ -18,7 +18,7 @@ from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.style import TWO_SIDED_95
-from paint_deposition.report.writers.fitted_model import PATTERN, REFIT
+from paint_deposition.report.writers.models import PATTERN, REFIT
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
     'incidence_deg': ('Incidence angle', 'deg'),

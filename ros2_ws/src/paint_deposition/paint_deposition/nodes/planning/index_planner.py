@@ -27,8 +27,7 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     thickness_parameter,
 )
-from paint_deposition.planning.optimised_plan import kept_clear
-from paint_deposition.planning.plan import Plan, plan
+from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import (
     FASTEST_M_PER_S,

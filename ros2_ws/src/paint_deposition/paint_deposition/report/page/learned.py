@@ -12,7 +12,7 @@ from paint_deposition.effects.learned.place import LearnedMap, places_m
 from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page import layout
+from paint_deposition.report.page import charts as layout
 from paint_deposition.report.style import ACCENT, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import capital, covariate_label, effect_name, joined
 
@@ -94,7 +94,7 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     law = data.model.effect(LearnedMap.id)
     if not isinstance(law, LearnedMap):
         return None
-    charts, marker = [], {'size': 3, 'color': INK}
+    found, marker = [], {'size': 3, 'color': INK}
     for grid, values in law.values_by_part():
         parts = [e for e in data.experiments if grid.is_of(e.measured_points)]
         neutral, title = 0.0, 'addition [µm]'
@@ -107,8 +107,8 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
         dots = [layout.scatter(p[:, 0], p[:, 1], 'markers', marker=marker, hoverinfo='skip')
                 for p in places]  # fmt: skip
         labels = ('right of the centre [m]', 'above it [m]')
-        charts.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))
-    return layout.figure('maps', charts) if charts else None
+        found.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))
+    return layout.figure('maps', found) if found else None
 
 
 def profile_figure(data: ReportData) -> dict[str, Any] | None:
@@ -150,12 +150,12 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
     plain = [planar.flux_um_per_s(x, y) for planar in patterns]
     factor = np.maximum(1.0 + laws[0].h(x, y), LEAST_FACTOR)
     of = [f' of brush {brush.number}' for brush in brushes] if len(brushes) > 1 else ['']
-    charts = []
+    found = []
     for flux, whose in zip(plain, of, strict=True):
         colours = layout.FILM_COLOURS, 0.0, float(max(flux.max(), (flux * factor).max()))
         for title, values in (('of eq. (1)', flux), ('as learned', flux * factor)):
             title = f'pattern {title}{whose} [µm/s]'
-            charts.append(_heat_map(title, labels, along, along, values, colours))
+            found.append(_heat_map(title, labels, along, along, values, colours))
     contours = [
         {
             'type': 'contour', 'x': along, 'y': along, 'z': plain[0], 'showscale': False,
@@ -166,8 +166,8 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
         for share in CONTOURS
     ]  # fmt: skip
     title = f'factor, with contours of eq. (1){of[0]}'
-    charts.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), contours))
-    return layout.figure('footprint', charts)
+    found.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), contours))
+    return layout.figure('footprint', found)
 
 
 def _around(values: np.ndarray, neutral: float) -> tuple[list, float, float]:

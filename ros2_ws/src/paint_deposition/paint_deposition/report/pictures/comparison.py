@@ -10,17 +10,20 @@ from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.chart import (
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import HALO, PartPicture, label_points
+from paint_deposition.report.style import (
+    BEFORE,
+    INK,
     MM,
+    MUTED,
     PAGE_IN,
     TEXT_PT,
+    TWO_SIDED_95,
     colour_bar,
     new_figure,
     quiet,
 )
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PartPicture, label_points
-from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
 # As many letters of a title fit over a chart; one that is longer is written smaller.

@@ -14,9 +14,20 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_a
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.pictures.chart import colour_bar, colours_of, new_figure, quiet
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
-from paint_deposition.report.style import BARE, BELOW, GRID, HIGH, INK, MUTED, WITHIN
+from paint_deposition.report.style import (
+    BARE,
+    BELOW,
+    GRID,
+    HIGH,
+    INK,
+    MUTED,
+    WITHIN,
+    colour_bar,
+    colours_of,
+    new_figure,
+    quiet,
+)
 
 # The part's share of the picture, and the column beside it [in].
 PART_IN = (7.6, 7.6)

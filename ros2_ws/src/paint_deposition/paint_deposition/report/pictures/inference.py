@@ -12,9 +12,19 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture, label_points
-from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK, MUTED
+from paint_deposition.report.style import (
+    ACCENT,
+    BEFORE,
+    COMPONENTS,
+    INK,
+    MM,
+    MUTED,
+    legend,
+    new_figure,
+    quiet,
+    save_picture,
+)
 
 LINE_POINTS = 600
 PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26

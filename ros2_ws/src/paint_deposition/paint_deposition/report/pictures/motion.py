@@ -14,9 +14,16 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import new_figure, save_picture
 from paint_deposition.report.pictures.part import View, draw_triangles, dress
-from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
+from paint_deposition.report.style import (
+    ACCENT,
+    COMPONENTS,
+    GRID,
+    INK,
+    MUTED,
+    new_figure,
+    save_picture,
+)
 
 PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')

@@ -20,8 +20,7 @@ from paint_deposition.part.edges import edges_of
 from paint_deposition.part.orientation import downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
-from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
 
 # Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
 MARGIN_IN_PARTS = 1.0

@@ -9,21 +9,24 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement, PassChange
-from paint_deposition.planning.improvement.programme import STANDING_M, speed_along
+from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
 from paint_deposition.planning.part_place import PartPlaces
+from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import (
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
+from paint_deposition.report.style import (
+    ACCENT,
+    BEFORE,
+    INK,
     MM,
+    MUTED,
     colour_bar,
     legend,
     new_figure,
     quiet,
     save_picture,
 )
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 
 PERCENT = 100.0
 POINTS = 600

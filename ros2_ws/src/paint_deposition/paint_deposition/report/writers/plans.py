@@ -1,7 +1,9 @@
-"""How plans, improved programmes, recommendations and chosen points are written."""
+"""Plans, improved programmes, recommendations, places and chosen points on disk."""
 
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -9,20 +11,30 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, PLAN_FILE
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
 from paint_deposition.files.provenance import model_digest, origin
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.bag_files import TRIGGER
+from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.files.tool_path import write_tool_path
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move, timed
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.driving import Drive
+from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
@@ -31,13 +43,124 @@ from paint_deposition.report.pictures.planning import (
     write_places,
     write_uniformity,
 )
-from paint_deposition.report.writers.film import write_film
-from paint_deposition.report.writers.passes import Passes, write_passes
-from paint_deposition.report.writers.write import input_files, with_provenance, written
+from paint_deposition.report.style import save_picture
+from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
+
+BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
+TOOL_PATH = 'passes.yaml'
+COLUMNS = (
+    'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
+    'brush',
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Passes:
+    """A motion in the part's frame, timed and as moves of a robot program, and its model."""
+
+    trajectory: Trajectory
+    moves: Sequence[Move]
+    model: DepositionModel
+    made: str  # how, for the head of the program, as 'Planned'
+    # The robot's frame and the pose of the part in it; bag and table have their poses in that
+    # frame then, and the program defines its work object so. None: the part's frame.
+    part: tuple[str, Rigid] | None = None
+    drive: Drive | None = None  # the joints that drive it
+    warnings: Sequence[str] = ()  # for the head of the program
+    paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
+
+
+def write_passes(folder: Path, passes: Passes) -> list[str]:
+    """Write bag, ``passes.csv``, ``passes.mod`` and ``model.yaml`` to a folder; their names.
+
+    Raises:
+        PaintError: the folder holds another folder of the bag's name.
+        OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    digest, part = model_digest(passes.model), passes.part
+    _write_bag(folder / BAG, passes, digest)
+    write_table(folder / TABLE, _table(_in_frame(passes.moves, part)))
+    comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
+    at = part[1] if part else None
+    head = [comment, *(f'WARNING: {warning}' for warning in passes.warnings)]
+    module = module_text(passes.moves, head, at, passes.paint_moves)
+    write_text(folder / PROGRAM, module)
+    write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
+    write_model(folder / MODEL_FILE, passes.model)
+    if passes.drive:
+        write_table(folder / JOINTS, _joint_table(passes.drive))
+    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.drive else [])]
+
+
+def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
+    if part is None:
+        return moves
+    poses = [part[1].applied(move.position_m, move.quaternion_xyzw) for move in moves]
+    return [
+        replace(move, position_m=position, quaternion_xyzw=quaternion)
+        for move, (position, quaternion) in zip(moves, poses, strict=True)
+    ]
+
+
+def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
+    """A line a move of the TCP: where it ends, how fast, and what the gun does."""
+    yield COLUMNS
+    for number, move in zip(pass_numbers(moves), moves, strict=True):
+        yield [
+            number,
+            *(f'{value:.6f}' for value in move.position_m),
+            *(f'{value:.8f}' for value in move.quaternion_xyzw),
+            f'{move.speed_m_per_s:.6g}',
+            int(move.spraying),
+            f'{move.flow:.6g}' if move.spraying else 0,
+            move.brush,
+        ]
+
+
+def pass_numbers(moves: Sequence[Move]) -> list[int]:
+    """Number of the pass on which each move (M,) ends, from 1, as a simulation counts them."""
+    path, _ = spray_path(timed(moves, gun_known=True))
+    steps_m = np.linalg.norm(np.diff([move.position_m for move in moves], axis=0), axis=1)
+    middle_m = np.cumsum(steps_m) - 0.5 * steps_m
+    row = np.searchsorted(np.cumsum(path.dwell_s * path.speed_m_per_s), middle_m)
+    number = path.spray_pass[np.minimum(row, len(path) - 1)]
+    return [1, *np.maximum(number + 1, 1).tolist()]
+
+
+def _joint_table(drive: Drive) -> Iterator[Sequence[object]]:
+    units = np.where(drive.arm.slides, 'm', 'rad')
+    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(drive.arm.joints, units, strict=True))
+    for time_s, values in zip(drive.seconds, drive.joints, strict=True):
+        yield [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
+
+
+def _write_bag(target: Path, passes: Passes, digest: str) -> None:
+    if target.exists():
+        strangers = [
+            path for path in target.rglob('*')
+            if path.suffix not in ('.mcap', '.yaml') or path.is_dir()
+        ]  # fmt: skip
+        if not target.is_dir() or strangers:
+            raise PaintError(f'{target} is there and no planned bag; move it away')
+    trajectory, part = passes.trajectory, passes.part
+    placed = moved(trajectory, part[1], part[0]) if part else trajectory
+    # A bag's files are named for their folder, so the folder is made under its own name.
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
+        fresh = write_pose_bag(
+            Path(aside) / target.name, placed,
+            custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
+            part=(trajectory.frame_id, part[1]) if part else None, drive=passes.drive,
+        )  # fmt: skip
+        if target.exists():
+            shutil.rmtree(target)
+        fresh.rename(target)
+    write_model(target / MODEL_FILE, passes.model)
+
 
 # What a robot's own frame is called where nobody says (REP-105 and most URDFs).
 ROBOT_FRAME = 'base_link'
-COLUMNS = (
+POINT_COLUMNS = (
     'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
     'expected_um', 'speaks_for',
 )  # fmt: skip
@@ -158,7 +281,7 @@ def _gauge_quaternions(chosen: ChosenReadings) -> np.ndarray:
 
 def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
     """A line a reading: all points once, then those that are read twice."""
-    yield COLUMNS
+    yield POINT_COLUMNS
     face_mm = 1e3 * chosen.from_edges_m
     for k in [*range(len(chosen)), *chosen.read_twice]:
         place = (*chosen.positions_m[k], *chosen.normals[k])

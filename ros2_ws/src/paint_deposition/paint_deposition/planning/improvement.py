@@ -15,18 +15,17 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import Drive
-from paint_deposition.planning.films import evenness
-from paint_deposition.planning.improvement.nodes import BEND, JOINT, LEAD, ROBOT
-from paint_deposition.planning.improvement.programme import (
+from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
+from paint_deposition.planning.planned_film import WantedFilm, evenness
+from paint_deposition.planning.programme import (
     STANDING_M,
     Programme,
     Strokes,
     speed_along,
 )
-from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
-from paint_deposition.planning.improvement.retiming import Retiming
+from paint_deposition.planning.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import WantedFilm
+from paint_deposition.planning.retiming import Retiming
 
 DEFAULT_TOLERANCE = 0.1
 # The films of bag and robot program should agree to this share of the peak.

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.improvement.nodes import (
+from paint_deposition.planning.nodes import (
     BEND,
     JOINT,
     LEAD,
@@ -23,8 +23,8 @@ from paint_deposition.planning.improvement.nodes import (
     Nodes,
     SpeedBounds,
 )
+from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import Band
 
 # Converged when the density changes by less than this share; largest number of rounds.
 SETTLED, ROUNDS = 3e-3, 8

@@ -1,43 +1,129 @@
-"""Films that plans are made from: of a motion, of single passes, and of pieces of a pass."""
+"""The film that a plan aims at, and the film of a planned motion with its figures."""
+
+from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
-from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.integrator import FilmIntegrator, after_film_effects
+from paint_deposition.errors import PlanError
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.paint_used import PaintUsed, paint_figures
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
-from paint_deposition.planning.improvement.nodes import Nodes
-from paint_deposition.planning.improvement.programme import Programme
-from paint_deposition.planning.passes import PassStyle, PlannedPass, plan_pass, trajectory_of
+from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-from paint_deposition.planning.surface_map import SurfaceMap
-from paint_deposition.planning.wanted_film import WantedFilm
 
 MOST_POINTS = 1500
-LINES_PER_SCALE = 5.0
-COARSEST_STEP_M = 0.02
-# Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak; of nodes: 1e-3.
-STEPS_PER_SCALE, STEPS_PER_SIGMA = 5.0, 6.0
-# Slower poses would be gaps, at which the gun is off.
-SLOWEST_RATE_HZ = 10.0
 # A mean film this close to the target is on it; speeds this close to a limit keep it.
 NEAR = 0.01
+
+
+class Band(NamedTuple):
+    """What film is accepted at some of V points."""
+
+    points: np.ndarray  # (V,) bool
+    target_um: float  # film wanted
+    tolerance: float | None  # accepted share of it either way; None: any film
+
+
+@dataclass(frozen=True)
+class WantedFilm:
+    """The film wanted on a region of a part; a film over ``share`` should be the mean target.
+
+    Attributes:
+        region: (V,) bool, vertices whose film counts.
+        target_um: mean target there; None: it is that of the film as it is.
+        elsewhere_um: target outside of the zones, None: none.
+        share: (V,) target of each vertex over the mean target.
+        zones: of the vertices, or None. free_m2: what is painted and has no target [m^2].
+    """
+
+    region: np.ndarray
+    target_um: float | None
+    elsewhere_um: float | None
+    share: np.ndarray
+    zones: PointZones | None = None
+    free_m2: float = 0.0
+
+    @staticmethod
+    def of(
+        surface: Surface, region: np.ndarray, target_um: float | None, zones: PointZones | None
+    ) -> WantedFilm:
+        """In zones their targets, and elsewhere ``target_um``, count on a region (V,) bool.
+
+        Raises:
+            PlanError: no vertex of the region has a target of its own.
+        """
+        if zones is None:
+            return WantedFilm(region, target_um, target_um, np.ones(len(region)))
+        targets, _ = zones.wanted_um(target_um)
+        counted = region & ~np.isnan(targets)
+        if not (counted & (zones.number >= 0)).any():
+            raise PlanError(
+                'no zone lies where paint is to land; give zones on the side that the gun faces'
+            )
+        # By zones, and not by vertices: of equal targets it is the very same.
+        area = np.where(counted, surface.vertex_areas_m2, 0.0)
+        kinds, of = np.unique(targets, return_inverse=True)
+        areas = np.bincount(of, area)
+        mean = float((areas / areas.sum())[areas > 0.0] @ kinds[areas > 0.0])
+        return WantedFilm(
+            counted, mean, target_um, np.where(counted, targets / mean, 1.0), zones,
+            float(surface.vertex_areas_m2[region & ~counted].sum()),
+        )  # fmt: skip
+
+    def doubts(self, laid: FilmStatistics) -> Iterator[str]:
+        """What of the film that is laid may not be as expected, a line each."""
+        if self.free_m2:
+            yield (
+                f'{self.free_m2:.2g} m2 of what is painted are in no zone and have no target: any '
+                'film is taken there; give --target-um, or a zone over them'
+            )
+        for one in self.zones.zones.zones if self.zones else ():
+            if one.name not in laid.zones:
+                yield (
+                    f'zone {one.name} is left out: the passes do not paint it, or hardly; give '
+                    'passes over it'
+                )
+        for name, zone in laid.zones.items():
+            low, high = zone.band_um
+            if not low <= zone.mean_um <= high:
+                yield (
+                    f'zone {name}: the mean film is {zone.mean_um:.1f} µm, outside of {low:g} to '
+                    f'{high:g} µm: the passes over it reach its neighbours too; lay passes along '
+                    'the border, or allow other speeds (--speed-min, --speed-max)'
+                )
+
+    def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
+        """Those of vertices (V,); outside of zones the mean target and tolerance given hold."""
+        if self.zones is None:
+            return [Band(np.ones(len(rows), dtype=bool), target_um, tolerance)]
+        here = self.zones.select(rows)
+        found = [Band(own, z.target_um, z.tolerance_um / z.target_um) for z, own in here]
+        if self.elsewhere_um is not None:
+            found.append(Band(here.number < 0, self.elsewhere_um, tolerance))
+        return found
+
+    def limits_um(self, target_um: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest film (V,) accepted [um]; the rest as for ``bands``."""
+        low, high = np.full((2, len(self.region)), np.nan)
+        for band in self.bands(np.arange(len(low)), target_um, tolerance):
+            low[band.points] = band.target_um * (1.0 - (band.tolerance or 0.0))
+            high[band.points] = band.target_um * (1.0 + (band.tolerance or 0.0))
+        return low, high
 
 
 def simulated(
@@ -203,115 +289,3 @@ def stratified_sample(area_m2: np.ndarray) -> np.ndarray:
     count = min(MOST_POINTS, 4 * len(area_m2))
     shares = (np.arange(count) + 0.5) / count * reached[-1]
     return np.searchsorted(reached, shares)
-
-
-class LineFilms:
-    """Film at points spread evenly over the painted side, for passes along many lines.
-
-    Shadows and effects on the finished film are left out. ``finest_m`` is the scale on which the
-    film changes across a pass; lines are laid up to ``beyond_m`` past the part's edges.
-
-    Attributes:
-        lines_m: (L,) the lines, and low_m and high_m their ends [m].
-        films_um: (L, V) film of each pass at the part's vertices ``rows`` (V,).
-    """
-
-    def __init__(
-        self,
-        surface: Surface,
-        surface_map: SurfaceMap,
-        model: DepositionModel,
-        style: PassStyle,
-        finest_m: float,
-        beyond_m: float,
-        progress: Callable[[float], None] = lambda share: None,
-    ) -> None:
-        chosen = stratified_sample(surface.vertex_areas_m2[surface_map.painted])
-        self.rows = rows = np.flatnonzero(surface_map.painted)[chosen]
-        self.surface_map = surface_map
-        points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
-        low, high = surface_map.extent_m[1]
-        self.low_m, self.high_m = low - beyond_m, high + beyond_m
-        step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
-        count = math.ceil((self.high_m - self.low_m) / step) + 1
-        self.lines_m = np.linspace(self.low_m, self.high_m, count)
-        integrator = FilmIntegrator(points, model)
-        longest = finest_m / STEPS_PER_SCALE
-        # Poses about a sub-step apart.
-        rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
-        self.films_um = np.empty((count, len(rows)))
-        for k, across in enumerate(self.lines_m):
-            line = (plan_pass(surface_map, float(across), style),)
-            motion = trajectory_of(line, style, rate_hz=rate)
-            path, _ = spray_path(motion, max_step_m=longest)
-            integrator.reset()
-            integrator.add(path)
-            self.films_um[k] = integrator.raw_um
-            progress((k + 1) / count)
-        # Cubic splines through the lines' films are linear in them: one matrix for all points.
-        self._basis = CubicSpline(self.lines_m, np.eye(count))
-
-    def sigma_n(self, lines_m: np.ndarray) -> np.ndarray:
-        """(...) standard deviation over mean of the film of passes along lines (..., n) [m]."""
-        weights = self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
-        film = weights @ self.films_um
-        return film.std(axis=-1) / film.mean(axis=-1)
-
-
-class FilmAtPoints:
-    """Films at vertices of a part, with the model's effects, the film's own included.
-
-    They are divided by ``share`` (V,), the target of each vertex over the mean target.
-    """
-
-    def __init__(
-        self, surface: Surface, rows: np.ndarray, model: DepositionModel, share: np.ndarray
-    ) -> None:
-        self.model, self._share = model, share
-        self._surface, self._rows = surface, rows
-        points = surface.points().select(rows)
-        self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
-        narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
-        self.step_m = max(model.max_step_m, narrow / STEPS_PER_SIGMA)
-        self._settles = [e for e in model.effects if type(e).on_film is not Effect.on_film]
-
-    def film_um(self, programme: Programme) -> np.ndarray:
-        """(V,) film of a programme at the points [um]."""
-        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
-        self._integrator.reset()
-        self._integrator.add(path)
-        return self._integrator.raw_um * self._finished_over_arrived(path) / self._share
-
-    def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
-        """(n, V) films for a density of paint of 1 s/m at each node [um].
-
-        Density is slowness times flow. The film is linear in it, but for effects that depend on
-        the speed or on the time since the gun opened: they are taken as they are in this
-        programme, which was timed at a density of paint (n,) [s/m].
-        """
-        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
-        travel = programme.travel_at_m(path.stamp_ns)
-        # The opening that each sub-step belongs to: the last that has begun.
-        begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
-        sprayed, rows = self._integrator.sprayed(path)
-        hats = nodes.hats(travel[rows], np.maximum(begun - 1, 0)[rows])
-        shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()
-        films = np.empty((len(nodes), len(self._rows)))
-        for node in range(len(nodes)):
-            column = slice(shares.indptr[node], shares.indptr[node + 1])
-            part = sprayed.select(shares.indices[column])
-            self._integrator.reset()
-            self._integrator.add_sprayed(part.with_(dwell_s=part.dwell_s * shares.data[column]))
-            films[node] = self._integrator.raw_um
-        return films * self._finished_over_arrived(path) / self._share
-
-    def _finished_over_arrived(self, path: SprayPath) -> np.ndarray | float:
-        """(V,) finished film over the film that arrived, from effects on the finished film."""
-        if not self._settles:
-            return 1.0
-        everywhere = self._surface.points()
-        whole = FilmIntegrator(everywhere, self.model, occluder=self._surface.occluder)
-        whole.add(path)
-        raw = whole.raw_um
-        settled = after_film_effects(raw, self._settles, everywhere)
-        return np.divide(settled, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -8,17 +8,20 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import FilmAtPoints, stratified_sample
-from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
-from paint_deposition.planning.improvement.programme import Opening, Programme
-from paint_deposition.planning.improvement.quadratic_program import (
+from paint_deposition.planning.nodes import FilmAtPoints, Nodes, SpeedBounds, retime, speed_bounds
+from paint_deposition.planning.planned_film import (
+    Band,
+    WantedFilm,
+    stratified_sample,
+)
+from paint_deposition.planning.programme import Opening, Programme
+from paint_deposition.planning.quadratic_program import (
     LIMIT_NAMES,
     Density,
     Problem,
     solve,
 )
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import Band, WantedFilm
 
 # Nodes per width of the pattern, within bounds.
 NODES_PER_SIGMA = 2.0
