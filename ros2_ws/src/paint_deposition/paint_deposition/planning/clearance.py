@@ -12,11 +12,6 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import GunEnvelope
 
-# Poses are looked at after this much travel or turn.
-STEP_M, STEP_RAD = 0.01, math.radians(2.0)
-# Contacts closer together in time than this are one.
-ONE_CONTACT_S = 0.5
-
 
 @dataclass(frozen=True)
 class Contact:
@@ -75,7 +70,8 @@ def contacts(
             float(time_s), float(time_s), surface.vertices_m[vertices[deepest]],
             float(depth[deepest]), by_gun,
         )  # fmt: skip
-        if found and time_s - found[-1].end_s < ONE_CONTACT_S:
+        # Contacts closer together in time than this are one.
+        if found and time_s - found[-1].end_s < 0.5:
             before = found[-1]
             deeper = max(before, here, key=lambda contact: contact.depth_m)
             by_gun = before.by_gun or here.by_gun
@@ -87,8 +83,9 @@ def contacts(
 
 def _steps(trajectory: Trajectory) -> np.ndarray:
     """Rows of poses that lie a step apart, with the last one."""
-    way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / STEP_M
+    # Poses are looked at after this much travel or turn.
+    way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / 0.01
     turns = Rotation.from_quat(trajectory.quaternions_xyzw)
-    way += (turns[:-1].inv() * turns[1:]).magnitude() / STEP_RAD
+    way += (turns[:-1].inv() * turns[1:]).magnitude() / math.radians(2.0)
     steps = np.floor(np.concatenate([[0.0], np.cumsum(way)]))
     return np.unique(np.append(np.unique(steps, return_index=True)[1], len(trajectory) - 1))

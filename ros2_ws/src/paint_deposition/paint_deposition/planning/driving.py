@@ -27,14 +27,8 @@ from paint_deposition.planning.joints import (
 
 # Joints are looked at this often along the planned motion [s].
 STEP_S = 0.02
-# The way is chosen over poses that lie so far apart.
-APART_M, APART_RAD = 0.02, math.radians(3.0)
 # Poses of a motion that is only tried.
 TRIED = 150
-# A joint of which nothing more is known reaches its full speed in this time [s].
-FULL_SPEED_S = 0.25
-# Ways that come nearer to the limit of a joint than this share of its range are avoided.
-NEAR_LIMIT = 0.05
 
 
 @dataclass(frozen=True)
@@ -124,7 +118,8 @@ class RobotCell:
         times_s = _times(trajectory)
         positions, turns = self.poses(trajectory, times_s)
         joints, begun = _joints(arm, positions, turns, times_s, free_roll, begin)
-        most = arm.fastest / FULL_SPEED_S
+        # A joint of which nothing more is known reaches its full speed in this time [s].
+        most = arm.fastest / 0.25
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
@@ -214,7 +209,8 @@ def _roll(roll_rad: float) -> Rotation:
 def _apart(positions_m: np.ndarray, turns: Rotation) -> np.ndarray:
     """Rows of poses about APART from each other, both ends included."""
     angle = (turns[:-1].inv() * turns[1:]).magnitude()
-    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / APART_M + angle / APART_RAD
+    # The way is chosen over poses that lie so far apart.
+    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / 0.02 + angle / math.radians(3.0)
     steps = np.floor(np.append(0.0, np.cumsum(way)))
     rows = np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0)
     return np.union1d(rows, len(steps) - 1)
@@ -266,7 +262,8 @@ def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
     joints = ways.joints[ways.whole]
     speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
     late = np.maximum(speeds.max(axis=2), 1.0)
-    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / NEAR_LIMIT, 0.0)
+    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
+    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
     return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
 
 

@@ -35,11 +35,6 @@ from paint_deposition.planning.surface_map import SurfaceMap
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
-# Bounds on the time on a pass, over the time that evenness on its face alone requires, and the
-# weight that holds it near that.
-DWELL, DWELL_WEIGHT = (0.5, 2.0), 0.02
-# Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
-RETRACTIONS_M = (0.1, 0.2, 0.4, 0.8)
 
 
 @dataclass(frozen=True)
@@ -133,9 +128,10 @@ def _dwell(trial: _FaceFilms, area: np.ndarray, target_um: float | None) -> np.n
     films = trial.films_um
     wanted = target_um or float(weight @ films.sum(axis=0))
     rows = np.sqrt(weight)[:, np.newaxis] * films.T / wanted
-    ridge = DWELL_WEIGHT * np.eye(len(films)) / math.sqrt(len(films))
+    # The times stay within half and twice those for evenness on each face alone, and near them.
+    ridge = 0.02 * np.eye(len(films)) / math.sqrt(len(films))
     return lsq_linear(
-        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), DWELL
+        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), (0.5, 2.0)
     ).x
 
 
@@ -213,7 +209,8 @@ def _between(
 ) -> list[Move]:
     """Moves from the end of a face to the start of the next, without both."""
     speed = style.transfer_speed_m_per_s
-    for retreat_m in RETRACTIONS_M:
+    # Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
+    for retreat_m in (0.1, 0.2, 0.4, 0.8):
         between = []
         for move in (before, after):
             tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]

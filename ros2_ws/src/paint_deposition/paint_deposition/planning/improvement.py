@@ -30,13 +30,6 @@ from paint_deposition.planning.retiming import Retiming
 DEFAULT_TOLERANCE = 0.1
 # The films of bag and robot program should agree to this share of the peak.
 ALIKE = 2e-3
-# A mean film further from the target than this share gives a warning.
-OFF_TARGET = 0.02
-# Samples of the new speed along a pass.
-SAMPLES = 60
-# Smaller shifts of a trigger are left out of the sentence [m].
-LEAST_SHIFT_M = 0.002
-LEAST_PASS_M = 0.05
 # Of an improvement, by their names in improvement.json.
 FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 'sentence')
 
@@ -134,7 +127,8 @@ class PassChange:
             ('opens', self.opens_earlier_m, self.opens_earlier_s, ('earlier', 'later')),
             ('closes', self.closes_later_m, self.closes_later_s, ('later', 'earlier')),
         ):
-            if abs(metres) >= LEAST_SHIFT_M:
+            # Smaller shifts of a trigger are left out of the sentence [m].
+            if abs(metres) >= 0.002:
                 side = sides[metres < 0.0]
                 parts.append(
                     f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
@@ -233,7 +227,8 @@ class Improvement:
         found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
         off = self.after.mean_um / self.target_um - 1.0
-        if abs(off) > OFF_TARGET:
+        # A mean film further from the target than this share gives a warning.
+        if abs(off) > 0.02:
             thick = off > 0.0
             other = (
                 (LIMIT_NAMES['slowest'],)
@@ -351,7 +346,7 @@ def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
     ):
         own = [
             (before, after) for before, after in pairs
-            if min(after.off_m, end) - max(after.on_m, begin) > LEAST_PASS_M
+            if min(after.off_m, end) - max(after.on_m, begin) > 0.05
         ]  # fmt: skip
         if not own:
             continue
@@ -362,7 +357,8 @@ def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
         earlier = first_before.on_m - on if first_before.on_m in opened_m else 0.0
         later = off - last_before.off_m if last_before.off_m in closed_m else 0.0
         old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-        speed = speed_along(improved, np.linspace(*inside, SAMPLES + 1))
+        # Samples of the new speed along a pass.
+        speed = speed_along(improved, np.linspace(*inside, 61))
         found.append(
             PassChange(
                 int(number) + 1, (on, off),

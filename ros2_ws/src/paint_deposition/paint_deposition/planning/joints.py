@@ -22,12 +22,8 @@ STARTS, FOLLOWED = 600, 40
 START_ROUNDS, ROUNDS = 60, 12
 # A pose is reached within this [m and rad].
 REACHED = 1e-5
-# No step turns a joint further [rad or m]; near a singularity steps are damped.
-LONGEST_STEP, DAMPING = 0.5, 1e-3
 # A joint without limits begins within this of zero [rad or m].
 UNLIMITED = np.pi
-# Configurations that differ by less are one [rad or m].
-SAME = 0.1
 
 
 @dataclass(frozen=True)
@@ -77,7 +73,8 @@ def starts(
     good = np.flatnonzero((error < REACHED) & within(arm, joints))
     found: list[Start] = []
     for row in good[np.argsort(np.abs((joints - middle) / half).max(axis=1)[good])]:
-        if all(np.abs(joints[row] - other.joints).max() > SAME for other in found):
+        # Configurations that differ by less are one [rad or m].
+        if all(np.abs(joints[row] - other.joints).max() > 0.1 for other in found):
             found.append(Start(joints[row], float(roll_rad[row])))
     return found[:FOLLOWED]
 
@@ -121,11 +118,12 @@ def towards(
     position, tip, jacobian = arm.jacobians(joints)
     turn = 0.5 * np.cross(tip, axes, axis=-2).sum(axis=-1)
     error = np.concatenate([positions_m - position, turn], axis=-1)
-    square = jacobian @ jacobian.swapaxes(-1, -2) + DAMPING**2 * np.eye(6)
+    # No step turns a joint further [rad or m]; near a singularity steps are damped.
+    square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-3**2 * np.eye(6)
     step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, error[..., np.newaxis])
     step = step[..., 0]
     longest = np.abs(step).max(axis=-1, keepdims=True)
-    step *= np.minimum(1.0, LONGEST_STEP / np.maximum(longest, 1e-12))
+    step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-12))
     return joints + step, np.linalg.norm(error, axis=-1)
 
 
@@ -139,10 +137,6 @@ def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
 MARGIN = 0.03
 # No motion is slowed down to less than this share: the robot stands in a singularity there.
 SLOWEST = 0.01
-# Of the joints that are written.
-RATE_HZ = 250.0
-# Smaller losses of speed are not told.
-TOLD = 0.005
 
 
 @dataclass(frozen=True)
@@ -226,7 +220,8 @@ class JointPace:
         """
         steps_s = 2.0 * np.diff(self.times_s) / (shares[1:] + shares[:-1])
         reached_s = np.append(0.0, np.cumsum(steps_s))
-        seconds = np.linspace(0.0, reached_s[-1], math.ceil(reached_s[-1] * RATE_HZ) + 1)
+        # Of the joints that are written.
+        seconds = np.linspace(0.0, reached_s[-1], math.ceil(reached_s[-1] * 250.0) + 1)
         step = np.clip(np.searchsorted(reached_s, seconds, side='right') - 1, 0, len(shares) - 2)
         since = seconds - reached_s[step]
         rise = (np.diff(shares) / steps_s)[step]
@@ -246,7 +241,8 @@ class JointPace:
         for number in np.unique(spray_pass[spray_pass >= 0]).tolist():
             inside = spray_pass == number
             share = float(shares[inside].min())
-            if share > 1.0 - TOLD:
+            # Smaller losses of speed are not told.
+            if share > 0.995:
                 continue
             speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
             of_speed = speed.max() > rate.max()

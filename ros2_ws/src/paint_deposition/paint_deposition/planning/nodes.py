@@ -18,9 +18,6 @@ from paint_deposition.planning.requests import Limits
 
 # Half the length over which bends of the path and its programmed speed are measured [m].
 BEND_M = 0.02
-# Where the gun is closed, a place much slower than its opening sets how fast that can be. Speeds
-# are taken over so much travel to both sides: poses of recordings jitter [m].
-MUCH_SLOWER, ABOUT_AS_SLOW = 0.8, 1.05
 STEADY_M = 0.01
 
 
@@ -164,10 +161,11 @@ def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: L
     high = np.minimum(places + STEADY_M, programme.travel_m[-1])
     seconds = programme.seconds_at(high) - programme.seconds_at(low)
     speed = (high - low) / np.maximum(seconds, 1e-9)
-    if speed.min() > MUCH_SLOWER * speed[0]:
+    # A place much slower than the opening of the gun sets how fast that can be.
+    if speed.min() > 0.8 * speed[0]:
         return math.inf
     # What the programme does there itself is possible, whatever acceleration is said to be.
-    slow = np.abs(places - end_m)[speed <= ABOUT_AS_SLOW * speed.min()].min()
+    slow = np.abs(places - end_m)[speed <= 1.05 * speed.min()].min()
     reach = 2.0 * limits.acceleration_m_per_s2 * float(slow)
     return max(math.sqrt(float(speed.min()) ** 2 + reach), float(speed[0]))
 

@@ -18,9 +18,6 @@ from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
 
-# Faces that turn further from the side of the gun are its back.
-BACK_COSINE = -0.1
-
 
 @dataclass(frozen=True, kw_only=True, repr=False)
 class PartPlan(PlannedFilm):
@@ -132,7 +129,8 @@ def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ..
     if request.outward is None:
         return faces
     side = np.asarray(request.outward) / np.linalg.norm(request.outward)
-    kept = tuple(face for face in faces if face.surface.outward @ side > BACK_COSINE)
+    # Faces that turn further from the side of the gun are its back.
+    kept = tuple(face for face in faces if face.surface.outward @ side > -0.1)
     if not kept:
         raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     return kept

@@ -14,14 +14,9 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
-# Travel at full speed before the gun opens and after it closes.
-SETTLING_M = 0.02
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
 WAYPOINTS_PER_MOVE = 4
 POSE_RATE_HZ = 250.0
-LEAST_TRANSFER_SPEED_M_PER_S = 0.3
-# Turn of the tool between passes is no faster than this.
-TURN_RATE_RAD_PER_S = math.radians(90.0)
 
 
 @dataclass(frozen=True)
@@ -40,7 +35,7 @@ class PassStyle:
     @property
     def transfer_speed_m_per_s(self) -> float:
         """From a pass or a face to the next [m/s]."""
-        return max(self.speed_m_per_s, LEAST_TRANSFER_SPEED_M_PER_S)
+        return max(self.speed_m_per_s, 0.3)
 
 
 @dataclass(frozen=True)
@@ -76,7 +71,8 @@ def plan_pass(
     """
     first, last = surface_map.extent_near_m(across_m, style.band_m)
     # From standstill to full speed with the gun off.
-    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + SETTLING_M
+    # Travel at full speed before the gun opens and after it closes.
+    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + 0.02
     beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
@@ -232,7 +228,8 @@ def _transfer(
     angle = float((turn[0].inv() * turn[1]).magnitude())
     length = float(np.linalg.norm(end - start))
     ramp = _Ramp(length, style.transfer_speed_m_per_s, style)
-    duration = max(ramp.duration_s, angle / TURN_RATE_RAD_PER_S)
+    # Turn of the tool between passes is no faster than this.
+    duration = max(ramp.duration_s, angle / math.radians(90.0))
     if duration == 0.0:
         return _Leg(np.empty(0), np.empty((0, 3)), np.empty((0, 4)), 0.0)
     times = _sample_times(duration, rate_hz)

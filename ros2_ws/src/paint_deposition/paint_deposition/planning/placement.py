@@ -18,16 +18,6 @@ from paint_deposition.planning.passes import PassStyle, plan_pass, trajectory_of
 from paint_deposition.planning.planned_film import stratified_sample
 from paint_deposition.planning.surface_map import SurfaceMap
 
-INDICES, OFFSETS = 25, 25
-# Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
-SLACK, LEAST_SLACK = 1.05, 0.002
-LINES_PER_SCALE = 5.0
-COARSEST_STEP_M = 0.02
-# Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak.
-STEPS_PER_SCALE = 5.0
-# Slower poses would be gaps, at which the gun is off.
-SLOWEST_RATE_HZ = 10.0
-
 
 class LineFilms:
     """Film at points spread evenly over the painted side, for passes along many lines.
@@ -56,13 +46,15 @@ class LineFilms:
         points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
         low, high = surface_map.extent_m[1]
         self.low_m, self.high_m = low - beyond_m, high + beyond_m
-        step = min(finest_m / LINES_PER_SCALE, COARSEST_STEP_M)
+        step = min(finest_m / 5.0, 0.02)
         count = math.ceil((self.high_m - self.low_m) / step) + 1
         self.lines_m = np.linspace(self.low_m, self.high_m, count)
         integrator = FilmIntegrator(points, model)
-        longest = finest_m / STEPS_PER_SCALE
+        # Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak.
+        longest = finest_m / 5.0
         # Poses about a sub-step apart.
-        rate = max(style.speed_m_per_s / longest, SLOWEST_RATE_HZ)
+        # Slower poses would be gaps, at which the gun is off.
+        rate = max(style.speed_m_per_s / longest, 10.0)
         self.films_um = np.empty((count, len(rows)))
         for k, across in enumerate(self.lines_m):
             line = (plan_pass(surface_map, float(across), style),)
@@ -125,7 +117,8 @@ def place_passes(
         if (placement := best_placement(films, extent_m, index_range_m, passes)) is not None
     ]
     closest = min(best, key=lambda placement: placement.sigma_n)
-    limit = tolerance or SLACK * closest.sigma_n + LEAST_SLACK
+    # Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
+    limit = tolerance or 1.05 * closest.sigma_n + 0.002
     good = [placement for placement in best if placement.sigma_n <= limit]
     if not good:
         raise PlanError(
@@ -155,8 +148,8 @@ def best_placement(
     # Lines further out than the films that are kept are not considered.
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)
     high = min(high, widest)
-    index = np.linspace(low, high, INDICES if high > low and passes > 1 else 1)
-    offset = np.linspace(-0.5, 0.5, OFFSETS)
+    index = np.linspace(low, high, 25 if high > low and passes > 1 else 1)
+    offset = np.linspace(-0.5, 0.5, 25)
     indices, offsets = (grid.ravel() for grid in np.meshgrid(index, offset))
     lines = lines_of(passes, indices, middle + offsets * indices)
     inside = (lines.min(axis=1) >= films.low_m) & (lines.max(axis=1) <= films.high_m)

@@ -44,10 +44,7 @@ from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
-# The gun opens where the pattern begins to reach the part with all but this much of its volume.
-OVERSPRAY_SHARE = 0.9
 TARGET_ROUNDS = 4
-TARGET_PRECISION = 2e-3
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -169,7 +166,7 @@ def plan(
         )  # fmt: skip
         mean, _ = evenness(found['film_um'][wanted.region], area)
         ratio = mean / target if target else 1.0
-        if abs(ratio - 1.0) <= TARGET_PRECISION or round_ == TARGET_ROUNDS - 1:
+        if abs(ratio - 1.0) <= 2e-3 or round_ == TARGET_ROUNDS - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     return Plan(
@@ -185,7 +182,8 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         widening = distance / model.projection.model_plane_m
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
-        overspray = widening * float(np.interp(OVERSPRAY_SHARE, enclosed, radii))
+        # The gun opens where 90 % of the pattern's volume begin to reach the part.
+        overspray = widening * float(np.interp(0.9, enclosed, radii))
     return PassStyle(
         standoff_m=plane.setup.standoff_m,
         speed_m_per_s=plane.speed_m_per_s,
@@ -198,16 +196,7 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
     )
 
 
-# A further pass must save this share of the cost: neither rounding nor an immeasurable gain
-# decides the number of passes.
-WORTH_A_PASS = 0.05
-# Numbers of passes tried: so many fewer, and so many more, than in the unoptimised plan.
-FEWER, MORE = 2, 1
-# The lead-in is long enough for a speed at the ends of a pass of this many times the mean.
-FASTER_ENDS = 1.3
 Planned = TypeVar('Planned', bound=PlannedFilm)
-# The pattern counts as round if a quarter turn of the tool changes the film by less of its peak.
-ROUND = 1e-3
 # Of the robot program, as of one that keeps the planned speeds.
 SHORTEST_MOVE_M = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
 QUARTER = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
@@ -227,7 +216,8 @@ def optimise(
     low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
     placements = [unoptimised.placement]
-    for passes in range(max(1, count - FEWER), count + MORE + 1):
+    # From two passes fewer than in the unoptimised plan to one more.
+    for passes in range(max(1, count - 2), count + 2):
         if passes != count:
             placement = best_placement(unoptimised.line_films, (low, high), (least, most), passes)
             placements += [placement] if placement else []
@@ -244,7 +234,9 @@ def optimise(
         + request.time_weight * one.cycle_time_s / unoptimised.cycle_time_s
         for one in tried
     ]
-    enough = min(costs) / (1.0 - WORTH_A_PASS)
+    # A further pass must save 5 % of the cost: neither rounding nor an immeasurable gain
+    # decides the number of passes.
+    enough = min(costs) / 0.95
     return next(one for one, cost in zip(tried, costs, strict=True) if cost <= enough)
 
 
@@ -260,7 +252,8 @@ def _timed_plan(
     even = unoptimised.style.speed_m_per_s * placement.passes / len(unoptimised.passes)
     speed = float(np.clip(even, request.speed_min_m_per_s, request.speed_max_m_per_s))
     # The run-up is that of the fastest.
-    style = replace(unoptimised.style, speed_m_per_s=FASTER_ENDS * speed)
+    # The lead-in is long enough for a speed at the ends of a pass of this many times the mean.
+    style = replace(unoptimised.style, speed_m_per_s=1.3 * speed)
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     passes = tuple(
         replace(planned, style=replace(style, speed_m_per_s=speed))
@@ -324,4 +317,5 @@ def _is_round(planned: PlannedFilm) -> bool:
     turned = Rotation.from_quat(planned.trajectory.quaternions_xyzw) * QUARTER
     trajectory = replace(planned.trajectory, quaternions_xyzw=turned.as_quat())
     film_um, _ = simulated(planned.surface, planned.model, trajectory)
-    return bool(np.abs(film_um - planned.film_um).max() < ROUND * planned.film_um.max())
+    # It is round if a quarter turn of the tool changes the film by less than 1e-3 of its peak.
+    return bool(np.abs(film_um - planned.film_um).max() < 1e-3 * planned.film_um.max())

@@ -26,7 +26,6 @@ from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 
-MOST_POINTS = 1500
 # A mean film this close to the target is on it; speeds this close to a limit keep it.
 NEAR = 0.01
 
@@ -284,8 +283,8 @@ def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
 
 
 def stratified_sample(area_m2: np.ndarray) -> np.ndarray:
-    """Rows that stand for equal shares of the area, MOST_POINTS at most."""
+    """Rows that stand for equal shares of the area, 1500 at most."""
     reached = np.cumsum(area_m2)
-    count = min(MOST_POINTS, 4 * len(area_m2))
+    count = min(1500, 4 * len(area_m2))
     shares = (np.arange(count) + 0.5) / count * reached[-1]
     return np.searchsorted(reached, shares)

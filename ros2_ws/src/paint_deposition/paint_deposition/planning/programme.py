@@ -18,8 +18,6 @@ from paint_deposition.planning.requests import ImproveRequest
 
 # Intervals that travel less have no speed: the gun waits or turns.
 STANDING_M = 1e-6
-# The shortest time between two poses that is written [s].
-LEAST_STEP_S = 1e-5
 # Stamps begin here: in ROS a stamp of 0 is none.
 BEGIN_NS = 1_000_000_000
 # Moves are straight: the path leaves them by no more than this [m]. A turn of the tool counts by
@@ -27,15 +25,8 @@ BEGIN_NS = 1_000_000_000
 TOLERANCE_M, LEVER_M = 0.0005, 0.3
 # A program's speeds are written in steps of this [m/s].
 SPEED_STEP_M_PER_S = 1e-5
-SLOWEST_M_PER_S = 1e-3
-# Sub-steps this close in time follow each other.
-ROUNDED_NS = 4
-# Whether a link meets the part is looked at this often along it [m].
-LINK_STEP_M = 0.01
 # The gun is closed so far before a turn and opened so far behind it: their places are estimates.
 TURN_M = 0.02
-# The speed is sampled so often along an opening.
-STEPS = 400
 
 
 @dataclass(frozen=True)
@@ -161,7 +152,8 @@ class Programme:
 
     def without_standstill(self) -> 'Programme':
         """Without poses that are reached in no time: the gun stood there and does so no more."""
-        kept = np.append(True, self.duration_s > LEAST_STEP_S)
+        # The shortest time between two poses that is written [s].
+        kept = np.append(True, self.duration_s > 1e-5)
         return replace(
             self,
             positions_m=self.positions_m[kept],
@@ -224,7 +216,8 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
     strokes = Strokes.of(programme)
     openings = programme.openings
     for begin, end in strokes.ends_m[np.flatnonzero(~strokes.begins_pass)[:, None] + [0, 1]]:
-        places = np.linspace(begin, end, math.ceil((end - begin) / LINK_STEP_M) + 2)[1:-1]
+        # Whether a link meets the part is looked at this often along it [m].
+        places = np.linspace(begin, end, math.ceil((end - begin) / 0.01) + 2)[1:-1]
         axes = programme.turns_at_s(programme.seconds_at(places)).as_matrix()[:, :, 2]
         if (surface.first_faces(programme.positions_at_m(places), axes) < 0).all():
             pieces = [
@@ -255,7 +248,8 @@ def _openings(
     sprays = path.flow > 0.0
     breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
     # The halves of two sub-steps are rounded, each to a nanosecond.
-    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > ROUNDED_NS
+    # Sub-steps this close in time follow each other.
+    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
     openings = []
     for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
         on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
@@ -292,7 +286,7 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
             pace = length / (clock[row] - clock[left])
         else:
             pace = float(speed[before : max(row, before + 1)].max())
-        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, SLOWEST_M_PER_S)
+        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, 1e-3)
         pose = whole.positions_m[row], whole.quaternions_xyzw[row]
         opening = programme.openings[max(number, 0)]
         flow = opening.flow if spraying else 1.0
@@ -303,7 +297,8 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
 def _stops(programme: Programme, number: int, request: ImproveRequest) -> np.ndarray:
     """Where moves begin and end in an opening: not too close in length, nor in time."""
     opening = programme.openings[number]
-    places = np.linspace(opening.on_m, opening.off_m, STEPS + 1)
+    # The speed is sampled so often along an opening.
+    places = np.linspace(opening.on_m, opening.off_m, 401)
     speed = speed_along(programme, places)
     least = np.maximum(request.move_min_m, speed / request.settings_per_s)
     moves = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])

@@ -33,10 +33,6 @@ BOUND_WEIGHT = 100.0
 # Weight that holds the mean of the best known film at the target. The levels of the
 # other models are free: holding them too would cost evenness.
 LEVEL_WEIGHT = 30.0
-# Smoothness is that of slowness over this length [m].
-SLOPE_M = 0.1
-# A constraint that costs more than this, in units of sigma_n squared, binds.
-BINDS = 1e-6
 # Additional weight of film outside the tolerance.
 BEYOND_TOLERANCE = 3.0
 LIMIT_NAMES = {
@@ -136,9 +132,8 @@ def _step(problem: Problem, now: Density) -> Density:
     names = np.repeat(
         [rows.name for rows in constraints], [r.matrix.shape[0] for r in constraints]
     )
-    binding = [
-        name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in LIMIT_NAMES
-    ]
+    # A constraint that costs more than this, in units of sigma_n squared, binds.
+    binding = [name for name in dict.fromkeys(names[costs > 1e-6].tolist()) if name in LIMIT_NAMES]
     flow = values[count:]
     least, most = problem.request.flow
     if least >= most:
@@ -175,7 +170,8 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     mean = float(weights @ now.density / weights.sum())
     unit = np.eye(problem.size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
-    slope *= (SLOPE_M / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
+    # Smoothness is that of slowness over this length [m].
+    slope *= (0.1 / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()

@@ -20,10 +20,6 @@ from paint_deposition.planning.index_search import (
 )
 from paint_deposition.planning.requests import IndexRequest
 
-# Film below this share of the mean, between passes, is a bare stripe.
-BARE = 0.01
-FIRST_GUESS_M_PER_S = 0.2
-SPEED_ROUNDS = 6
 # Within this share of a speed film goes as 1 / speed, whatever an effect makes of the speed.
 NEAR = 1e-4
 
@@ -129,7 +125,7 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
             f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'
         )
     setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
-    speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
+    speed = request.speed_m_per_s or 0.2
     # A speed that is only a guess is replaced at the end.
     guessed = request.speed_m_per_s is None and bool(model.effects)
     parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
@@ -189,7 +185,8 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
 def _refuse_stripes(parallel: ParallelPasses, best: Minimum, half_width_m: float) -> None:
     period = parallel.period_m(best.index_m)
     least = parallel.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
-    if least < BARE * parallel.mean_um(best.index_m):
+    # Film below this share of the mean, between passes, is a bare stripe.
+    if least < 0.01 * parallel.mean_um(best.index_m):
         raise PlanError(
             f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
             f'{half_width_m:.3f} m wide at half its height; search about that index'
@@ -229,7 +226,7 @@ def _at_target(
     """Choose the speed: film goes as 1 / speed, unless an effect depends on the speed."""
     assert request.target_um is not None
     low, high = float(curve.index_m[0]), float(curve.index_m[-1])
-    for _ in range(SPEED_ROUNDS):
+    for _ in range(6):
         wanted = speed * curve.parallel.mean_um(best.index_m) / request.target_um
         if not model.effects or abs(wanted - speed) <= NEAR * speed:
             parallel = curve.parallel

@@ -11,10 +11,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from paint_deposition.errors import PlanError, ReadingsError
 from paint_deposition.request import Request, given
 
-USUAL_RANGE_M = (0.2, 0.8)
-# A pattern whose SB50 lies here is searched over the usual range, another one over its own scale.
-USUAL_HALF_WIDTHS_M = (0.25, 0.75)
-RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
 SLOWEST_M_PER_S, FASTEST_M_PER_S = 0.005, 3.0
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -98,11 +94,10 @@ class IndexRequest(SpeedLimits, PassRequest):
 
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
         """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
-        least, greatest = USUAL_HALF_WIDTHS_M
-        usual = USUAL_RANGE_M
-        if not least <= half_width_m <= greatest:
-            least, greatest = RANGE_IN_HALF_WIDTHS
-            usual = round(least * half_width_m, 3), round(greatest * half_width_m, 3)
+        # A pattern of a usual SB50 is searched over the usual range, another over its own scale.
+        usual = 0.2, 0.8
+        if not 0.25 <= half_width_m <= 0.75:
+            usual = round(0.35 * half_width_m, 3), round(1.4 * half_width_m, 3)
         low = usual[0] if self.index_min_m is None else self.index_min_m
         high = usual[1] if self.index_max_m is None else self.index_max_m
         if not low < high:

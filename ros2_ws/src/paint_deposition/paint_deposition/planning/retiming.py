@@ -23,20 +23,10 @@ from paint_deposition.planning.quadratic_program import (
 )
 from paint_deposition.planning.requests import ImproveRequest
 
-# Nodes per width of the pattern, within bounds.
-NODES_PER_SIGMA = 2.0
-FINEST_M, COARSEST_M = 0.015, 0.05
 # The film of the solution and that of the timed programme agree to this share of the target.
 FILM_AGREEMENT, ROUNDS = 5e-4, 4
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
-# A limit is reported if sigma_n without it would be lower by this share.
-NAMED_GAIN = 0.02
-# An opening is not cut to less than this share of its length.
-LEAST_SHARE = 0.3
-# It is extended only where the path runs on straight, at nearly the speed of its end.
-STRAIGHT, STEADY = 0.995, 0.99
-CHECKS = 20
 
 
 @dataclass(frozen=True)
@@ -90,7 +80,8 @@ def retime_for_evenness(
     target = wanted.target_um or request.target_um or mean
     bands = wanted.bands(rows, target, request.tolerance)
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
-    spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
+    # Nodes per width of the pattern, within bounds.
+    spacing = min(max(narrow / 2.0, 0.015), 0.05)
     search = _Search(programme, films, target, target / mean, bands, request, spacing, progress)
     return search.retiming(explain)
 
@@ -190,7 +181,8 @@ class _Search:
         for number, name in enumerate(found.binding):
             self.progress('limits', number / len(found.binding))
             relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
-            if relaxed < (1.0 - NAMED_GAIN) * sigma_n:
+            # A limit is reported if sigma_n would be lower by 2 % without it.
+            if relaxed < 0.98 * sigma_n:
                 limits.append(BindingLimit(LIMIT_NAMES[name], relaxed))
         return tuple(sorted(limits, key=lambda limit: limit.sigma_n))
 
@@ -229,7 +221,7 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     """How far the path continues from an end, straight and at a steady speed."""
     if most_m <= 0.0:
         return 0.0
-    way = np.linspace(0.0, most_m, CHECKS + 1)
+    way = np.linspace(0.0, most_m, 21)
     places = from_m + side * way
     at = programme.positions_at_m(places)
     seconds = np.abs(np.diff(programme.seconds_at(places)))
@@ -237,9 +229,10 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     # The opening may end in a turn: it runs on straight as seen from inside.
     inside = np.array([from_m - side * way[1], from_m])
     own = way[1] / max(float(np.ptp(programme.seconds_at(inside))), 1e-9)
-    good = speed >= STEADY * own
+    # It is extended only where the path runs on straight, at nearly the speed of its end.
+    good = speed >= 0.99 * own
     off = np.linalg.norm(at[1:] - programme.positions_at_m(inside[:1]), axis=1)
-    good &= off >= STRAIGHT * (way[1:] + way[1])
+    good &= off >= 0.995 * (way[1:] + way[1])
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
@@ -284,7 +277,8 @@ def _openings(
 
 def _most_cut_m(opening: Opening, request: ImproveRequest) -> float:
     length = opening.off_m - opening.on_m
-    return min(request.trigger_cut_m, 0.5 * (1.0 - LEAST_SHARE) * length)
+    # An opening is not cut to less than 30 % of its length.
+    return min(request.trigger_cut_m, 0.35 * length)
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:

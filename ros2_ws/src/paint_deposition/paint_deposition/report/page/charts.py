@@ -84,10 +84,6 @@ def figure(
     return {'name': name, 'charts': list(charts), 'legend': entries}
 
 
-MOST_COVARIATES = 8
-BINS = 6
-# Conditions that differ by less than this share say nothing of the model.
-LEAST_SPREAD = 0.01
 AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
@@ -129,9 +125,10 @@ def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[
 def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     """Residual against what differs from point to point, the most telling first."""
     values = _conditions(data)
-    differing = {n for n, v in values.items() if np.ptp(v) > LEAST_SPREAD * np.abs(v).max()}
+    # Conditions that differ by less than this share say nothing of the model.
+    differing = {n for n, v in values.items() if np.ptp(v) > 0.01 * np.abs(v).max()}
     dependences = [d for d in data.comparisons[0].dependences if d.covariate in differing]
-    dependences = dependences[:MOST_COVARIATES]
+    dependences = dependences[:8]
     if not dependences:
         return None
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
@@ -171,7 +168,7 @@ def _conditions(data: ReportData) -> dict[str, np.ndarray]:
 
 def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
     """Means of the covariate, and of each model's residual, over sixths of the readings."""
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, BINS + 1)))
+    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 7)))
     bin_of = np.minimum(np.digitize(x, edges), max(len(edges) - 1, 1))
     sums = np.array([np.bincount(bin_of, values) for values in (np.ones(len(x)), x, *residuals)])
     means = sums[1:, sums[0] > 0.0] / sums[0, sums[0] > 0.0]

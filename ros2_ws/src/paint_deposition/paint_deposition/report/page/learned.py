@@ -19,12 +19,6 @@ from paint_deposition.report.words import capital, covariate_label, effect_name,
 CURVE_POINTS = 201
 # The accent, so pale that grid and curves show through.
 BAND = 'rgba(0,112,140,0.18)'
-HEIGHT_PX = 340
-# Cells of a footprint from one side to the other, and how far out the pattern matters: where it
-# is above this share of its peak.
-CELLS, FAINT = 81, 0.02
-# Contours of the pattern of eq. (1), as shares of its peak.
-CONTOURS = (0.1, 0.5, 0.9)
 
 
 def learned_figure(data: ReportData) -> dict[str, Any] | None:
@@ -144,8 +138,9 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
     if not laws:
         return None
     patterns, brushes = data.model.patterns, data.model.brushes
-    reach = max(planar.radius_of_flux_m(FAINT) for planar in patterns)
-    along, labels = np.linspace(-reach, reach, CELLS), ('tool x [m]', 'tool y [m]')
+    # As far out as the pattern matters: where it is above 2 % of its peak.
+    reach = max(planar.radius_of_flux_m(0.02) for planar in patterns)
+    along, labels = np.linspace(-reach, reach, 81), ('tool x [m]', 'tool y [m]')
     x, y = np.meshgrid(along, along)
     plain = [planar.flux_um_per_s(x, y) for planar in patterns]
     factor = np.maximum(1.0 + laws[0].h(x, y), LEAST_FACTOR)
@@ -156,6 +151,7 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
         for title, values in (('of eq. (1)', flux), ('as learned', flux * factor)):
             title = f'pattern {title}{whose} [µm/s]'
             found.append(_heat_map(title, labels, along, along, values, colours))
+    # Contours of the pattern of eq. (1), as shares of its peak.
     contours = [
         {
             'type': 'contour', 'x': along, 'y': along, 'z': plain[0], 'showscale': False,
@@ -163,7 +159,7 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
             'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain[0].max()},
             'showlegend': False,
         }
-        for share in CONTOURS
+        for share in (0.1, 0.5, 0.9)
     ]  # fmt: skip
     title = f'factor, with contours of eq. (1){of[0]}'
     found.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), contours))
@@ -198,4 +194,4 @@ def _heat_map(
         'colorbar': {'thickness': 10, 'outlinewidth': 0,
                      'tickfont': {'size': 11, 'color': MUTED}},
     }  # fmt: skip
-    return layout.chart(title, [heat, *above], arranged, HEIGHT_PX)
+    return layout.chart(title, [heat, *above], arranged, 340)

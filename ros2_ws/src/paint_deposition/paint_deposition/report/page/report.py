@@ -35,7 +35,6 @@ from paint_deposition.report.pictures.planning import improved_figures
 from paint_deposition.report.style import DOTS_PER_INCH
 
 TEMPLATES = Path(__file__).parent / 'templates'
-SPRAYS_SHOWN = 5
 
 
 def write_report(path: Path, data: ReportData) -> Path:
@@ -100,7 +99,7 @@ def report_html(data: ReportData) -> str:
         blind=tables.blind_rows(data),
         misfits=tables.misfit_rows(data),
         places=places,
-        sprays=sprays[:SPRAYS_SHOWN],
+        sprays=sprays[:5],
         separates=words.capital(words.competing_explanations(sprays[0])) if sprays else '',
         provenance=[
             ('Made', datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z')),
@@ -140,10 +139,6 @@ def embedded(figure: Figure) -> str:
     return f'data:image/png;base64,{b64encode(content.getvalue()).decode("ascii")}'
 
 
-# Seconds after which a page that is not complete looks for more.
-RELOAD_S = 2
-
-
 @dataclass(frozen=True)
 class Chapter:
     """What one step found."""
@@ -163,7 +158,8 @@ def write_story(
         told: each chapter with the command that does the same by hand.
         underway: what is being done; until it has ``ended`` the page reloads itself.
     """
-    reload_s = RELOAD_S if underway and not ended else None
+    # Seconds after which a page that is not complete looks for more.
+    reload_s = 2 if underway and not ended else None
     page = from_template('story.html.j2', {}, told=told, underway=underway, reload_s=reload_s)
     write_text(path, page)
     return path

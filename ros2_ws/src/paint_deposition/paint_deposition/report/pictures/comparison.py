@@ -26,13 +26,9 @@ from paint_deposition.report.style import (
 )
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
-# As many letters of a title fit over a chart; one that is longer is written smaller.
-TITLE_LETTERS = 41
 # A profile's two charts with the room around them, as shares of it, and that of the legend [in].
 PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
 PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
-# Few readings beyond the end of the colours do not take the contrast from all others.
-SHOWN_SHARE = 0.98
 
 
 def part_figures(data: ReportData, index: int) -> list[Figure]:
@@ -65,7 +61,8 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     points = experiment.points
     positions, normals = points.positions_m[:count], points.normals[:count]
     room = 0.03 * (part.high_m - part.low_m).max()
-    largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), SHOWN_SHARE))
+    # Few readings beyond the end of the colours do not take the contrast from all others.
+    largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), 0.98))
     scale = residual_scale(np.array([largest]))
     places = part.view.flat(positions)
     figures = []
@@ -143,7 +140,8 @@ def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
     of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
     errors = [f'{c.points.select(profile.rows).rmse_um:.2f}' for c in data.comparisons]
     title = f'{of}{profile.label}:  RMSE {" → ".join(errors)} µm'
-    title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(title))
+    # As many letters of a title fit over a chart; one that is longer is written smaller.
+    title_pt = (TEXT_PT + 1.0) * min(1.0, 41 / len(title))
     axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
     at_mm, line_mm = MM * profile.position_m, MM * profile.line_m
     measured_um = data.study.measured_um[profile.rows]

@@ -29,10 +29,7 @@ from paint_deposition.report.style import (
     quiet,
 )
 
-# The part's share of the picture, and the column beside it [in].
-PART_IN = (7.6, 7.6)
 BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 3.1, 1.0, 3.4
-BINS = 40
 NO_TARGET = GRID
 
 
@@ -52,7 +49,8 @@ def film_picture(
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
-    width, height = (high - low) * min(PART_IN / (high - low))
+    # The part's share of the picture, and the column beside it [in].
+    width, height = (high - low) * min(7.6 / (high - low))
     rows = 2 if statistics.has_target else 1
     figure = new_figure(
         width + BESIDE_IN + AROUND_IN, rows * (max(height, LEAST_HEIGHT_IN) + AROUND_IN)
@@ -217,7 +215,7 @@ def _draw_histogram(
     axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
     axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
     if len(film):
-        axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
+        axes.hist(film, 40, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
     for limit in (low, middle, high):
         axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 

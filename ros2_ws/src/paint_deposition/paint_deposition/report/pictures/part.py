@@ -22,20 +22,13 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
 
-# Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
-MARGIN_IN_PARTS = 1.0
-# Whether a triangle is hidden is seen from a place so far above it [m].
-LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
-ARROWS_A_WIDTH = 3.0
 # Where a label of a point may stand [pt], the best place first.
 AROUND_POINT = 9.0 * np.array(
     [(1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.2), (0, -1.2)]
 )
 # Rounds of smoothing of a zone's border, over neighbours; a label is so much wider than high.
 SMOOTHINGS, LABEL_SHAPE = 3, np.array([5.0, 1.0])
-# On a page a part is drawn no higher than this, with this room above and below [in].
-HIGHEST_IN, AROUND_IN = 4.2, 1.3
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
@@ -109,7 +102,8 @@ class PartPicture:
         first, second = (flat[surface.faces[:, k]] - flat[surface.faces[:, 0]] for k in (1, 2))
         front = surface.faces[first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]]
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
-        above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
+        # Whether a triangle is hidden is seen from a place so far above it [m].
+        above = surface.vertices_m[faces].mean(axis=1) + 1e-3 * view.toward
         seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
         # Creases, where patches share no vertex, and rims have one triangle only.
         edges, of_face = edges_of(faces[seen])
@@ -129,7 +123,8 @@ class PartPicture:
     def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of a picture of the part with its whole passes [m]."""
         low, high = self.low_m, self.high_m
-        margin = MARGIN_IN_PARTS * (high - low).max()
+        # Passes beside the part are shown as far off as the part is large.
+        margin = (high - low).max()
         gun = self.view.flat(spray.position_m[spray.flow > 0.0])
         if len(gun):
             low = np.maximum(np.minimum(low, gun.min(axis=0)), low - margin)
@@ -140,8 +135,9 @@ class PartPicture:
     def on_page(self, low: np.ndarray, high: np.ndarray, title: str) -> tuple[Figure, Axes]:
         """A picture as wide as a page has room for, and its axes to these corners [m]."""
         across, upward = high - low
-        height = min((PAGE_IN - 0.8) * upward / across, HIGHEST_IN)
-        figure = new_figure(PAGE_IN, height + AROUND_IN)
+        # On a page a part is drawn no higher than this, with this room above and below [in].
+        height = min((PAGE_IN - 0.8) * upward / across, 4.2)
+        figure = new_figure(PAGE_IN, height + 1.3)
         axes = figure.subplots()
         self.dress(axes, low, high)
         axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
@@ -303,7 +299,7 @@ def draw_tool_path(
         shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
         if len(shown) < 2:
             continue
-        _draw_arrows(axes, shown, (high - low).max() / ARROWS_A_WIDTH)
+        _draw_arrows(axes, shown, (high - low).max() / 3.0)
         if number not in drawn:
             drawn.add(number)
             axes.annotate(

@@ -33,9 +33,7 @@ POINTS = 600
 CHOSEN = '#c0392b'
 # The colours span the films but for this share at either end.
 SHOWN = 0.99
-MOST_CHARTS, SAMPLES = 12, 120
 FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
-MAP_IN = (5.2, 5.2)
 
 
 def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
@@ -112,7 +110,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
     low, high = _window(part, result)
-    passes = result.changes[:MOST_CHARTS]
+    passes = result.changes[:12]
     columns = min(len(passes), 4)
     rows = math.ceil(len(passes) / columns)
     width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
@@ -190,7 +188,7 @@ def _title(name: str, laid: FilmSummary) -> str:
 def _draw_speeds(axes: Axes, change: PassChange, result: Improvement) -> None:
     """The speeds along a pass, before and after."""
     begin, end = change.place_m
-    places = np.linspace(begin + STANDING_M, end - STANDING_M, SAMPLES + 1)
+    places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
     middle = 0.5 * (places[1:] + places[:-1]) - begin
     programmes = result.retiming.original, result.retiming.programme
     for programme, colour, name in zip(
@@ -205,7 +203,7 @@ def write_places(path: str | Path, places: PartPlaces) -> Path:
     step = max(np.ptp(places.x_m) / max(len(places.x_m) - 1, 1), 1e-3)
     edges = [np.append(at, at[-1] + step) - 0.5 * step for at in (places.x_m, places.y_m)]
     low, high = (np.array([one[end] for one in edges]) for end in (0, -1))
-    width, height = (high - low) * min(MAP_IN / (high - low))
+    width, height = (high - low) * min(5.2 / (high - low))
     figure = new_figure(width + 2.4, height + 1.4)
     axes = figure.subplots()
     quiet(axes, "x of the part in the robot's base [m]", 'y [m]')

@@ -27,10 +27,6 @@ from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 
-# So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
-DIGITS = 8
-# The numbers of a learned law.
-LEARNED = ('learned', 'sd')
 # What a step of the history added, where it was no effect.
 PATTERN, REFIT = 'pattern', 'refit'
 
@@ -113,7 +109,10 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
     )
     for effect in model.effects:
         if isinstance(effect, LearnedLaw) and effect not in given:
-            values = {n: _short(v) for n, v in effect if isinstance(v, float) or n in LEARNED}
+            # The numbers of a learned law.
+            values = {
+                n: _short(v) for n, v in effect if isinstance(v, float) or n in ('learned', 'sd')
+            }
         else:
             values = {
                 name: min(max(_short(getattr(effect, name)), info['low']), info['high'])
@@ -127,7 +126,8 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
 def _short(value: Any) -> Any:
     """The same with few digits in all its numbers."""
     if isinstance(value, float):
-        return float(f'{value:.{DIGITS}g}')
+        # Eight digits leave the film within 1e-6 of its peak; the uncertainty is far larger.
+        return float(f'{value:.8g}')
     if isinstance(value, dict):
         return {name: _short(one) for name, one in value.items()}
     return type(value)(map(_short, value))
