@@ -12,7 +12,7 @@ from paint_deposition.planning.placement import place_passes
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.planned_film import evenness
 from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.report.writers.plans import Passes, write_passes
+from paint_deposition.report.writers.plans import write_passes
 from planning.test_surface_map import sheet
 from scenes import painted
 
@@ -106,10 +106,9 @@ def test_impossible_plans_say_why(bowed, what, words):
 
 
 def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):
-    passes = Passes(planned.trajectory, planned.moves, planned.model, 'Planned')
-    write_passes(tmp_path, passes)
-    write_passes(tmp_path, passes)
+    write_passes(tmp_path, planned)
+    write_passes(tmp_path, planned)
     (tmp_path / 'trajectory' / 'notes.txt').write_text('mine')
     with pytest.raises(Exception, match='no planned bag; move it away'):
-        write_passes(tmp_path, passes)
+        write_passes(tmp_path, planned)
     assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'

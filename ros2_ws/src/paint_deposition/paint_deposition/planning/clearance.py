@@ -44,12 +44,14 @@ def contacts(
 
     What is smaller than an edge of that mesh may be missed by half an edge.
     """
-    rows = _steps(trajectory)
-    positions = trajectory.positions_m[rows]
-    turns = Rotation.from_quat(trajectory.quaternions_xyzw[rows])
-    axes = turns.as_matrix()[:, :, 2]
+    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
+    rows = rows_apart(trajectory.positions_m, turns, 0.01, math.radians(2.0))
+    positions, axes = trajectory.positions_m[rows], turns[rows].as_matrix()[:, :, 2]
+    # The spheres that hold gun and cylinder, about the middle of both.
+    whole_m = envelope.before_m + envelope.length_m
     near = cKDTree(surface.vertices_m).query_ball_point(
-        positions + envelope.middle_m * axes, envelope.reach_m
+        positions + (envelope.before_m - 0.5 * whole_m) * axes,
+        math.hypot(envelope.radius_m, 0.5 * whole_m),
     )
     seconds = 1e-9 * (trajectory.stamps_ns[rows] - trajectory.stamps_ns[0])
     found: list[Contact] = []
@@ -81,11 +83,11 @@ def contacts(
     return tuple(found)
 
 
-def _steps(trajectory: Trajectory) -> np.ndarray:
-    """Rows of poses that lie a step apart, with the last one."""
-    # Poses are looked at after this much travel or turn.
-    way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / 0.01
-    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
-    way += (turns[:-1].inv() * turns[1:]).magnitude() / math.radians(2.0)
-    steps = np.floor(np.concatenate([[0.0], np.cumsum(way)]))
-    return np.unique(np.append(np.unique(steps, return_index=True)[1], len(trajectory) - 1))
+def rows_apart(
+    positions_m: np.ndarray, turns: Rotation, step_m: float, step_rad: float
+) -> np.ndarray:
+    """Rows of poses (N,) that lie about so much travel or turn apart, both ends included."""
+    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / step_m
+    way += (turns[:-1].inv() * turns[1:]).magnitude() / step_rad
+    steps = np.floor(np.append(0.0, np.cumsum(way)))
+    return np.union1d(np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0), len(steps) - 1)

@@ -13,6 +13,7 @@ from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.planning.clearance import rows_apart
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,
@@ -190,7 +191,7 @@ def _joints(
     begin: Start | None = None,
 ) -> tuple[np.ndarray, Start]:
     """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
-    rows = _apart(positions_m, turns)
+    rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
     way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
     axes = (turns * _roll(begun.roll_rad)).as_matrix()
     joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
@@ -204,16 +205,6 @@ def _joints(
 
 def _roll(roll_rad: float) -> Rotation:
     return Rotation.from_rotvec([0.0, 0.0, roll_rad])
-
-
-def _apart(positions_m: np.ndarray, turns: Rotation) -> np.ndarray:
-    """Rows of poses about APART from each other, both ends included."""
-    angle = (turns[:-1].inv() * turns[1:]).magnitude()
-    # The way is chosen over poses that lie so far apart.
-    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / 0.02 + angle / math.radians(3.0)
-    steps = np.floor(np.append(0.0, np.cumsum(way)))
-    rows = np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0)
-    return np.union1d(rows, len(steps) - 1)
 
 
 def _best_way(

@@ -44,16 +44,6 @@ class FacePasses:
     passes: tuple[PlannedPass, ...]
     style: PassStyle
 
-    @property
-    def start_m(self) -> np.ndarray:
-        """(3,) TCP at the start of the first pass [m]."""
-        return self.passes[0].positions_m[0]
-
-    @property
-    def end_m(self) -> np.ndarray:
-        """(3,) TCP at the end of the last pass [m]."""
-        return self.passes[-1].positions_m[-1]
-
     def reversed(self) -> 'FacePasses':
         """The same passes the other way round, the last one first."""
         return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
@@ -181,7 +171,8 @@ def _nearest_next(
 
 
 def _travel_m(before: FacePasses, after: FacePasses) -> float:
-    return float(np.linalg.norm(after.start_m - before.end_m))
+    ends = before.passes[-1].positions_m[-1], after.passes[0].positions_m[0]
+    return float(np.linalg.norm(ends[1] - ends[0]))
 
 
 def join_motions(

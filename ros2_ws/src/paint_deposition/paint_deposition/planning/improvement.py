@@ -14,6 +14,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
 from paint_deposition.planning.planned_film import WantedFilm, evenness
@@ -172,6 +173,7 @@ class Improvement:
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
+    contacts: tuple[Contact, ...] = ()  # the path is the user's, and not looked at
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -292,8 +294,8 @@ class Improvement:
     def limit_sentences(self) -> tuple[str, ...]:
         """Which limits keep the film from being more even, a line each."""
         found = [
-            f'limited by {limit.name}: sigma_n {100 * limit.sigma_n:.1f} % without it'
-            for limit in self.retiming.binding_limits
+            f'limited by {name}: sigma_n {100 * sigma_n:.1f} % without it'
+            for name, sigma_n in self.retiming.binding_limits.items()
         ]
         found.append(
             'along this path, without limits and without weights for paint, time and smoothness, '
@@ -325,7 +327,10 @@ class Improvement:
             ],
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
-            'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
+            'binding_limits': [
+                {'name': name, 'sigma_n': sigma_n}
+                for name, sigma_n in self.retiming.binding_limits.items()
+            ],
             'passes': [change.to_dict() for change in self.changes],
             'request': self.request.model_dump(),
             'robot': self.drive and self.drive.to_dict(),

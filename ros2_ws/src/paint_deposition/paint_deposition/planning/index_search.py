@@ -128,7 +128,14 @@ class IndexCurve:
         index = np.linspace(low_m, high_m, min(max(count, 121), 601))
         sigma = parallel.sigma_n_at(index)
         inside = np.flatnonzero((sigma[1:-1] < sigma[:-2]) & (sigma[1:-1] <= sigma[2:])) + 1
-        minima = tuple(_refined(parallel, index[k - 1], index[k + 1]) for k in inside)
+        refined = [
+            minimize_scalar(
+                parallel.sigma_n, bounds=(index[k - 1], index[k + 1]), method='bounded',
+                options={'xatol': PRECISION_M},
+            )
+            for k in inside
+        ]  # fmt: skip
+        minima = tuple(Minimum(float(found.x), float(found.fun)) for found in refined)
         return IndexCurve(parallel, index, sigma, minima)
 
     @property
@@ -155,13 +162,6 @@ class IndexCurve:
         if knots[-1][1] <= tolerance:
             ends.append(knots[-1][0])
         return list(zip(ends[::2], ends[1::2], strict=True))
-
-
-def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
-    found = minimize_scalar(
-        parallel.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
-    )
-    return Minimum(float(found.x), float(found.fun))
 
 
 def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:

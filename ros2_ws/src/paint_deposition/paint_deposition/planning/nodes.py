@@ -109,19 +109,13 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
     return replace(whole, duration_s=duration).without_standstill()
 
 
-@dataclass(frozen=True)
-class SpeedBounds:
-    """(n,) greatest speed at each node [m/s], and (n,) which limit sets it."""
-
-    greatest_m_per_s: np.ndarray
-    limit: np.ndarray
-
-
 ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
-def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBounds:
-    """How fast the gun may go at the nodes.
+def speed_bounds(
+    programme: Programme, nodes: Nodes, limits: Limits
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) how fast the gun may go at the nodes [m/s], and (n,) which limit sets that.
 
     In a bend no faster than the acceleration allows, unless it was programmed so; where it opens
     and closes, no faster than can be reached from its way there and slowed down on its way on.
@@ -148,7 +142,7 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
             fastest = _fastest_m_per_s(programme, end, far, limits)
             if fastest < greatest[node]:
                 greatest[node], limit[node] = fastest, LEAD
-    return SpeedBounds(greatest, limit)
+    return greatest, limit
 
 
 def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: Limits) -> float:

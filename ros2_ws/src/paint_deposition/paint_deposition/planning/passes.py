@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -137,26 +136,27 @@ def trajectory_of(
 
     Every pass and every transfer between passes starts and ends at rest, with trapezoidal speed.
     """
-    legs: list[_Leg] = []
+    legs: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     triggers = []
     clock = 0.0
     for number, planned in enumerate(passes):
         if number:
-            legs.append(_transfer(clock, passes[number - 1], planned, style, rate_hz))
-            clock += legs[-1].duration_s
+            between, duration_s = _transfer(clock, passes[number - 1], planned, style, rate_hz)
+            legs.append(between)
+            clock += duration_s
         ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
         triggers += [clock + ramp.time_at_m(planned.on_m), clock + ramp.time_at_m(planned.off_m)]
         times = _sample_times(ramp.duration_s, rate_hz)
         poses = _poses_at(planned, ramp.travel_at_s(times))
-        legs.append(_Leg(clock + times, *poses, ramp.duration_s))
+        legs.append((clock + times, *poses))
         clock += ramp.duration_s
-    stamps_s = np.concatenate([leg.stamps_s for leg in legs])
+    stamps_s, positions_m, quaternions = map(np.concatenate, zip(*legs, strict=True))
     stamps_ns = np.round(stamps_s * 1e9).astype(np.int64)
     forward = np.append(True, np.diff(stamps_ns) > 0)
     return Trajectory(
         stamps_ns=stamps_ns[forward],
-        positions_m=np.concatenate([leg.positions_m for leg in legs])[forward],
-        quaternions_xyzw=np.concatenate([leg.quaternions for leg in legs])[forward],
+        positions_m=positions_m[forward],
+        quaternions_xyzw=quaternions[forward],
         frame_id=frame_id,
         trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
@@ -177,15 +177,6 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
             spraying = 2 <= k < len(stops) - 1
             moves.append(Move(*pose, speed, spraying, brush=style.brush))
     return moves
-
-
-class _Leg(NamedTuple):
-    """A timed stretch: samples with their times, and how long it takes."""
-
-    stamps_s: np.ndarray
-    positions_m: np.ndarray
-    quaternions: np.ndarray
-    duration_s: float
 
 
 class _Ramp:
@@ -221,8 +212,11 @@ class _Ramp:
 
 def _transfer(
     start_s: float, before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float
-) -> _Leg:
-    """Straight from the end of a pass to the start of the next, turning evenly with the travel."""
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
+    """Straight from the end of a pass to the start of the next, turning evenly with the travel.
+
+    Returned are times, positions and quaternions, and how long it takes.
+    """
     start, end = before.positions_m[-1], after.positions_m[0]
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
     angle = float((turn[0].inv() * turn[1]).magnitude())
@@ -231,14 +225,14 @@ def _transfer(
     # Turn of the tool between passes is no faster than this.
     duration = max(ramp.duration_s, angle / math.radians(90.0))
     if duration == 0.0:
-        return _Leg(np.empty(0), np.empty((0, 3)), np.empty((0, 4)), 0.0)
+        return (np.empty(0), np.empty((0, 3)), np.empty((0, 4))), 0.0
     times = _sample_times(duration, rate_hz)
     share = times / duration
     if length > 0.0:
         share = ramp.travel_at_s(share * ramp.duration_s) / length
     positions = start + share[:, np.newaxis] * (end - start)
     quaternions = Slerp([0.0, 1.0], turn)(share).as_quat()
-    return _Leg(start_s + times, positions, quaternions, duration)
+    return (start_s + times, positions, quaternions), duration
 
 
 def _poses_at(planned: PlannedPass, way_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -322,17 +322,12 @@ def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
         if last - first < 2:
             continue
         between = followed[first + 1 : last]
-        off = _distances(between, followed[first], followed[last])
+        way = followed[last] - followed[first]
+        share = (between - followed[first]) @ way / max(float(way @ way), 1e-12)
+        nearest = followed[first] + np.outer(np.clip(share, 0.0, 1.0), way)
+        off = np.linalg.norm(between - nearest, axis=1)
         if off.max() > TOLERANCE_M:
             middle = first + 1 + int(off.argmax())
             wanted[middle] = True
             spans += [(first, middle), (middle, last)]
     return np.flatnonzero(wanted)
-
-
-def _distances(points: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(N,) distances of points (N, D) from a line segment."""
-    way = end - begin
-    square = float(way @ way)
-    share = np.clip((points - begin) @ way / square, 0.0, 1.0) if square > 0.0 else 0.0
-    return np.linalg.norm(points - begin - np.multiply.outer(share, way), axis=-1)

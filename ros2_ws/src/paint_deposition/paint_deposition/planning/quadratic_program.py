@@ -21,7 +21,6 @@ from paint_deposition.planning.nodes import (
     LEAD,
     ROBOT,
     Nodes,
-    SpeedBounds,
 )
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
@@ -78,7 +77,7 @@ class Problem:
     bands: Sequence[Band]  # of the points
     # Of the path.
     nodes: Nodes
-    bounds: SpeedBounds
+    bounds: tuple[np.ndarray, np.ndarray]  # greatest speeds and their limits, see speed_bounds
     request: ImproveRequest  # of the user
     original_s: float  # paint of the original programme [s at the calibrated flow]
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
@@ -202,14 +201,14 @@ def _constraints(problem: Problem, now: Density) -> list[Constraint]:
     unit = identity(problem.size, format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
-    greatest = problem.bounds.greatest_m_per_s
+    greatest, limit = problem.bounds
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
     rows = [
         Constraint('slowest', y - diags(1.0 / least) @ f),
         Constraint('positive', -y[closable]),
     ]
     for name in (ROBOT, BEND, LEAD, JOINT):  # y >= f / v
-        some = np.flatnonzero((problem.bounds.limit == name) & ~closable)
+        some = np.flatnonzero((limit == name) & ~closable)
         rows.append(Constraint(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
     # Nodes from which the gun sprays on to the next one for certain.
     pairs = nodes.followed

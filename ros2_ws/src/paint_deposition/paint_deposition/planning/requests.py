@@ -3,7 +3,6 @@
 Options of the command line and keywords of Python are these fields; None is not given.
 """
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -272,13 +271,3 @@ class GunEnvelope(Request):
         '--keep-off-m',
         least=0.0,
     )
-
-    @property
-    def middle_m(self) -> float:
-        """Of the whole cylinder, along tool z from the TCP [m]."""
-        return 0.5 * (self.before_m - self.length_m)
-
-    @property
-    def reach_m(self) -> float:
-        """Radius of the sphere about that middle that holds it all [m]."""
-        return math.hypot(self.radius_m, 0.5 * (self.before_m + self.length_m))

@@ -8,7 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.nodes import FilmAtPoints, Nodes, SpeedBounds, retime, speed_bounds
+from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
 from paint_deposition.planning.planned_film import (
     Band,
     WantedFilm,
@@ -30,14 +30,6 @@ ROUGH_ROUNDS = 3
 
 
 @dataclass(frozen=True)
-class BindingLimit:
-    """A limit that keeps the film from being more even."""
-
-    name: str  # of the limit, in words
-    sigma_n: float  # what it would be without this limit alone
-
-
-@dataclass(frozen=True)
 class Retiming:
     """A programme with new times and openings."""
 
@@ -45,8 +37,8 @@ class Retiming:
     programme: Programme  # the new one
     target_um: float  # mean film aimed at
     binding: tuple[str, ...]  # names of all limits that bind
-    # Those of them that cost evenness, the strongest first.
-    binding_limits: tuple[BindingLimit, ...]
+    # Those of them that cost evenness, the strongest first, with sigma_n without each alone.
+    binding_limits: dict[str, float]
     # The most even film of any densities of paint along this path, without limits and without
     # weights for paint, time and smoothness.
     sigma_n_of_path: float
@@ -110,7 +102,7 @@ class _Search:
             relaxed, density = self._problem(wide, nodes, None, open_ends)
             density = solve(relaxed, density, ROUGH_ROUNDS)
             chosen = _openings(
-                nodes, density.density, open_ends, relaxed.bounds, self.original.openings,
+                nodes, density.density, open_ends, relaxed.bounds[0], self.original.openings,
                 self.request,
             )  # fmt: skip
             programme = replace(programme, openings=chosen)
@@ -128,7 +120,7 @@ class _Search:
             if off <= FILM_AGREEMENT * self.target_um:
                 break
         assert found is not None
-        limits: tuple[BindingLimit, ...] = ()
+        limits: dict[str, float] = {}
         of_path = now = _sigma_n(laid)
         if explain:
             limits = self._binding_limits(problem, found, now)
@@ -176,15 +168,15 @@ class _Search:
 
     def _binding_limits(
         self, problem: Problem, found: Density, sigma_n: float
-    ) -> tuple[BindingLimit, ...]:
-        limits = []
+    ) -> dict[str, float]:
+        limits: dict[str, float] = {}
         for number, name in enumerate(found.binding):
             self.progress('limits', number / len(found.binding))
             relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
             # A limit is reported if sigma_n would be lower by 2 % without it.
             if relaxed < 0.98 * sigma_n:
-                limits.append(BindingLimit(LIMIT_NAMES[name], relaxed))
-        return tuple(sorted(limits, key=lambda limit: limit.sigma_n))
+                limits[LIMIT_NAMES[name]] = relaxed
+        return dict(sorted(limits.items(), key=lambda limit: limit[1]))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
@@ -255,7 +247,7 @@ def _openings(
     nodes: Nodes,
     density: np.ndarray,
     open_ends: np.ndarray,
-    bounds: SpeedBounds,
+    greatest_m_per_s: np.ndarray,
     original: tuple[Opening, ...],
     request: ImproveRequest,
 ) -> tuple[Opening, ...]:
@@ -264,7 +256,7 @@ def _openings(
     for number, opening in enumerate(nodes.openings):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
-        least = opening.flow / bounds.greatest_m_per_s[rows]
+        least = opening.flow / greatest_m_per_s[rows]
         worth = (density[rows] - 0.5 * least) / least
         cut = _most_cut_m(original[number], request)
         kept = np.flatnonzero(~open_ends[rows] | (worth > 0.0))

@@ -167,15 +167,12 @@ def _draw_band_legend(
     below = figure.add_subplot(column[2])
     below.set_axis_off()
     text = f'Cpk {s.cpk:.2f}\n{fill(CPK_MEANS, 40)}'.replace('-', '−')
-    _write(below, '\n'.join(map(_zone_words, s.zones.items())) or text, 8.0)
-
-
-def _zone_words(named: tuple[str, FilmStatistics]) -> str:
-    name, s = named
-    return (
-        f'{name}: {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
-        f'    mean {s.mean_um:.1f} µm, {100 * s.within_target:.1f} % in the band'
-    )
+    of_zones = [
+        f'{name}: {zone.target_um:g} ± {zone.target_tolerance_um:g} µm\n'
+        f'    mean {zone.mean_um:.1f} µm, {100 * zone.within_target:.1f} % in the band'
+        for name, zone in s.zones.items()
+    ]
+    _write(below, '\n'.join(of_zones) or text, 8.0)
 
 
 def _draw_patches(axes: Axes, entries: list[tuple[str, str]], title: str = '') -> None:

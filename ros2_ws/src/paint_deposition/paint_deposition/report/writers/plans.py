@@ -3,7 +3,7 @@
 import shutil
 import tempfile
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -27,9 +27,7 @@ from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.part_plan import PartPlan
@@ -54,43 +52,47 @@ COLUMNS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class Passes:
-    """A motion in the part's frame, timed and as moves of a robot program, and its model."""
-
-    trajectory: Trajectory
-    moves: Sequence[Move]
-    model: DepositionModel
-    made: str  # how, for the head of the program, as 'Planned'
-    # The robot's frame and the pose of the part in it; bag and table have their poses in that
-    # frame then, and the program defines its work object so. None: the part's frame.
-    part: tuple[str, Rigid] | None = None
-    drive: Drive | None = None  # the joints that drive it
-    warnings: Sequence[str] = ()  # for the head of the program
-    paint_moves: bool = False  # whether the program sprays by PaintL and SetBrush
-
-
-def write_passes(folder: Path, passes: Passes) -> list[str]:
+def write_passes(
+    folder: Path,
+    result: Plan | PartPlan | Improvement,
+    part: tuple[str, Rigid] | None = None,
+    paint_moves: bool = False,
+) -> list[str]:
     """Write bag, ``passes.csv``, ``passes.mod`` and ``model.yaml`` to a folder; their names.
+
+    Args:
+        folder: where to; made if it is not there.
+        result: the motion in the part's frame, timed and as moves of a robot program.
+        part: the robot's frame and the pose of the part in it; bag and table have their poses in
+            that frame then, and the program defines its work object so. None: the part's frame.
+        paint_moves: whether the program sprays by PaintL and SetBrush.
 
     Raises:
         PaintError: the folder holds another folder of the bag's name.
         OSError: it cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    digest, part = model_digest(passes.model), passes.part
-    _write_bag(folder / BAG, passes, digest)
-    write_table(folder / TABLE, _table(_in_frame(passes.moves, part)))
-    comment = f'{passes.made} with the model in {MODEL_FILE}, sha256 {digest}'
-    at = part[1] if part else None
-    head = [comment, *(f'WARNING: {warning}' for warning in passes.warnings)]
-    module = module_text(passes.moves, head, at, passes.paint_moves)
+    digest, moves = model_digest(result.model), _in_frame(result.moves, part)
+    _write_bag(folder / BAG, result, part, digest)
+    write_table(folder / TABLE, _table(moves))
+    made = 'Improved' if isinstance(result, Improvement) else 'Planned'
+    head = [f'{made} with the model in {MODEL_FILE}, sha256 {digest}']
+    head += [f'WARNING: {contact}' for contact in result.contacts]
+    module = module_text(result.moves, head, part[1] if part else None, paint_moves)
     write_text(folder / PROGRAM, module)
-    write_tool_path(folder / TOOL_PATH, _in_frame(passes.moves, part))
-    write_model(folder / MODEL_FILE, passes.model)
-    if passes.drive:
-        write_table(folder / JOINTS, _joint_table(passes.drive))
-    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, *([JOINTS] if passes.drive else [])]
+    write_tool_path(folder / TOOL_PATH, moves)
+    write_model(folder / MODEL_FILE, result.model)
+    if not result.drive:
+        return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE]
+    arm = result.drive.arm
+    units = np.where(arm.slides, 'm', 'rad')
+    names = [f'{name}_{unit}' for name, unit in zip(arm.joints, units, strict=True)]
+    rows = [
+        [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
+        for time_s, values in zip(result.drive.seconds, result.drive.joints, strict=True)
+    ]
+    write_table(folder / JOINTS, [['time_s', *names], *rows])
+    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, JOINTS]
 
 
 def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
@@ -128,14 +130,12 @@ def pass_numbers(moves: Sequence[Move]) -> list[int]:
     return [1, *np.maximum(number + 1, 1).tolist()]
 
 
-def _joint_table(drive: Drive) -> Iterator[Sequence[object]]:
-    units = np.where(drive.arm.slides, 'm', 'rad')
-    yield 'time_s', *(f'{name}_{unit}' for name, unit in zip(drive.arm.joints, units, strict=True))
-    for time_s, values in zip(drive.seconds, drive.joints, strict=True):
-        yield [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
-
-
-def _write_bag(target: Path, passes: Passes, digest: str) -> None:
+def _write_bag(
+    target: Path,
+    result: Plan | PartPlan | Improvement,
+    part: tuple[str, Rigid] | None,
+    digest: str,
+) -> None:
     if target.exists():
         strangers = [
             path for path in target.rglob('*')
@@ -143,23 +143,21 @@ def _write_bag(target: Path, passes: Passes, digest: str) -> None:
         ]  # fmt: skip
         if not target.is_dir() or strangers:
             raise PaintError(f'{target} is there and no planned bag; move it away')
-    trajectory, part = passes.trajectory, passes.part
+    trajectory = result.trajectory
     placed = moved(trajectory, part[1], part[0]) if part else trajectory
     # A bag's files are named for their folder, so the folder is made under its own name.
     with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
         fresh = write_pose_bag(
             Path(aside) / target.name, placed,
             custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
-            part=(trajectory.frame_id, part[1]) if part else None, drive=passes.drive,
+            part=(trajectory.frame_id, part[1]) if part else None, drive=result.drive,
         )  # fmt: skip
         if target.exists():
             shutil.rmtree(target)
         fresh.rename(target)
-    write_model(target / MODEL_FILE, passes.model)
+    write_model(target / MODEL_FILE, result.model)
 
 
-# What a robot's own frame is called where nobody says (REP-105 and most URDFs).
-ROBOT_FRAME = 'base_link'
 POINT_COLUMNS = (
     'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
     'expected_um', 'speaks_for',
@@ -189,19 +187,14 @@ def _passes(
     folder: Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
-    frame_id: str = ROBOT_FRAME,
+    frame_id: str = 'base_link',  # as most URDFs have it (REP-105)
     paint_moves: bool = False,
     pictures: str = 'png',
 ) -> list[Path]:
-    surface, improved = result.surface, isinstance(result, Improvement)
-    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
+    surface = result.surface
+    name = IMPROVEMENT_FILE if isinstance(result, Improvement) else PLAN_FILE
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    touched = () if isinstance(result, Improvement) else tuple(map(str, result.contacts))
-    passes = Passes(
-        result.trajectory, result.moves, result.model, made, part, result.drive, touched,
-        paint_moves,
-    )  # fmt: skip
-    files = [folder / one for one in (name, *write_passes(folder, passes))]
+    files = [folder / one for one in (name, *write_passes(folder, result, part, paint_moves))]
     given = result.original.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
@@ -220,7 +213,7 @@ def _passes(
         # The film is seen from one side, the passes from three. That they lie aside of the one
         # side that a part usually has is not odd here.
         geometry = spray_geometry(surface, result.path, result.model, frame_id)
-        geometry = replace(geometry, warnings=touched)
+        geometry = replace(geometry, warnings=tuple(map(str, result.contacts)))
         files.append(folder / f'passes.{pictures}')
         title = 'Planned passes over the faces'
         write_geometry_picture(files[-1], surface, result.path, geometry, title)
