@@ -159,7 +159,7 @@ class RobotCell:
         moving = steps_m > 1e-6
         return (0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]), begun
 
-    def tried(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
+    def reachability(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
         """How far a motion is followed, at which share of its speed, and with what room.
 
         Of the whole, at the slowest moment, and of a joint's range; 0 where not all is reached.

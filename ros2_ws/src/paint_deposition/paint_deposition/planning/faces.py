@@ -45,7 +45,7 @@ class FacePasses:
     style: PassStyle
 
     def reversed(self) -> 'FacePasses':
-        """The same passes the other way round, the last one first."""
+        """Passes of the face run the other way round, the last one first."""
         return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
 
 

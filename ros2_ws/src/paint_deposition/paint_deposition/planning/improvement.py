@@ -88,7 +88,7 @@ class FilmSummary:
         return self.statistics.emitted_volume_cm3
 
     def figures(self) -> dict[str, float]:
-        """Those of the region where a film is wanted, paint and time, by name."""
+        """Figures by name: film where one is wanted, paint and time."""
         names = ('mean_um', 'sigma_n', 'within', 'spraying_s', 'cycle_s', 'paint_cm3')
         return {name: getattr(self, name) for name in names} | {
             'min_um': self.statistics.min_um,
@@ -210,7 +210,7 @@ class Improvement:
 
     @property
     def whole_part(self) -> FilmStatistics:
-        """Of that film on the whole part."""
+        """Statistics of the improved film on the whole part."""
         return self.after.whole_part
 
     @cached_property

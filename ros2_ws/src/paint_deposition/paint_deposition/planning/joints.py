@@ -234,7 +234,7 @@ class JointPace:
         return slower * reached_s, slower * seconds, joints, slope * share / slower
 
     def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
-        """Of the passes that are slower than planned, the joint that makes them so."""
+        """For each pass that is slower than planned, the joint that makes it so."""
         slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
         bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
         found = []

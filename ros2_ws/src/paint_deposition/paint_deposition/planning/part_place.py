@@ -50,7 +50,7 @@ class PartPlaces:
 
     @property
     def part_pose(self) -> tuple[float, ...]:
-        """Of the part at the best place: x y z [m] and qx qy qz qw."""
+        """Pose of the part at the best place: x y z [m] and qx qy qz qw."""
         row, column = self.best
         return _placed(self.cell.part, self.x_m[column], self.y_m[row]).values
 
@@ -110,7 +110,7 @@ def part_places(
     for number, (row, column) in enumerate(np.ndindex(shape)):
         progress('places', number / reached.size)
         part = _placed(cell.part, x_m[column], y_m[row])
-        tried = replace(cell, part=part).tried(trajectory, free_roll)
+        tried = replace(cell, part=part).reachability(trajectory, free_roll)
         reached[row, column], speed[row, column], room[row, column] = tried
     return PartPlaces(cell, x_m, y_m, reached, speed, room)
 

@@ -107,7 +107,7 @@ class WantedFilm:
                 )
 
     def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
-        """Those of vertices (V,); outside of zones the mean target and tolerance given hold."""
+        """Films accepted at vertices (V,), outside of zones by the target and tolerance given."""
         if self.zones is None:
             return [Band(np.ones(len(rows), dtype=bool), target_um, tolerance)]
         here = self.zones.select(rows)
@@ -214,7 +214,7 @@ class PlannedFilm:
 
     @property
     def sprayed_speeds_m_per_s(self) -> list[float]:
-        """Of the moves that spray."""
+        """Speeds of the moves that spray."""
         return [move.speed_m_per_s for move in self.moves if move.spraying]
 
     @cached_property

@@ -124,7 +124,7 @@ class Programme:
         return np.stack([before, after], axis=1)
 
     def with_poses_at(self, travel_m: np.ndarray) -> 'Programme':
-        """The same motion with poses at these lengths of travel too."""
+        """Insert poses at these lengths of travel; the motion stays as it is."""
         wanted = np.unique(travel_m[(travel_m > 0.0) & (travel_m < self.travel_m[-1])])
         wanted = wanted[np.diff(wanted, prepend=-1.0) > STANDING_M]
         row = np.searchsorted(self.travel_m, wanted, side='right') - 1
@@ -196,7 +196,7 @@ class Strokes:
 
     @staticmethod
     def of(programme: Programme) -> 'Strokes':
-        """As a simulation of the timed programme numbers them."""
+        """Number strokes and passes as a simulation of the timed programme does."""
         path, _ = spray_path(programme.trajectory())
         begins = 1 + np.flatnonzero(np.diff(path.stroke))
         travel_m = programme.travel_at_m(path.stamp_ns)

@@ -80,12 +80,12 @@ def retime_for_evenness(
 
 @dataclass(frozen=True)
 class _Search:
-    """The original programme and the request; ``level`` is the target over its mean film."""
+    """The search for one programme and request."""
 
     original: Programme
     films: Sequence[FilmAtPoints]
     target_um: float
-    level: float
+    target_over_mean: float  # of the original programme's film
     bands: Sequence[Band]
     request: ImproveRequest
     spacing_m: float
@@ -141,18 +141,20 @@ class _Search:
         timed = self._timed(programme, nodes, now)
         films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
         flow = np.array([opening.flow for opening in original.openings])
-        sprayed_s = self.level * float(flow @ np.diff(original.seconds_at(original.ends_m))[:, 0])
+        sprayed_s = self.target_over_mean * float(
+            flow @ np.diff(original.seconds_at(original.ends_m))[:, 0]
+        )
         return Problem(
             films, self.target_um, self.bands, nodes, bounds, self.request, sprayed_s, open_ends
         ), now
 
     def _mean_density(self, nodes: Nodes) -> Density:
-        """The original mean density of each opening, times the level."""
+        """The original mean density of each opening, scaled for the target."""
         flow = np.array([opening.flow for opening in nodes.openings])
         ends, request = self.original.ends_m, self.request
         seconds = np.diff(self.original.seconds_at(ends))[:, 0]
         slowness = np.clip(
-            self.level * seconds / np.diff(ends)[:, 0],
+            self.target_over_mean * seconds / np.diff(ends)[:, 0],
             1.0 / request.speed_max_m_per_s,
             1.0 / request.speed_min_m_per_s,
         )

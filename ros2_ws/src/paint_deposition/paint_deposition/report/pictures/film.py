@@ -161,7 +161,7 @@ def _draw_band_legend(
         f'of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'
     )
     if s.zones:
-        title = 'target of each zone\nof the painted area with one'
+        title = 'each zone by its own target,\nof the painted area with a target'
     _draw_patches(shares, entries, title)
     _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s, zones)
     below = figure.add_subplot(column[2])

@@ -56,13 +56,13 @@ class View:
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
 
     def from_the_right(self) -> 'View':
-        """The same part seen from the right of this picture."""
+        """View of the part from the right of this picture."""
         return View(
             -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
         )
 
     def from_above(self) -> 'View':
-        """The same part seen from the top of this picture, its front below."""
+        """View of the part from the top of this picture, its front below."""
         return View(
             self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
         )

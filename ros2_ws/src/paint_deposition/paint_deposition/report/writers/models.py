@@ -124,7 +124,7 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
 
 
 def _short(value: Any) -> Any:
-    """The same with few digits in all its numbers."""
+    """A value, list or mapping with few digits in all its numbers."""
     if isinstance(value, float):
         # Eight digits leave the film within 1e-6 of its peak; the uncertainty is far larger.
         return float(f'{value:.8g}')
