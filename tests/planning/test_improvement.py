@@ -233,6 +233,9 @@ def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     assert closed.program_difference < 2e-3
     assert any('--spray-turns' in note for note in closed.notes)
     assert kept.notes == ()
+    # In turns that are sprayed through no trigger is earlier or later.
+    one, other = kept.changes
+    assert one.closes_later_m == other.opens_earlier_m == 0.0
 
 
 def test_brushes_that_change_between_poses_are_followed():

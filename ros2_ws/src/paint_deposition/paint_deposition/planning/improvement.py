@@ -359,10 +359,11 @@ def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
         on, off = max(first.on_m, begin), min(last.off_m, end)
         inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
         # A turn that the programme sprays through has no trigger that could be earlier or later.
-        earlier = first_before.on_m - on if first_before.on_m in opened_m else 0.0
-        later = off - last_before.off_m if last_before.off_m in closed_m else 0.0
+        opens = on == first.on_m and first_before.on_m in opened_m
+        closes = off == last.off_m and last_before.off_m in closed_m
+        earlier = first_before.on_m - on if opens else 0.0
+        later = off - last_before.off_m if closes else 0.0
         old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-        # Samples of the new speed along a pass.
         speed = speed_along(improved, np.linspace(*inside, 61))
         found.append(
             PassChange(

@@ -24,6 +24,10 @@ START_ROUNDS, ROUNDS = 60, 12
 REACHED = 1e-5
 # A joint without limits begins within this of zero [rad or m].
 UNLIMITED = np.pi
+# Speeds and accelerations keep this share below the limits where they are looked at.
+MARGIN = 0.03
+# No motion is slowed down to less than this share: the robot stands in a singularity there.
+SLOWEST = 0.01
 
 
 @dataclass(frozen=True)
@@ -131,12 +135,6 @@ def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
     """(...) whether joints (..., J) keep their limits."""
     outside = (joints < arm.lower) | (joints > arm.upper)
     return np.logical_not(outside.any(axis=-1))
-
-
-# Speeds and accelerations keep this share below the limits where they are looked at.
-MARGIN = 0.03
-# No motion is slowed down to less than this share: the robot stands in a singularity there.
-SLOWEST = 0.01
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,7 @@ from paint_deposition.planning.requests import Limits
 # Half the length over which bends of the path and its programmed speed are measured [m].
 BEND_M = 0.02
 STEADY_M = 0.01
+ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,6 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
             number, slowness, begin[inside]
         )
     return replace(whole, duration_s=duration).without_standstill()
-
-
-ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
 def speed_bounds(

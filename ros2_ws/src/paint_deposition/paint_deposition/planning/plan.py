@@ -45,6 +45,10 @@ from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
 TARGET_ROUNDS = 4
+Planned = TypeVar('Planned', bound=PlannedFilm)
+# Of the robot program, as of one that keeps the planned speeds.
+SHORTEST_MOVE_M = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
+QUARTER = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -194,12 +198,6 @@ def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) 
         one_way=request.one_way,
         brush=model.brush,
     )
-
-
-Planned = TypeVar('Planned', bound=PlannedFilm)
-# Of the robot program, as of one that keeps the planned speeds.
-SHORTEST_MOVE_M = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
-QUARTER = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
 
 
 def optimise(

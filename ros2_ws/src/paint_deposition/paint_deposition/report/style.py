@@ -26,8 +26,6 @@ COMPONENTS = ('#d1701f', '#7a5195', '#4c9a2a')
 MODELS = (ACCENT, *COMPONENTS, '#b5485f', '#8a7a2b')
 # 95 % of normally distributed readings lie within so many standard deviations.
 TWO_SIDED_95 = 1.96
-
-
 DOTS_PER_INCH = 150
 # Pictures of a page are as wide as a phone or half a sheet of paper [in], so that their lettering
 # is that of the page.

@@ -12,6 +12,7 @@ from paint_deposition.report.words import covariate_label, fixed, p_words
 
 CLEAR = 'rgba(0,0,0,0)'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
+AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
 def plotly_scale(colours: np.ndarray) -> list[list[Any]]:
@@ -82,9 +83,6 @@ def figure(
     keys = ('words', 'colour', 'kind')
     entries = [dict(zip(keys, entry, strict=True)) for entry in legend]
     return {'name': name, 'charts': list(charts), 'legend': entries}
-
-
-AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
 
 
 def parity_figure(data: ReportData) -> dict[str, Any]:

@@ -5,14 +5,13 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.gridspec import GridSpec
-from matplotlib.patheffects import Normal, Stroke
 
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.pictures.part import PartPicture, label_points
+from paint_deposition.report.pictures.part import PALE_HALO, PartPicture, label_points
 from paint_deposition.report.style import (
     ACCENT,
     BEFORE,
@@ -28,7 +27,6 @@ from paint_deposition.report.style import (
 
 LINE_POINTS = 600
 PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26
-HALO = [Stroke(linewidth=2.4, foreground='white'), Normal()]
 
 
 def write_calibration_pictures(
@@ -149,7 +147,7 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
         )  # fmt: skip
     names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
     per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
-    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=HALO)
+    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
     axes.set_title(
         f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
         color=INK, pad=24,

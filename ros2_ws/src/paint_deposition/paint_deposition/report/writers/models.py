@@ -29,6 +29,25 @@ from paint_deposition.inference.posterior import Posterior
 
 # What a step of the history added, where it was no effect.
 PATTERN, REFIT = 'pattern', 'refit'
+# What a law is over, in the words of an effect's code, and the family of such effects.
+VARIABLES = {
+    'incidence_deg': ('ray.cos_incidence', 'incidence'),
+    'standoff_ratio': ('ray.standoff_ratio', 'standoff'),
+    'time_s': ('path.time_s', 'time'),
+    'spray_pass': ('np.where(np.isnan(path.time_s), np.nan, path.passes_before + 1.0)', 'order'),
+    'stroke_end_m': ('np.minimum(path.from_turn_m, path.to_turn_m)', 'boundary'),
+    'since_trigger_s': ('path.since_on_s', 'boundary'),
+    'speed_m_per_s': ('path.speed_m_per_s', 'time'),
+    'curvature_per_m': ('points.curvature_per_m', 'curvature'),
+    'edge_distance_m': ('points.edge_distance_m', 'boundary'),
+    'sky_view_factor': ('points.sky_view_factor', 'visibility'),
+    'height_fraction': ('points.height_fraction', 'order'),
+    'across_m': ('places_m(points)[:, 0]', 'lateral shift'),
+    'film_um': ('film_um', 'level'),
+}
+# An amplitude may become so many times as far from neutral, a shape so many times as long.
+ROOM = 10.0
+TEMPLATE = Path(__file__).parent / 'templates' / 'effect.py.j2'
 
 
 def write_fitted(
@@ -142,27 +161,6 @@ def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
             section = 'planar'
         sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     return sections
-
-
-# What a law is over, in the words of an effect's code, and the family of such effects.
-VARIABLES = {
-    'incidence_deg': ('ray.cos_incidence', 'incidence'),
-    'standoff_ratio': ('ray.standoff_ratio', 'standoff'),
-    'time_s': ('path.time_s', 'time'),
-    'spray_pass': ('np.where(np.isnan(path.time_s), np.nan, path.passes_before + 1.0)', 'order'),
-    'stroke_end_m': ('np.minimum(path.from_turn_m, path.to_turn_m)', 'boundary'),
-    'since_trigger_s': ('path.since_on_s', 'boundary'),
-    'speed_m_per_s': ('path.speed_m_per_s', 'time'),
-    'curvature_per_m': ('points.curvature_per_m', 'curvature'),
-    'edge_distance_m': ('points.edge_distance_m', 'boundary'),
-    'sky_view_factor': ('points.sky_view_factor', 'visibility'),
-    'height_fraction': ('points.height_fraction', 'order'),
-    'across_m': ('places_m(points)[:, 0]', 'lateral shift'),
-    'film_um': ('film_um', 'level'),
-}
-# An amplitude may become so many times as far from neutral, a shape so many times as long.
-ROOM = 10.0
-TEMPLATE = Path(__file__).parent / 'templates' / 'effect.py.j2'
 
 
 def effect_entry(form: ClosedForm, file: str | Path) -> str:

@@ -50,6 +50,10 @@ COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
     'brush',
 )  # fmt: skip
+POINT_COLUMNS = (
+    'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
+    'expected_um', 'speaks_for',
+)  # fmt: skip
 
 
 def write_passes(
@@ -156,12 +160,6 @@ def _write_bag(
             shutil.rmtree(target)
         fresh.rename(target)
     write_model(target / MODEL_FILE, result.model)
-
-
-POINT_COLUMNS = (
-    'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
-    'expected_um', 'speaks_for',
-)  # fmt: skip
 
 
 @written.register

@@ -25,6 +25,8 @@ from paint_deposition.part.zones import PointZones
 Models = DepositionModel | Mapping[str, DepositionModel] | None
 # Modules beside this one that register writers; those that import least come first.
 WRITERS = ('plans', 'inference')
+# Of a table, as one text: formatted together they take half the time.
+ROWS_AT_ONCE = 10_000
 
 
 @singledispatch
@@ -91,10 +93,6 @@ def with_provenance(
     """The entries with the provenance of their result: the model and the input files."""
     files = input_files(made_from) | dict(more_files or {})
     return {**made_from, 'provenance': origin(model, files)}
-
-
-# Of a table, as one text: formatted together they take half the time.
-ROWS_AT_ONCE = 10_000
 
 
 @written.register
@@ -168,7 +166,8 @@ def write_film(
         write_mesh_ply(paths[0], surface, colours, **films)
         columns = {**dict(zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True)), **films}
         _write_table(paths[1], columns, zones.names if zones else None)
-        write_json(paths[2], {**statistics.to_dict(), **(details or {})})
+        region = {'region': 'painted area of the whole part, by area'}
+        write_json(paths[2], {**region, **statistics.to_dict(), **(details or {})})
     return paths
 
 
