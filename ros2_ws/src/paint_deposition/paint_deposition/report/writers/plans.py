@@ -199,8 +199,9 @@ def _passes(
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
     zones = result.wanted.zones
     files += write_film(
-        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True
-    )
+        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True,
+        details={'region': 'the painted area of the whole part'},
+    )  # fmt: skip
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(

@@ -166,8 +166,7 @@ def write_film(
         write_mesh_ply(paths[0], surface, colours, **films)
         columns = {**dict(zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True)), **films}
         _write_table(paths[1], columns, zones.names if zones else None)
-        region = {'region': 'painted area of the whole part, by area'}
-        write_json(paths[2], {**region, **statistics.to_dict(), **(details or {})})
+        write_json(paths[2], {**statistics.to_dict(), **(details or {})})
     return paths
 
 
