@@ -23,7 +23,7 @@ ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'
 IMAGES = ROOT / 'docs/images'
 LARGEST_BYTES = 300_000
-WIDEST_PX = 1250
+WIDEST_PX = 1280
 
 # The moving picture: frames a second, how much faster than the robot, the last frame's time [s].
 FRAMES_PER_S, SPEED_UP, REST_S = 12, 3.0, 2.5
@@ -148,7 +148,11 @@ def draw_results() -> None:
         paint('improve', '--mesh', SAMPLES / 'door.stl', '--trajectory',
               folder / 'plan/trajectory', '--model', folder / 'diagnosis/model.yaml',
               '--target-um', 20, '-o', folder / 'better')  # fmt: skip
-        keep(Image.open(folder / 'better/improvement.png'), 'improve.png')
+        keep(Image.open(folder / 'better/improvement.png'), 'improve.png', 1150)
+        paint('place', '--trajectory', folder / 'plan/trajectory',
+              '--urdf', SAMPLES / 'robot.urdf', '--part-pose', 1.8, 0, 0.5, 0, 0,
+              -0.7071068, 0.7071068, '-o', folder / 'place')  # fmt: skip
+        keep(Image.open(folder / 'place/place.png'), 'place.png')
         first_page(folder / 'diagnosis/report.html', folder / 'report.png')
         if (folder / 'report.png').exists():
             keep(Image.open(folder / 'report.png'), 'report.png')
@@ -182,11 +186,11 @@ def first_page(report: Path, picture: Path) -> None:
     )  # fmt: skip
 
 
-def keep(picture: Image.Image, name: str) -> None:
+def keep(picture: Image.Image, name: str, widest_px: int = WIDEST_PX) -> None:
     """Save a picture no wider than the pages show it, with all its colours."""
     path = IMAGES / name
     picture = picture.convert('RGB')
-    picture.thumbnail((WIDEST_PX, WIDEST_PX), Image.Resampling.LANCZOS)
+    picture.thumbnail((widest_px, widest_px), Image.Resampling.LANCZOS)
     picture.save(path, optimize=True)
     check_size(path, LARGEST_BYTES)
 

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
+from paint_deposition.errors import PlanError
 from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.requests import GunEnvelope
 
@@ -24,6 +26,17 @@ def test_a_screen_before_the_gun_is_met_while_it_passes():
     assert contact.begin_s == pytest.approx((HALF - 0.05 - 0.04) / SPEED, abs=0.05)
     assert contact.end_s == pytest.approx((HALF + 0.05 + 0.04) / SPEED, abs=0.05)
     assert abs(contact.place_m[1] + 0.1) < 1e-9
+
+
+def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path):
+    """The gun's body reaches back from the TCP, 30 mm from the panel: the screen is in its way."""
+    low = {'speed_m_per_s': 0.3, 'standoff_m': 0.03, 'smoothing_radius_m': 0.3}
+    with pytest.raises(PlanError, match=r'the gun touches the part at .* allow_contact keeps it'):
+        pd.plan(panel_with_screen(), **low)
+    kept = pd.plan(panel_with_screen(), allow_contact=True, **low)
+    touched, *_ = [line for line in kept.warnings if 'the gun touches the part' in line]
+    pd.write(kept, tmp_path)
+    assert f'! WARNING: {touched}' in (tmp_path / 'passes.mod').read_text()
 
 
 def test_a_gun_in_the_part_is_told_from_a_near_part():

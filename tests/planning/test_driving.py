@@ -18,9 +18,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
-from paint_deposition.planning.configurations import starts
-from paint_deposition.planning.optimised_plan import driven
-from paint_deposition.planning.plan import plan
+from paint_deposition.planning.joints import starts
+from paint_deposition.planning.part_place import PartPlaces
+from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.requests import PlanRequest
 from planning.test_surface_map import sheet
 from scenes import painted
@@ -164,6 +164,20 @@ def test_places_of_the_part_are_those_that_can_be_driven(planned, cell):
     assert found.speed[0, 0] > 0.5
     in_base = moved(planned.trajectory, cell.part, 'base_link')
     assert place(in_base, cell, [0.9], [0.0]).room == pytest.approx(found.room[:, :1])
+
+
+def test_the_place_to_choose_has_good_neighbours(cell):
+    """A little less room of a joint beats a place beside one that is not reached."""
+    reached = np.ones((5, 5))
+    reached[0, 4] = 0.4
+    room = np.full((5, 5), 0.2)
+    room[1, 3], room[3, 1] = 0.24, 0.22
+    at = np.arange(5.0)
+    found = PartPlaces(cell, at, at, reached, np.where(reached < 1.0, 0.0, 1.0), room)
+    assert found.best == (3, 1)
+    alone = replace(found, speed=np.where(room > 0.23, 1.0, 0.5))
+    assert alone.best == (1, 3)
+    assert 'not all places beside it were tried' in alone.sentence
 
 
 def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path):

@@ -8,11 +8,11 @@ import pytest
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.planning.films import evenness
 from paint_deposition.planning.placement import place_passes
 from paint_deposition.planning.plan import plan
+from paint_deposition.planning.planned_film import evenness
 from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.report.writers.passes import Passes, write_passes
+from paint_deposition.report.writers.plans import write_passes
 from planning.test_surface_map import sheet
 from scenes import painted
 
@@ -92,7 +92,7 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     ('what', 'words'),
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
-        ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 0.05; the closest is'),
+        ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
         ({'index_m': -0.2}, 'index_m is -0.2'),
         ({'standoff_m': -1.0}, 'standoff_m is -1'),
         ({'overspray_m': -0.1}, 'overspray_m is -0.1'),
@@ -106,10 +106,9 @@ def test_impossible_plans_say_why(bowed, what, words):
 
 
 def test_writing_again_replaces_the_plan_but_no_stranger(planned, tmp_path):
-    passes = Passes(planned.trajectory, planned.moves, planned.model, 'Planned')
-    write_passes(tmp_path, passes)
-    write_passes(tmp_path, passes)
+    write_passes(tmp_path, planned)
+    write_passes(tmp_path, planned)
     (tmp_path / 'trajectory' / 'notes.txt').write_text('mine')
     with pytest.raises(Exception, match='no planned bag; move it away'):
-        write_passes(tmp_path, passes)
+        write_passes(tmp_path, planned)
     assert (tmp_path / 'trajectory' / 'notes.txt').read_text() == 'mine'

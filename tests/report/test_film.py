@@ -12,10 +12,9 @@ from booth import door, panel, serpentine
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.part import View
-from paint_deposition.report.style import BELOW, HIGH, WITHIN
+from paint_deposition.report.style import BELOW, HIGH, WITHIN, save_picture
 
 X, Y, Z = np.eye(3)
 

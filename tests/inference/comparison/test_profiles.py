@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import trimesh
 import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -86,3 +87,30 @@ def test_readings_without_rows_or_columns_fall_into_strips_with_a_line(tmp_path)
         assert len(profile.line_m) > len(profile.rows)
         middle = profile.lines_um[0][np.searchsorted(profile.line_m, profile.position_m)]
         assert middle == pytest.approx(predicted[profile.rows], rel=0.03)
+
+
+def test_lines_break_over_an_opening_and_do_not_run_over_its_hem(tmp_path):
+    """A panel with a window of 300 x 300 mm, its edge folded back by 20 mm."""
+    small_campaign(tmp_path, experiments=('panel',), style='random')
+    mesh = trimesh.load(tmp_path / 'panel.stl')
+    middle = mesh.bounds.mean(axis=0)
+
+    def from_middle(points_m):
+        return np.abs(points_m - middle)[:, [0, 2]].max(axis=1)
+
+    inner = from_middle(mesh.triangles_center) < 0.15
+    hem = trimesh.creation.box((0.3, 0.02, 0.3))
+    hem.update_faces(np.abs(hem.face_normals[:, 1]) < 0.5)
+    hem.apply_translation(middle + np.array([0.0, 0.01, 0.0]))
+    mesh.update_faces(~inner)
+    trimesh.util.concatenate([mesh, hem]).export(tmp_path / 'panel.stl')
+    head, *rows = (tmp_path / 'panel.csv').read_text().splitlines()
+    places = np.array([row.split(',')[:3] for row in rows], dtype=float)
+    kept = [row for row, far in zip(rows, from_middle(places) > 0.16, strict=True) if far]
+    (tmp_path / 'panel.csv').write_text('\n'.join([head, *kept]))
+    study = Study.of(read_campaign(tmp_path / 'campaign.yaml'))
+    profiles = profiles_of(study, [DepositionModel()])
+    gone = np.concatenate([p.line_m[np.isnan(p.lines_um[0])] for p in profiles])
+    assert len(gone) > 20
+    assert np.abs(gone - middle[2]).max() < 0.16
+    assert all(np.isfinite(profile.lines_um[0]).sum() > 20 for profile in profiles)

@@ -91,10 +91,11 @@ def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path)
     write_model(tmp_path / 'narrow.yaml', NARROW)
     (tmp_path / 'broken.yaml').write_text('planar: {K9: 1}\n')
     node = planner()
-    wide = ask(speed_m_per_s=0.2, tolerance=0.1).index_m
+    wide = ask(speed_m_per_s=0.2, index_min_m=0.5, index_max_m=0.7).index_m
     (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'narrow.yaml')))
     assert result.successful
-    assert ask(speed_m_per_s=0.2, tolerance=0.1).index_m == pytest.approx(0.5 * wide, rel=0.03)
+    narrow = ask(speed_m_per_s=0.2, index_min_m=0.25, index_max_m=0.35).index_m
+    assert narrow == pytest.approx(0.5 * wide, rel=0.03)
     (result,) = node.set_parameters(parameters(model_file=str(tmp_path / 'broken.yaml')))
     assert not result.successful
     assert 'K9' in result.reason

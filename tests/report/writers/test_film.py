@@ -9,7 +9,7 @@ import pytest
 from paint_deposition.errors import PaintError
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.writers.film import write_film
+from paint_deposition.report.writers.write import write_film
 
 
 @pytest.fixture

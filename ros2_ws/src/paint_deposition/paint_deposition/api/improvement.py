@@ -1,9 +1,7 @@
 """A programme's speeds, flows and triggers, chosen for a more even film."""
 
-import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,26 +9,24 @@ import numpy as np
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
+from paint_deposition.motion.programmed import timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import Zones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.films import simulated
-from paint_deposition.planning.improvement.improvement import (
+from paint_deposition.planning.improvement import (
     DEFAULT_TOLERANCE,
     FilmSummary,
     Improvement,
 )
-from paint_deposition.planning.improvement.programme import Programme, moves_of
-from paint_deposition.planning.improvement.retiming import retime_for_evenness
+from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
+from paint_deposition.planning.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.requests import ImproveRequest
+from paint_deposition.planning.retiming import retime_for_evenness
 from paint_deposition.planning.surface_map import painted_side, pass_axes
-from paint_deposition.planning.wanted_film import WantedFilm
-from paint_deposition.report.writers.passes import BAG, PROGRAM, Passes, write_passes
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]
@@ -58,9 +54,6 @@ def improve(
 ) -> Improvement:
     """Keep the path of a programme and change its speeds, flows and triggers.
 
-    Films before and after are those of the motions as written to files: the new one is written as
-    a bag and as a RAPID module, and both are read back.
-
     Args:
         surface: the part; it is turned round, with a note, if the gun looks at its back.
         trajectory: the programme, in the frame of the mesh.
@@ -84,6 +77,8 @@ def improve(
     request = ImproveRequest(**wanted)
     seen = look_at(surface, trajectory, model)
     surface, original = seen.surface, Programme.of(trajectory)
+    if not request.spray_turns:
+        original = closed_beside(original, surface)
     begin = None
     point_zones = zones.on(surface) if zones else None
     if robot:
@@ -97,6 +92,9 @@ def improve(
         tool_z = seen.path.rotation[seen.path.flow > 0.0][:, :, 2]
         target_region = _target_region(surface, film_um, tool_z)
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
+    if sought.target_um is None:
+        mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
+        sought = replace(sought, target_um=mean_um)
     models = [model, *rivals]
     if posterior is not None:
         models += draw_models(model, posterior, DRAWS, seed)
@@ -106,11 +104,10 @@ def improve(
         drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
         programme = Programme.of(drive.trajectory)
     moves = moves_of(programme, request)
-    progress('the film of the written files', 0.0)
-    passes = Passes(programme.trajectory(), moves, model, 'Improved')
-    improved, program = _read_back(passes)
+    progress('the film as it will be', 0.0)
+    improved = programme.trajectory()
     new_um, new_paint = simulated(surface, model, improved)
-    program_um, _ = simulated(surface, model, program)
+    program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
     tolerance = request.tolerance or DEFAULT_TOLERANCE
     band = surface, sought, retiming.target_um, tolerance
     before = FilmSummary.of(film_um, *band, paint.emitted_cm3, trajectory)
@@ -128,14 +125,3 @@ def _target_region(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) ->
     if np.linalg.norm(towards) < ONE_SIDE:
         return reached
     return reached & painted_side(surface, pass_axes(surface, outward=towards))
-
-
-def _read_back(passes: Passes) -> tuple[Trajectory, Trajectory]:
-    """The motions of the bag and of the robot program, once written."""
-    with tempfile.TemporaryDirectory(prefix='paint-') as aside:
-        write_passes(Path(aside), passes)
-        frame = passes.trajectory.frame_id or 'part'
-        return (
-            read_recording(Path(aside) / BAG, frame_id=frame),
-            read_recording(Path(aside) / PROGRAM, frame_id=frame),
-        )

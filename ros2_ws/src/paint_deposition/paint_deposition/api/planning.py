@@ -9,10 +9,9 @@ from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.optimised_plan import driven, optimise
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
-from paint_deposition.planning.plan import Plan
+from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.recommendation import recommend as recommended
@@ -41,6 +40,7 @@ def plan(
     model: DepositionModel | None = None,
     *,
     frame_id: str = 'part',
+    envelope: GunEnvelope | None = None,
     robot: RobotCell | None = None,
     zones: Zones | None = None,
     progress: Callable[[str, float], None] = lambda what, share: None,
@@ -52,6 +52,7 @@ def plan(
         surface: the part.
         model: what the gun sprays; default: a 50 mm bell.
         frame_id: of the planned poses.
+        envelope: of the gun, which must keep clear of the part.
         robot: that is to drive it, from ``read_robot``: passes that its joints cannot keep up
             with are slower, and the plan has the joints; default: any robot does.
         zones: regions with targets of their own, from ``read_zones``: the speeds along the passes
@@ -61,7 +62,8 @@ def plan(
             ``target_um`` at least, or zones.
 
     Raises:
-        PlanError: the request has no answer; says why and what comes closest.
+        PlanError: the request has no answer, or the gun touches the part; says why and what comes
+            closest.
         PaintError: a zone has no vertex of the part.
     """
     request, on_part = _with_zones(surface, zones, wanted)
@@ -69,7 +71,7 @@ def plan(
         surface, model or DepositionModel(), request, frame_id, progress, on_part
     )
     found = optimise(unoptimised, progress) if request.optimise else unoptimised
-    return driven(found, robot) if robot else found
+    return kept_clear(driven(found, robot) if robot else found, envelope or GunEnvelope())
 
 
 @takes(PlanRequest)
@@ -88,21 +90,21 @@ def plan_faces(
     """Lay passes over a part that has several sides, each of them sprayed by itself.
 
     Args:
-        surface, model, frame_id, robot, zones, progress, wanted: as for ``plan``. With
+        surface, model, frame_id, envelope, robot, zones, progress, wanted: as for ``plan``. With
             ``outward``, faces on the back are left out; ``optimise`` chooses the speeds along the
             passes for an even film on all faces together.
         face_angle_deg: greatest angle between a normal of a face and its mean [deg].
-        envelope: of the gun, for the check that it keeps clear of the part.
 
     Raises:
         PlanError: the request has no answer; says why and what comes closest.
     """
     request, on_part = _with_zones(surface, zones, wanted)
+    envelope = envelope or GunEnvelope()
     found = planned_faces(
         surface, model or DepositionModel(), request, frame_id, math.radians(face_angle_deg),
         envelope, progress, on_part,
     )  # fmt: skip
-    return driven(found, robot) if robot else found
+    return kept_clear(driven(found, robot) if robot else found, envelope)
 
 
 def _with_zones(

@@ -21,8 +21,7 @@ from paint_deposition.errors import ManyError
 from paint_deposition.files.json_files import write_json
 from paint_deposition.files.parquet import require_pyarrow, write_parquet
 from paint_deposition.files.provenance import origin
-from paint_deposition.report.pictures.chart import new_figure, quiet, save_picture
-from paint_deposition.report.style import ACCENT, INK
+from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
 from paint_deposition.report.writers.write import written
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.results_folder import results_in
 
 if TYPE_CHECKING:
-    from paint_deposition.report.page.story import Chapter
+    from paint_deposition.report.page.report import Chapter
 
 PAGE = 'demo.html'
 STATE = '/atomizer/state'
@@ -49,7 +49,7 @@ def demo_command(output: Path, opens: bool) -> None:
     try:
         story.begin('Painting a door', 'simulate', *motion, '-o', output / 'film')
         from paint_deposition.files.model_file import read_model_file
-        from paint_deposition.report.page import story as chapters
+        from paint_deposition.report.page import report as chapters
 
         story.step('reading mesh and recording; the first run also compiles')
         trajectory = pd.read_recording(recording, state_topic=STATE)
@@ -127,7 +127,7 @@ class _Story:
 
     def _write(self, ended: bool = False) -> None:
         if self._told:
-            from paint_deposition.report.page.story import write_story
+            from paint_deposition.report.page.report import write_story
 
             write_story(self.page, self._told, self._underway, ended)
             if self._opens:

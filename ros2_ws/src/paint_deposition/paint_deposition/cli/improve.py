@@ -53,9 +53,8 @@ def improve_command(
     """Make the film of a given programme more even; its path stays as it is.
 
     Speeds along the passes, flows and the places where the gun opens and closes are chosen
-    through the whole model. What changes is printed pass by pass; the bag and the robot program
-    are read back, and all figures are of their film. With --urdf and --part-pose no joint of the
-    robot is faster than it can be.
+    through the whole model. What changes is printed pass by pass. With --urdf and --part-pose no
+    joint of the robot is faster than it can be.
     """
     from paint_deposition.files.motion_files import holds_joints
 
@@ -89,23 +88,23 @@ def improve_command(
             result, made_from=made_from, part_pose=motion.get('part_pose'),
             paint_moves=paint_moves,
         )  # fmt: skip
-    options.print_all('note', [*result.surface.notes, *recorded.notes])
+    options.print_all('note', [*result.surface.notes, *recorded.notes, *result.notes])
     options.print_all('warning', result.warnings)
     results.print(_lines(result), model=chosen.words)
 
 
 def _lines(result: pd.Improvement) -> Iterator[str]:
-    before, after, surface = result.before, result.after, result.surface
-    region = surface.vertex_areas_m2[result.target_region].sum()
-    yield (
-        f'target region: {region:.2f} of {surface.area_m2:.2f} m2, what the programme paints'
-        f'{" where a film is wanted" if result.wanted.zones else ""}'
-    )
+    before, after = result.before, result.after
+    yield f'{result.region}:'
     yield result.sentence
-    yield (
-        f'film {before.min_um:.1f} to {before.max_um:.1f} µm before, {after.min_um:.1f} to '
-        f'{after.max_um:.1f} µm after; mean {before.mean_um:.1f} and {after.mean_um:.1f} µm'
-    )
+    films = {'there': (before.statistics, after.statistics)}
+    if not result.target_region.all():
+        films['on the whole part'] = before.whole_part, after.whole_part
+    for where, (a, b) in films.items():
+        yield (
+            f'film {where}: mean {a.mean_um:.1f} → {b.mean_um:.1f} µm; {a.min_um:.1f} to '
+            f'{a.max_um:.1f} µm before, {b.min_um:.1f} to {b.max_um:.1f} µm after'
+        )
     yield from options.zone_lines(after.statistics.zones, before.statistics.zones)
     for change in result.changes:
         yield change.sentence

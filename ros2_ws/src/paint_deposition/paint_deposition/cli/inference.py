@@ -272,7 +272,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.writers.effect_file import effect_entry, write_effect_file
+    from paint_deposition.report.writers.models import effect_entry, write_effect_file
 
     law = next(iter(diagnosis.model.effects[::-1]), None)
     forms = forms_of(law)

@@ -98,9 +98,9 @@ def zone_lines(
         bare = f', {100 * (1.0 - zone.coverage):.1f} % of it bare' if zone.coverage < 1.0 else ''
         yield (
             f'{name}, {zone.target_um:g} ± {zone.target_tolerance_um:g} µm: '
-            f'{f"{was.mean_um:.1f} to " if was else ""}{zone.mean_um:.1f} µm mean, '
+            f'{f"{was.mean_um:.1f} → " if was else ""}{zone.mean_um:.1f} µm mean, '
             f'{zone.min_um:.1f} to {zone.max_um:.1f} µm, '
-            f'{f"{100 * was.within_target:.1f} to " if was else ""}'
+            f'{f"{100 * was.within_target:.1f} → " if was else ""}'
             f'{100 * zone.within_target:.1f} % within{bare}'
         )
 

@@ -37,14 +37,14 @@ def recommend_command(
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     yield answer.sentence
     for minimum in answer.minima:
-        yield f'minimum: sigma_n {minimum.sigma_n:.4f} at {minimum.index_m:.4f} m'
+        yield f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
     for low, high in answer.windows_m:
-        yield f'within tolerance: {low:.4f} to {high:.4f} m'
+        yield f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'
     if answer.index_drift_m and answer.standoff_drift_m:
         index, standoff = answer.index_drift_m, answer.standoff_drift_m
         yield (
-            f'the index may drift to {index[0]:.3f} and {index[1]:.3f} m, the standoff by '
-            f'{standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
+            f'the index may drift to {1e3 * index[0]:.0f} and {1e3 * index[1]:.0f} mm, the '
+            f'standoff by {standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
         )
     for note in answer.notes:
         yield f'note: {note}'
@@ -89,8 +89,6 @@ def plan_command(
     results: options.Results,
 ) -> None:
     """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
-    from paint_deposition.planning.clearance import contacts
-
     chosen, wanted = chosen_model(model_file, brush=brush), dict(request)
     model = chosen.model
     cell = options.robot_cell(robot, part_pose)
@@ -100,19 +98,14 @@ def plan_command(
         surface = pd.read_mesh(**part)
         frame = frame_id if part_pose is None else 'part'
         given: dict[str, Any] = {
-            'frame_id': frame, 'robot': cell, 'zones': options.zones_of(zones_file, part),
-            'progress': show, **wanted,
+            'frame_id': frame, 'envelope': envelope, 'robot': cell, 'progress': show,
+            'zones': options.zones_of(zones_file, part), **wanted,
         }  # fmt: skip
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
             result = pd.plan(surface, model, **given)
-            touched = contacts(surface, result.trajectory, envelope)
         else:
-            result = pd.plan_faces(
-                surface, model, face_angle_deg=face_angle_deg, envelope=envelope, **given
-            )
-            touched = result.contacts
-        warnings = [*result.warnings, *map(str, touched)]
+            result = pd.plan_faces(surface, model, face_angle_deg=face_angle_deg, **given)
         show('writing')
         made_from = {
             'mesh': str(part['path']),
@@ -120,14 +113,13 @@ def plan_command(
             'zones_file': str(zones_file or ''),
             'frame_id': frame_id,
             'part_pose': part_pose,
-            'warnings': warnings,
         }
         results.write(
             result, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
             paint_moves=paint_moves,
         )  # fmt: skip
     options.print_all('note', surface.notes)
-    options.print_all('warning', warnings)
+    options.print_all('warning', result.warnings)
     results.print(_plan_lines(result), model=chosen.words)
 
 
@@ -135,24 +127,25 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
     film = result.statistics
     yield result.sentence
     yield result.comparison
+    whole = result.whole_part
     yield (
-        f'film {film.min_um:.1f} to {film.max_um:.1f} µm, coverage {100 * film.coverage:.0f} %, '
-        f'capture fraction {100 * film.capture_fraction:.0f} %'
+        f'film there {film.min_um:.1f} to {film.max_um:.1f} µm; on the whole part '
+        f'{whole.min_um:.1f} to {whole.max_um:.1f} µm, mean {whole.mean_um:.1f} µm, coverage '
+        f'{100 * whole.coverage:.0f} %, capture fraction '
+        f'{100 * whole.capture_fraction:.0f} %'
     )
     first = result.unoptimised if isinstance(result, pd.Plan) else None
     yield from options.zone_lines(film.zones, first.statistics.zones if first else {})
     yield from options.paint_lines(result)
     if result.drive:
         yield result.drive.sentence
-    if isinstance(result, pd.PartPlan):
-        gun = result.envelope
-        if not result.contacts:
-            yield (
-                f'gun ({2e3 * gun.radius_m:.0f} mm wide, {1e3 * gun.length_m:.0f} mm long) and '
-                f'the {1e3 * gun.before_m:.0f} mm before it keep clear of the part'
-            )
-        return
-    if result.unoptimised:
+    gun = result.envelope
+    if not result.contacts:
+        yield (
+            f'gun ({2e3 * gun.radius_m:.0f} mm wide, {1e3 * gun.length_m:.0f} mm long) and the '
+            f'{1e3 * gun.before_m:.0f} mm before it keep clear of the part'
+        )
+    if isinstance(result, pd.Plan) and result.unoptimised:
         first, paint = result.unoptimised, result.unoptimised.statistics
         yield (
             f'without --optimise: {first.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '

@@ -12,11 +12,6 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import GunEnvelope
 
-# Poses are looked at after this much travel or turn.
-STEP_M, STEP_RAD = 0.01, math.radians(2.0)
-# Contacts closer together in time than this are one.
-ONE_CONTACT_S = 0.5
-
 
 @dataclass(frozen=True)
 class Contact:
@@ -49,12 +44,14 @@ def contacts(
 
     What is smaller than an edge of that mesh may be missed by half an edge.
     """
-    rows = _steps(trajectory)
-    positions = trajectory.positions_m[rows]
-    turns = Rotation.from_quat(trajectory.quaternions_xyzw[rows])
-    axes = turns.as_matrix()[:, :, 2]
+    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
+    rows = rows_apart(trajectory.positions_m, turns, 0.01, math.radians(2.0))
+    positions, axes = trajectory.positions_m[rows], turns[rows].as_matrix()[:, :, 2]
+    # The spheres that hold gun and cylinder, about the middle of both.
+    whole_m = envelope.before_m + envelope.length_m
     near = cKDTree(surface.vertices_m).query_ball_point(
-        positions + envelope.middle_m * axes, envelope.reach_m
+        positions + (envelope.before_m - 0.5 * whole_m) * axes,
+        math.hypot(envelope.radius_m, 0.5 * whole_m),
     )
     seconds = 1e-9 * (trajectory.stamps_ns[rows] - trajectory.stamps_ns[0])
     found: list[Contact] = []
@@ -75,7 +72,8 @@ def contacts(
             float(time_s), float(time_s), surface.vertices_m[vertices[deepest]],
             float(depth[deepest]), by_gun,
         )  # fmt: skip
-        if found and time_s - found[-1].end_s < ONE_CONTACT_S:
+        # Contacts closer together in time than this are one.
+        if found and time_s - found[-1].end_s < 0.5:
             before = found[-1]
             deeper = max(before, here, key=lambda contact: contact.depth_m)
             by_gun = before.by_gun or here.by_gun
@@ -85,10 +83,11 @@ def contacts(
     return tuple(found)
 
 
-def _steps(trajectory: Trajectory) -> np.ndarray:
-    """Rows of poses that lie a step apart, with the last one."""
-    way = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1) / STEP_M
-    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
-    way += (turns[:-1].inv() * turns[1:]).magnitude() / STEP_RAD
-    steps = np.floor(np.concatenate([[0.0], np.cumsum(way)]))
-    return np.unique(np.append(np.unique(steps, return_index=True)[1], len(trajectory) - 1))
+def rows_apart(
+    positions_m: np.ndarray, turns: Rotation, step_m: float, step_rad: float
+) -> np.ndarray:
+    """Rows of poses (N,) that lie about so much travel or turn apart, both ends included."""
+    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / step_m
+    way += (turns[:-1].inv() * turns[1:]).magnitude() / step_rad
+    steps = np.floor(np.append(0.0, np.cumsum(way)))
+    return np.union1d(np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0), len(steps) - 1)

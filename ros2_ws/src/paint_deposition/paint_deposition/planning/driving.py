@@ -11,20 +11,25 @@ from scipy.spatial.transform import Rotation, Slerp
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.configurations import REACHED, Start, Ways, follow, settled, starts
-from paint_deposition.planning.joint_pace import MARGIN, JointPace, PassLimit
+from paint_deposition.planning.clearance import rows_apart
+from paint_deposition.planning.joints import (
+    MARGIN,
+    REACHED,
+    JointPace,
+    PassLimit,
+    Start,
+    Ways,
+    follow,
+    settled,
+    starts,
+)
 
 # Joints are looked at this often along the planned motion [s].
 STEP_S = 0.02
-# The way is chosen over poses that lie so far apart.
-APART_M, APART_RAD = 0.02, math.radians(3.0)
 # Poses of a motion that is only tried.
 TRIED = 150
-# A joint of which nothing more is known reaches its full speed in this time [s].
-FULL_SPEED_S = 0.25
-# Ways that come nearer to the limit of a joint than this share of its range are avoided.
-NEAR_LIMIT = 0.05
 
 
 @dataclass(frozen=True)
@@ -114,12 +119,13 @@ class RobotCell:
         times_s = _times(trajectory)
         positions, turns = self.poses(trajectory, times_s)
         joints, begun = _joints(arm, positions, turns, times_s, free_roll, begin)
-        most = arm.fastest / FULL_SPEED_S
+        # A joint of which nothing more is known reaches its full speed in this time [s].
+        most = arm.fastest / 0.25
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
-        opening = _openings(trajectory, times_s)
-        shares = pace.shares(opening)
+        spray_pass = _passes(trajectory, times_s)
+        shares = pace.shares(spray_pass)
         reached_s, seconds, driven, speeds = pace.driven(shares)
 
         def slowed_ns(stamps_ns: np.ndarray) -> np.ndarray:
@@ -134,7 +140,7 @@ class RobotCell:
             quaternions_xyzw=rolled.as_quat(),
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
-        limits = pace.limits(opening, shares)
+        limits = pace.limits(spray_pass, shares)
         return Drive(arm, slowed, seconds, driven, speeds, limits, float(values[:, -1].min()))
 
     def allowed_speeds(
@@ -153,7 +159,7 @@ class RobotCell:
         moving = steps_m > 1e-6
         return (0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]), begun
 
-    def tried(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
+    def reachability(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
         """How far a motion is followed, at which share of its speed, and with what room.
 
         Of the whole, at the slowest moment, and of a joint's range; 0 where not all is reached.
@@ -185,7 +191,7 @@ def _joints(
     begin: Start | None = None,
 ) -> tuple[np.ndarray, Start]:
     """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
-    rows = _apart(positions_m, turns)
+    rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
     way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
     axes = (turns * _roll(begun.roll_rad)).as_matrix()
     joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
@@ -199,15 +205,6 @@ def _joints(
 
 def _roll(roll_rad: float) -> Rotation:
     return Rotation.from_rotvec([0.0, 0.0, roll_rad])
-
-
-def _apart(positions_m: np.ndarray, turns: Rotation) -> np.ndarray:
-    """Rows of poses about APART from each other, both ends included."""
-    angle = (turns[:-1].inv() * turns[1:]).magnitude()
-    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / APART_M + angle / APART_RAD
-    steps = np.floor(np.append(0.0, np.cumsum(way)))
-    rows = np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0)
-    return np.union1d(rows, len(steps) - 1)
 
 
 def _best_way(
@@ -256,7 +253,8 @@ def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
     joints = ways.joints[ways.whole]
     speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
     late = np.maximum(speeds.max(axis=2), 1.0)
-    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / NEAR_LIMIT, 0.0)
+    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
+    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
     return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
 
 
@@ -266,16 +264,16 @@ def _times(trajectory: Trajectory) -> np.ndarray:
     return np.linspace(0.0, trajectory.duration_s, count)
 
 
-def _openings(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
-    """(N,) number of the opening of the gun in which each time lies, -1 for none."""
-    found = np.full(len(times_s), -1)
-    stamps_s = 1e-9 * (trajectory.trigger_stamps_ns - trajectory.stamps_ns[0])
-    ends_s, number = np.append(stamps_s, times_s[-1]), 0
-    for k, flow in enumerate(trajectory.trigger_flow):
-        if flow > 0.0:
-            found[(times_s >= ends_s[k] - STEP_S) & (times_s <= ends_s[k + 1] + STEP_S)] = number
-            number += 1
-    return found
+def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
+    """(N,) number of the pass sprayed at each time, as a simulation counts; -1 for none."""
+    path, _ = spray_path(trajectory)
+    sprayed = path.select(path.flow > 0.0)
+    if not len(sprayed):
+        return np.full(len(times_s), -1)
+    at_s = 1e-9 * (sprayed.stamp_ns - trajectory.stamps_ns[0])
+    nearest = np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), times_s)
+    near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
+    return np.where(near, sprayed.spray_pass[nearest], -1)
 
 
 def _words(place_m: np.ndarray) -> str:

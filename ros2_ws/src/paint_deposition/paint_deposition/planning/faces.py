@@ -21,7 +21,6 @@ from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import Face
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import evenness
 from paint_deposition.planning.passes import (
     PassStyle,
     PlannedPass,
@@ -30,17 +29,12 @@ from paint_deposition.planning.passes import (
     trajectory_of,
 )
 from paint_deposition.planning.plan import plan
+from paint_deposition.planning.planned_film import WantedFilm, evenness
 from paint_deposition.planning.requests import PlanRequest
 from paint_deposition.planning.surface_map import SurfaceMap
-from paint_deposition.planning.wanted_film import WantedFilm
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
-# Bounds on the time on a pass, over the time that evenness on its face alone requires, and the
-# weight that holds it near that.
-DWELL, DWELL_WEIGHT = (0.5, 2.0), 0.02
-# Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
-RETRACTIONS_M = (0.1, 0.2, 0.4, 0.8)
 
 
 @dataclass(frozen=True)
@@ -50,18 +44,8 @@ class FacePasses:
     passes: tuple[PlannedPass, ...]
     style: PassStyle
 
-    @property
-    def start_m(self) -> np.ndarray:
-        """(3,) TCP at the start of the first pass [m]."""
-        return self.passes[0].positions_m[0]
-
-    @property
-    def end_m(self) -> np.ndarray:
-        """(3,) TCP at the end of the last pass [m]."""
-        return self.passes[-1].positions_m[-1]
-
     def reversed(self) -> 'FacePasses':
-        """The same passes the other way round, the last one first."""
+        """Passes of the face run the other way round, the last one first."""
         return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
 
 
@@ -134,9 +118,10 @@ def _dwell(trial: _FaceFilms, area: np.ndarray, target_um: float | None) -> np.n
     films = trial.films_um
     wanted = target_um or float(weight @ films.sum(axis=0))
     rows = np.sqrt(weight)[:, np.newaxis] * films.T / wanted
-    ridge = DWELL_WEIGHT * np.eye(len(films)) / math.sqrt(len(films))
+    # The times stay within half and twice those for evenness on each face alone, and near them.
+    ridge = 0.02 * np.eye(len(films)) / math.sqrt(len(films))
     return lsq_linear(
-        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), DWELL
+        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), (0.5, 2.0)
     ).x
 
 
@@ -186,7 +171,8 @@ def _nearest_next(
 
 
 def _travel_m(before: FacePasses, after: FacePasses) -> float:
-    return float(np.linalg.norm(after.start_m - before.end_m))
+    ends = before.passes[-1].positions_m[-1], after.passes[0].positions_m[0]
+    return float(np.linalg.norm(ends[1] - ends[0]))
 
 
 def join_motions(
@@ -214,7 +200,8 @@ def _between(
 ) -> list[Move]:
     """Moves from the end of a face to the start of the next, without both."""
     speed = style.transfer_speed_m_per_s
-    for retreat_m in RETRACTIONS_M:
+    # Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
+    for retreat_m in (0.1, 0.2, 0.4, 0.8):
         between = []
         for move in (before, after):
             tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]

@@ -18,10 +18,6 @@ from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
-# Share by which the film at the part's edge may fall below the least film inside.
-EDGE_LOSS = 0.05
-FEWEST_POINTS, MOST_POINTS = 121, 601
-POINTS_PER_SCALE = 12.0
 # Where a window ends is found to this [m].
 PRECISION_M = 1e-7
 # With effects each pass goes through the integrator: a quarter of the sub-steps and samples is
@@ -81,10 +77,10 @@ class PassSetup:
 def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) -> int:
     """Fewest passes, set evenly about the middle, that cover a width to its edges.
 
-    Covered is where the film is at most EDGE_LOSS below the least of endlessly many passes.
+    Covered is where the film is at most 5 % below the least of endlessly many passes.
     """
     period = np.linspace(0.0, parallel.period_m(index_m), 65)
-    enough = (1.0 - EDGE_LOSS) * parallel.thickness_um(index_m, period).min()
+    enough = 0.95 * parallel.thickness_um(index_m, period).min()
     across = np.linspace(-0.5 * width_m, 0.5 * width_m, 65)
     reach = max(parallel.first.reach_m, parallel.second.reach_m)
     most = math.ceil((width_m + 2.0 * reach) / index_m) + 2
@@ -128,11 +124,18 @@ class IndexCurve:
     def of(parallel: ParallelPasses, low_m: float, high_m: float) -> 'IndexCurve':
         """Sample a range finely enough to see every minimum, and refine those."""
         finest = min(parallel.first.finest_m, parallel.second.finest_m)
-        count = math.ceil((high_m - low_m) / finest * POINTS_PER_SCALE)
-        index = np.linspace(low_m, high_m, min(max(count, FEWEST_POINTS), MOST_POINTS))
+        count = math.ceil((high_m - low_m) / finest * 12.0)
+        index = np.linspace(low_m, high_m, min(max(count, 121), 601))
         sigma = parallel.sigma_n_at(index)
         inside = np.flatnonzero((sigma[1:-1] < sigma[:-2]) & (sigma[1:-1] <= sigma[2:])) + 1
-        minima = tuple(_refined(parallel, index[k - 1], index[k + 1]) for k in inside)
+        refined = [
+            minimize_scalar(
+                parallel.sigma_n, bounds=(index[k - 1], index[k + 1]), method='bounded',
+                options={'xatol': PRECISION_M},
+            )
+            for k in inside
+        ]  # fmt: skip
+        minima = tuple(Minimum(float(found.x), float(found.fun)) for found in refined)
         return IndexCurve(parallel, index, sigma, minima)
 
     @property
@@ -161,13 +164,6 @@ class IndexCurve:
         return list(zip(ends[::2], ends[1::2], strict=True))
 
 
-def _refined(parallel: ParallelPasses, low_m: float, high_m: float) -> Minimum:
-    found = minimize_scalar(
-        parallel.sigma_n, bounds=(low_m, high_m), method='bounded', options={'xatol': PRECISION_M}
-    )
-    return Minimum(float(found.x), float(found.fun))
-
-
 def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
     """The index to recommend, see ``recommend``.
 
@@ -182,12 +178,11 @@ def choose_index(curve: IndexCurve, tolerance: float | None) -> Minimum:
         closest = min([*minima, curve.best_end], key=lambda m: m.sigma_n)
         raise PlanError(
             f'no index from {curve.index_m[0]:g} to {curve.index_m[-1]:g} m keeps sigma_n within '
-            f'{tolerance:g}; the closest is {closest.sigma_n:.4f} at {closest.index_m:.3f} m: '
-            'allow that much, or search a smaller index'
+            f'{100 * tolerance:g} %; the closest is {100 * closest.sigma_n:.2f} % at '
+            f'{closest.index_m:.3f} m: allow that much (tolerance {1.01 * closest.sigma_n:.2g}), '
+            'or search a smaller index'
         )
-    low, high = windows[-1]
-    inside = [m for m in minima if low <= m.index_m <= high]
-    if inside:
-        return min(inside, key=lambda m: m.sigma_n)
-    middle = 0.5 * (low + high)
-    return Minimum(middle, curve.parallel.sigma_n(middle))
+    low, high = max(windows, key=lambda window: window[1] - window[0])
+    ends = [Minimum(end, curve.parallel.sigma_n(end)) for end in (low, high)]
+    found = [m for m in minima if low <= m.index_m <= high] or ends
+    return min(found, key=lambda m: m.sigma_n)

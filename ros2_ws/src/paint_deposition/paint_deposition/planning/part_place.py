@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import minimum_filter
 
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.part_frame import Rigid
@@ -32,15 +33,24 @@ class PartPlaces:
     room: np.ndarray
 
     @property
+    def good(self) -> np.ndarray:
+        """(Y, X) bool, places from which the robot is as fast as it can be from any."""
+        return self.speed >= min(1.0, self.speed.max())
+
+    @property
+    def amid(self) -> np.ndarray:
+        """(Y, X) bool, those all of whose neighbours were tried and are good too."""
+        return minimum_filter(self.good, 3, mode='constant', cval=False)
+
+    @property
     def best(self) -> tuple[int, int]:
-        """Row and column of the place to choose: in the midst of those that are fast enough."""
-        good = self.speed >= min(1.0, self.speed.max())
-        score = np.where(good, self.room, -1.0)
+        """Row and column of the place to choose: amid good ones if it can, with most room."""
+        score = np.where(self.amid if self.amid.any() else self.good, self.room, -1.0)
         return divmod(int(score.argmax()), len(self.x_m))
 
     @property
     def part_pose(self) -> tuple[float, ...]:
-        """Of the part at the best place: x y z [m] and qx qy qz qw."""
+        """Pose of the part at the best place: x y z [m] and qx qy qz qw."""
         row, column = self.best
         return _placed(self.cell.part, self.x_m[column], self.y_m[row]).values
 
@@ -61,6 +71,11 @@ class PartPlaces:
             f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
             f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
             f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
+            + (
+                ''
+                if self.amid[row, column]
+                else '; not all places beside it were tried and are as good'
+            )
         )
 
     def to_dict(self) -> dict[str, Any]:
@@ -95,7 +110,7 @@ def part_places(
     for number, (row, column) in enumerate(np.ndindex(shape)):
         progress('places', number / reached.size)
         part = _placed(cell.part, x_m[column], y_m[row])
-        tried = replace(cell, part=part).tried(trajectory, free_roll)
+        tried = replace(cell, part=part).reachability(trajectory, free_roll)
         reached[row, column], speed[row, column], room[row, column] = tried
     return PartPlaces(cell, x_m, y_m, reached, speed, room)
 

@@ -11,16 +11,12 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import Contact, contacts
+from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.faces import blend, join_motions, order_faces
-from paint_deposition.planning.films import PlannedFilm, predicted
-from paint_deposition.planning.improvement.programme import Programme, moves_of
-from paint_deposition.planning.improvement.retiming import retime_for_evenness
+from paint_deposition.planning.planned_film import PlannedFilm, WantedFilm, predicted
+from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-from paint_deposition.planning.wanted_film import WantedFilm
-
-# Faces that turn further from the side of the gun are its back.
-BACK_COSINE = -0.1
+from paint_deposition.planning.retiming import retime_for_evenness
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -31,14 +27,11 @@ class PartPlan(PlannedFilm):
         faces: sprayed, the largest first.
         margin_m: by how much each face is sprayed less far than its seams.
         sigma_n_unblended: sigma_n without margins, each face for itself.
-        contacts: where gun or spray come too close to the part. envelope: of the gun.
     """
 
     faces: tuple[Face, ...]
     margin_m: float
     sigma_n_unblended: float
-    contacts: tuple[Contact, ...]
-    envelope: GunEnvelope
 
     @property
     def sentence(self) -> str:
@@ -73,8 +66,6 @@ class PartPlan(PlannedFilm):
             'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
-            'gun': self.envelope.model_dump(),
-            'contacts': [contact.to_dict() for contact in self.contacts],
         }  # fmt: skip
 
 
@@ -122,14 +113,14 @@ def plan_faces(
     sigma_n = found['sigma_n']
     if request.tolerance is not None and sigma_n > request.tolerance:
         raise PlanError(
-            f'no passes on {len(faces)} face(s) keep sigma_n within {request.tolerance:g}; the '
-            f'closest is {sigma_n:.4f}: allow that much, or narrower faces (--face-angle-deg)'
+            f'no passes on {len(faces)} face(s) keep sigma_n within '
+            f'{100 * request.tolerance:g} %; the closest is {100 * sigma_n:.2f} %: '
+            'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
         **found, passes=tuple(planned for face in running for planned in face.passes),
         moves=moves, faces=faces, margin_m=margin_m,
-        sigma_n_unblended=unblended, contacts=contacts(surface, trajectory, envelope),
-        envelope=envelope,
+        sigma_n_unblended=unblended,
     )  # fmt: skip
 
 
@@ -138,7 +129,8 @@ def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ..
     if request.outward is None:
         return faces
     side = np.asarray(request.outward) / np.linalg.norm(request.outward)
-    kept = tuple(face for face in faces if face.surface.outward @ side > BACK_COSINE)
+    # Faces that turn further from the side of the gun are its back.
+    kept = tuple(face for face in faces if face.surface.outward @ side > -0.1)
     if not kept:
         raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     return kept

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
@@ -14,14 +13,9 @@ from paint_deposition.motion.trigger import ONLY_BRUSH
 from paint_deposition.planning.surface_map import SurfaceMap
 
 WAYPOINT_STEP_M = 0.01
-# Travel at full speed before the gun opens and after it closes.
-SETTLING_M = 0.02
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
 WAYPOINTS_PER_MOVE = 4
 POSE_RATE_HZ = 250.0
-LEAST_TRANSFER_SPEED_M_PER_S = 0.3
-# Turn of the tool between passes is no faster than this.
-TURN_RATE_RAD_PER_S = math.radians(90.0)
 
 
 @dataclass(frozen=True)
@@ -40,7 +34,7 @@ class PassStyle:
     @property
     def transfer_speed_m_per_s(self) -> float:
         """From a pass or a face to the next [m/s]."""
-        return max(self.speed_m_per_s, LEAST_TRANSFER_SPEED_M_PER_S)
+        return max(self.speed_m_per_s, 0.3)
 
 
 @dataclass(frozen=True)
@@ -76,7 +70,8 @@ def plan_pass(
     """
     first, last = surface_map.extent_near_m(across_m, style.band_m)
     # From standstill to full speed with the gun off.
-    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + SETTLING_M
+    # Travel at full speed before the gun opens and after it closes.
+    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + 0.02
     beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
@@ -141,26 +136,27 @@ def trajectory_of(
 
     Every pass and every transfer between passes starts and ends at rest, with trapezoidal speed.
     """
-    legs: list[_Leg] = []
+    legs: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     triggers = []
     clock = 0.0
     for number, planned in enumerate(passes):
         if number:
-            legs.append(_transfer(clock, passes[number - 1], planned, style, rate_hz))
-            clock += legs[-1].duration_s
+            between, duration_s = _transfer(clock, passes[number - 1], planned, style, rate_hz)
+            legs.append(between)
+            clock += duration_s
         ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
         triggers += [clock + ramp.time_at_m(planned.on_m), clock + ramp.time_at_m(planned.off_m)]
         times = _sample_times(ramp.duration_s, rate_hz)
         poses = _poses_at(planned, ramp.travel_at_s(times))
-        legs.append(_Leg(clock + times, *poses, ramp.duration_s))
+        legs.append((clock + times, *poses))
         clock += ramp.duration_s
-    stamps_s = np.concatenate([leg.stamps_s for leg in legs])
+    stamps_s, positions_m, quaternions = map(np.concatenate, zip(*legs, strict=True))
     stamps_ns = np.round(stamps_s * 1e9).astype(np.int64)
     forward = np.append(True, np.diff(stamps_ns) > 0)
     return Trajectory(
         stamps_ns=stamps_ns[forward],
-        positions_m=np.concatenate([leg.positions_m for leg in legs])[forward],
-        quaternions_xyzw=np.concatenate([leg.quaternions for leg in legs])[forward],
+        positions_m=positions_m[forward],
+        quaternions_xyzw=quaternions[forward],
         frame_id=frame_id,
         trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
@@ -181,15 +177,6 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
             spraying = 2 <= k < len(stops) - 1
             moves.append(Move(*pose, speed, spraying, brush=style.brush))
     return moves
-
-
-class _Leg(NamedTuple):
-    """A timed stretch: samples with their times, and how long it takes."""
-
-    stamps_s: np.ndarray
-    positions_m: np.ndarray
-    quaternions: np.ndarray
-    duration_s: float
 
 
 class _Ramp:
@@ -225,23 +212,27 @@ class _Ramp:
 
 def _transfer(
     start_s: float, before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float
-) -> _Leg:
-    """Straight from the end of a pass to the start of the next, turning evenly with the travel."""
+) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
+    """Straight from the end of a pass to the start of the next, turning evenly with the travel.
+
+    Returned are times, positions and quaternions, and how long it takes.
+    """
     start, end = before.positions_m[-1], after.positions_m[0]
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
     angle = float((turn[0].inv() * turn[1]).magnitude())
     length = float(np.linalg.norm(end - start))
     ramp = _Ramp(length, style.transfer_speed_m_per_s, style)
-    duration = max(ramp.duration_s, angle / TURN_RATE_RAD_PER_S)
+    # Turn of the tool between passes is no faster than this.
+    duration = max(ramp.duration_s, angle / math.radians(90.0))
     if duration == 0.0:
-        return _Leg(np.empty(0), np.empty((0, 3)), np.empty((0, 4)), 0.0)
+        return (np.empty(0), np.empty((0, 3)), np.empty((0, 4))), 0.0
     times = _sample_times(duration, rate_hz)
     share = times / duration
     if length > 0.0:
         share = ramp.travel_at_s(share * ramp.duration_s) / length
     positions = start + share[:, np.newaxis] * (end - start)
     quaternions = Slerp([0.0, 1.0], turn)(share).as_quat()
-    return _Leg(start_s + times, positions, quaternions, duration)
+    return (start_s + times, positions, quaternions), duration
 
 
 def _poses_at(planned: PlannedPass, way_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

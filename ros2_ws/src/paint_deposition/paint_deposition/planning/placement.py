@@ -1,16 +1,77 @@
-"""Placement of passes on a part: number, index and offset, chosen by their summed film."""
+"""Films of single passes on a part, and the placement of passes that lays the most even sum."""
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.optimize import minimize
 
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.films import LineFilms
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.passes import PassStyle, plan_pass, trajectory_of
+from paint_deposition.planning.planned_film import stratified_sample
+from paint_deposition.planning.surface_map import SurfaceMap
 
-INDICES, OFFSETS = 25, 25
-# Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
-SLACK, LEAST_SLACK = 1.05, 0.002
+
+class LineFilms:
+    """Film at points spread evenly over the painted side, for passes along many lines.
+
+    Shadows and effects on the finished film are left out. ``finest_m`` is the scale on which the
+    film changes across a pass; lines are laid up to ``beyond_m`` past the part's edges.
+
+    Attributes:
+        lines_m: (L,) the lines, and low_m and high_m their ends [m].
+        films_um: (L, V) film of each pass at the part's vertices ``rows`` (V,).
+    """
+
+    def __init__(
+        self,
+        surface: Surface,
+        surface_map: SurfaceMap,
+        model: DepositionModel,
+        style: PassStyle,
+        finest_m: float,
+        beyond_m: float,
+        progress: Callable[[float], None] = lambda share: None,
+    ) -> None:
+        chosen = stratified_sample(surface.vertex_areas_m2[surface_map.painted])
+        self.rows = rows = np.flatnonzero(surface_map.painted)[chosen]
+        self.surface_map = surface_map
+        points = SurfacePoints(surface.vertices_m[rows], surface.normals[rows], down=surface.down)
+        low, high = surface_map.extent_m[1]
+        self.low_m, self.high_m = low - beyond_m, high + beyond_m
+        step = min(finest_m / 5.0, 0.02)
+        count = math.ceil((self.high_m - self.low_m) / step) + 1
+        self.lines_m = np.linspace(self.low_m, self.high_m, count)
+        integrator = FilmIntegrator(points, model)
+        # Sub-steps of single passes may be coarser than for a film: 1e-4 of the peak.
+        longest = finest_m / 5.0
+        # Poses about a sub-step apart.
+        # Slower poses would be gaps, at which the gun is off.
+        rate = max(style.speed_m_per_s / longest, 10.0)
+        self.films_um = np.empty((count, len(rows)))
+        for k, across in enumerate(self.lines_m):
+            line = (plan_pass(surface_map, float(across), style),)
+            motion = trajectory_of(line, style, rate_hz=rate)
+            path, _ = spray_path(motion, max_step_m=longest)
+            integrator.reset()
+            integrator.add(path)
+            self.films_um[k] = integrator.raw_um
+            progress((k + 1) / count)
+        # Cubic splines through the lines' films are linear in them: one matrix for all points.
+        self._basis = CubicSpline(self.lines_m, np.eye(count))
+
+    def sigma_n(self, lines_m: np.ndarray) -> np.ndarray:
+        """(...) standard deviation over mean of the film of passes along lines (..., n) [m]."""
+        weights = self._basis(np.clip(lines_m, self.low_m, self.high_m)).sum(axis=-2)
+        film = weights @ self.films_um
+        return film.std(axis=-1) / film.mean(axis=-1)
 
 
 @dataclass(frozen=True)
@@ -56,14 +117,15 @@ def place_passes(
         if (placement := best_placement(films, extent_m, index_range_m, passes)) is not None
     ]
     closest = min(best, key=lambda placement: placement.sigma_n)
-    limit = SLACK * closest.sigma_n + LEAST_SLACK if tolerance is None else tolerance
+    # Loss of evenness accepted for one pass fewer: relative, and in sigma_n itself.
+    limit = tolerance or 1.05 * closest.sigma_n + 0.002
     good = [placement for placement in best if placement.sigma_n <= limit]
     if not good:
         raise PlanError(
             f'no passes at an index of {index_range_m[0]:.3f} to {index_range_m[1]:.3f} m keep '
-            f'sigma_n on this part within {tolerance:g}; the closest is {closest.sigma_n:.4f} '
-            f'with {closest.passes} at {closest.index_m:.3f} m: allow that much, or a smaller '
-            'index'
+            f'sigma_n on this part within {100 * limit:g} %; the closest is '
+            f'{100 * closest.sigma_n:.2f} % with {closest.passes} at {closest.index_m:.3f} m: '
+            'allow that much, or a smaller index'
         )
     return good[0]
 
@@ -86,8 +148,8 @@ def best_placement(
     # Lines further out than the films that are kept are not considered.
     widest = (films.high_m - films.low_m) / max(passes - 1, 1)
     high = min(high, widest)
-    index = np.linspace(low, high, INDICES if high > low and passes > 1 else 1)
-    offset = np.linspace(-0.5, 0.5, OFFSETS)
+    index = np.linspace(low, high, 25 if high > low and passes > 1 else 1)
+    offset = np.linspace(-0.5, 0.5, 25)
     indices, offsets = (grid.ravel() for grid in np.meshgrid(index, offset))
     lines = lines_of(passes, indices, middle + offsets * indices)
     inside = (lines.min(axis=1) >= films.low_m) & (lines.max(axis=1) <= films.high_m)

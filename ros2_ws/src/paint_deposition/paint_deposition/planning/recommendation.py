@@ -18,12 +18,8 @@ from paint_deposition.planning.index_search import (
     cycle_time_s,
     passes_to_cover,
 )
-from paint_deposition.planning.requests import FASTEST_M_PER_S, SLOWEST_M_PER_S, IndexRequest
+from paint_deposition.planning.requests import IndexRequest
 
-# Film below this share of the mean, between passes, is a bare stripe.
-BARE = 0.01
-FIRST_GUESS_M_PER_S = 0.2
-SPEED_ROUNDS = 6
 # Within this share of a speed film goes as 1 / speed, whatever an effect makes of the speed.
 NEAR = 1e-4
 
@@ -112,10 +108,11 @@ class Recommendation:
 
 
 def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
-    """Find the index that lays the most even film, or the widest one within the tolerance.
+    """Find the index that lays the most even film, or that in the widest range within tolerance.
 
-    Without a tolerance it is the deepest local minimum in the range. With one it lies in the
-    window of widest index, for that takes the fewest passes: at the deepest minimum in there.
+    It is the deepest local minimum there, or the more even end of the range where there is none.
+    Where the speed is chosen for a target, only an index is considered that needs none beyond the
+    limits of the request.
 
     Raises:
         PlanError: there is no such index or speed; says why and what comes closest.
@@ -128,12 +125,15 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
             f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'
         )
     setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
-    speed = request.speed_m_per_s or FIRST_GUESS_M_PER_S
+    speed = request.speed_m_per_s or 0.2
     # A speed that is only a guess is replaced at the end.
     guessed = request.speed_m_per_s is None and bool(model.effects)
     parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
     width = half_width_m(parallel.first)
-    curve = IndexCurve.of(parallel, *request.index_range_m(width))
+    searched = request.index_range_m(width)
+    if request.speed_m_per_s is None:
+        searched = _within_speeds(parallel, speed, request, *searched)
+    curve = IndexCurve.of(parallel, *searched)
     best = choose_index(curve, request.tolerance)
     _refuse_stripes(parallel, best, width)
     if request.speed_m_per_s is None:
@@ -143,11 +143,13 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     index_drift = standoff_drift = None
     if windows:
         index_drift = next(w for w in windows if w[0] - NEAR <= best.index_m <= w[1] + NEAR)
-        # The bare projection widens a pass in proportion to its distance from the emission point,
-        # which is as good as a narrower index.
-        distance = standoff + model.projection.emission_offset_m
-        nearer, further = (distance * (best.index_m / end - 1.0) for end in index_drift[::-1])
-        standoff_drift = None if model.effects else (max(nearer, -standoff), further)
+        standoff_drift = _standoff_drift_m(model, standoff, best.index_m, index_drift)
+    notes = _notes(model, setup, request, curve, best, speed)
+    if searched != request.index_range_m(width):
+        notes.append(
+            f'the index is searched from {searched[0]:.3g} to {searched[1]:.3g} m only: beyond, '
+            'the target needs other speeds than are allowed'
+        )
     passes = cycle_time = None
     length = request.width_m and (request.length_m or request.width_m)
     if request.width_m is not None and length is not None:
@@ -172,18 +174,56 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         half_width_m=width,
         index_drift_m=index_drift,
         standoff_drift_m=standoff_drift,
-        notes=tuple(_notes(model, setup, request, curve, best, speed)),
+        notes=tuple(notes),
     )
+
+
+def _standoff_drift_m(
+    model: DepositionModel, standoff_m: float, index_m: float, window_m: tuple[float, float]
+) -> tuple[float, float] | None:
+    """How far the standoff may drift where the index may go to the ends of a window.
+
+    The bare projection widens a pass in proportion to its distance from the emission point, which
+    is as good as a narrower index; effects may depend on the standoff by themselves.
+    """
+    if model.effects:
+        return None
+    distance = standoff_m + model.projection.emission_offset_m
+    nearer, further = (distance * (index_m / end - 1.0) for end in window_m[::-1])
+    return max(nearer, -standoff_m), further
 
 
 def _refuse_stripes(parallel: ParallelPasses, best: Minimum, half_width_m: float) -> None:
     period = parallel.period_m(best.index_m)
     least = parallel.thickness_um(best.index_m, np.linspace(0.0, period, 65)).min()
-    if least < BARE * parallel.mean_um(best.index_m):
+    # Film below this share of the mean, between passes, is a bare stripe.
+    if least < 0.01 * parallel.mean_um(best.index_m):
         raise PlanError(
             f'an index of {best.index_m:.3f} m leaves bare stripes: one pass is '
             f'{half_width_m:.3f} m wide at half its height; search about that index'
         )
+
+
+def _within_speeds(
+    parallel: ParallelPasses, speed: float, request: IndexRequest, low_m: float, high_m: float
+) -> tuple[float, float]:
+    """The range of the index over which the target needs a speed within the limits.
+
+    At a target the speed goes as 1 / index; that of the ``parallel`` passes is given.
+    """
+    least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
+    assert request.target_um is not None
+    at_1_m = speed * parallel.mean_um(1.0) / request.target_um
+    low, high = max(low_m, at_1_m / most), min(high_m, at_1_m / least)
+    if not low < high:
+        wanted, nearest = (at_1_m / low_m, least) if high < low_m else (at_1_m / high_m, most)
+        raise PlanError(
+            f'target_um {request.target_um:g} at an index from {low_m:g} to {high_m:g} m needs '
+            f'{wanted:.3g} m/s, where {least:g} to {most:g} m/s are allowed; the closest is '
+            f'{request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s: allow other '
+            'speeds (speed_min_m_per_s, speed_max_m_per_s), or another index'
+        )
+    return low, high
 
 
 def _at_target(
@@ -197,15 +237,8 @@ def _at_target(
     """Choose the speed: film goes as 1 / speed, unless an effect depends on the speed."""
     assert request.target_um is not None
     low, high = float(curve.index_m[0]), float(curve.index_m[-1])
-    for _ in range(SPEED_ROUNDS):
+    for _ in range(6):
         wanted = speed * curve.parallel.mean_um(best.index_m) / request.target_um
-        if not SLOWEST_M_PER_S <= wanted <= FASTEST_M_PER_S:
-            nearest = min(max(wanted, SLOWEST_M_PER_S), FASTEST_M_PER_S)
-            raise PlanError(
-                f'target_um {request.target_um:g} at an index of {best.index_m:.3f} m needs '
-                f'{wanted:.3g} m/s, outside {SLOWEST_M_PER_S:g} to {FASTEST_M_PER_S:g} m/s; the '
-                f'closest is {request.target_um * wanted / nearest:.3g} µm at {nearest:g} m/s'
-            )
         if not model.effects or abs(wanted - speed) <= NEAR * speed:
             parallel = curve.parallel
             first = parallel.first.scaled(speed / wanted)
@@ -231,13 +264,14 @@ def _notes(
         there = otherwise.parallel_passes(model, speed, SEARCHED).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
             how = ('turned by 180 deg every way back', 'keeping its orientation')[setup.gun_turns]
-            notes.append(f'with the gun {how} sigma_n there would be {there:.4f}')
+            notes.append(f'with the gun {how} sigma_n there would be {100 * there:.2f} %')
     end = curve.best_end
     if best not in curve.minima:
         notes.append('there is no minimum of sigma_n here; it is more even at a smaller index')
     elif request.tolerance is None and end.sigma_n < best.sigma_n:
         notes.append(
-            f'the end of the range is more even still: {end.sigma_n:.4f} at {end.index_m:g} m'
+            f'the end of the range is more even still: sigma_n {100 * end.sigma_n:.2f} % at '
+            f'{1e3 * end.index_m:.0f} mm'
         )
     mean = curve.parallel.mean_um(best.index_m)
     if request.target_um is not None and abs(mean / request.target_um - 1.0) > 1e-3:

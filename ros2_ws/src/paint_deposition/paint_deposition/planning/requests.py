@@ -3,7 +3,6 @@
 Options of the command line and keywords of Python are these fields; None is not given.
 """
 
-import math
 from typing import Annotated, Literal
 
 from pydantic import BeforeValidator, Field, model_validator
@@ -11,10 +10,6 @@ from pydantic import BeforeValidator, Field, model_validator
 from paint_deposition.errors import PlanError, ReadingsError
 from paint_deposition.request import Request, given
 
-USUAL_RANGE_M = (0.2, 0.8)
-# A pattern whose SB50 lies here is searched over the usual range, another one over its own scale.
-USUAL_HALF_WIDTHS_M = (0.25, 0.75)
-RANGE_IN_HALF_WIDTHS = (0.35, 1.4)
 SLOWEST_M_PER_S, FASTEST_M_PER_S = 0.005, 3.0
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -61,8 +56,29 @@ class PassRequest(FilmBuild):
         return self
 
 
-class IndexRequest(PassRequest):
-    """An index between parallel passes on a plane."""
+class SpeedLimits(Request):
+    """How fast and how slow the gun may go."""
+
+    speed_min_m_per_s: float = given(
+        0.1, 'Least speed while spraying [m/s].', '--speed-min', above=0.0
+    )
+    speed_max_m_per_s: float = given(
+        1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
+    )
+
+    @model_validator(mode='after')
+    def _speeds_in_order(self) -> 'SpeedLimits':
+        self._require_order('speed_min_m_per_s', 'speed_max_m_per_s')
+        return self
+
+    def _require_order(self, low: str, high: str) -> None:
+        least, most = getattr(self, low), getattr(self, high)
+        if least is not None and most is not None and least > most:
+            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
+
+
+class IndexRequest(SpeedLimits, PassRequest):
+    """An index between parallel passes on a plane, at a speed or at one chosen for a target."""
 
     width_m: float | None = given(
         None, 'Width to paint across the passes [m].', '--width', above=0.0, most=100.0
@@ -77,11 +93,10 @@ class IndexRequest(PassRequest):
 
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
         """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
-        least, greatest = USUAL_HALF_WIDTHS_M
-        usual = USUAL_RANGE_M
-        if not least <= half_width_m <= greatest:
-            least, greatest = RANGE_IN_HALF_WIDTHS
-            usual = round(least * half_width_m, 3), round(greatest * half_width_m, 3)
+        # A pattern of a usual SB50 is searched over the usual range, another over its own scale.
+        usual = 0.2, 0.8
+        if not 0.25 <= half_width_m <= 0.75:
+            usual = round(0.35 * half_width_m, 3), round(1.4 * half_width_m, 3)
         low = usual[0] if self.index_min_m is None else self.index_min_m
         high = usual[1] if self.index_max_m is None else self.index_max_m
         if not low < high:
@@ -91,29 +106,13 @@ class IndexRequest(PassRequest):
         return low, high
 
 
-class Limits(Request):
+class Limits(SpeedLimits):
     """What robot, gun and shop allow while the speeds along a path are chosen."""
 
-    speed_min_m_per_s: float = given(
-        0.1, 'Least speed while spraying [m/s].', '--speed-min', above=0.0
-    )
-    speed_max_m_per_s: float = given(
-        1.0, 'Greatest speed while spraying [m/s].', '--speed-max', above=0.0
-    )
     acceleration_m_per_s2: float = given(
         2.0, 'Acceleration of the robot along its path, and across it in bends [m/s2].',
         '--acceleration', above=0.0,
     )  # fmt: skip
-
-    @model_validator(mode='after')
-    def _in_order(self) -> 'Limits':
-        self._require_order('speed_min_m_per_s', 'speed_max_m_per_s')
-        return self
-
-    def _require_order(self, low: str, high: str) -> None:
-        least, most = getattr(self, low), getattr(self, high)
-        if least is not None and most is not None and least > most:
-            raise PlanError(f'{low} is {least:g}, above {high}, {most:g}; swap them')
 
 
 class PlanRequest(Limits, PassRequest):
@@ -151,6 +150,12 @@ class PlanRequest(Limits, PassRequest):
         5e-3, 'With --optimise: the same for the time of the plan without it.', least=0.0
     )
 
+    allow_contact: bool = given(
+        False,
+        'Keep passes on which the gun touches the part, and say so in the head of the robot '
+        'program; default: they are refused.',
+    )
+
     @model_validator(mode='after')
     def _has_a_side(self) -> 'PlanRequest':
         if self.outward is not None and not any(self.outward):
@@ -169,9 +174,12 @@ class PlanRequest(Limits, PassRequest):
         return ImproveRequest(**limits, target_um=target_um, trigger_cut_m=overspray_m, **weights)
 
     def for_plane(self, width_m: float, length_m: float) -> IndexRequest:
-        """The same for a plane of the part's size."""
+        """For a plane of the part's size, at any speed: a part needs another than its plane."""
         shared = {name: getattr(self, name) for name in PassRequest.model_fields}
-        return IndexRequest(**shared, width_m=width_m, length_m=length_m)
+        return IndexRequest(
+            **shared, width_m=width_m, length_m=length_m, speed_min_m_per_s=SLOWEST_M_PER_S,
+            speed_max_m_per_s=FASTEST_M_PER_S,
+        )  # fmt: skip
 
 
 class ImproveRequest(Limits):
@@ -218,6 +226,11 @@ class ImproveRequest(Limits):
         0.3, 'The gun opens later and closes earlier by this much at most [m].',
         '--trigger-cut', least=0.0,
     )  # fmt: skip
+    spray_turns: bool = given(
+        False,
+        'Keep spraying in turns beside the part where the programme does; default: the gun is '
+        'closed there.',
+    )
     film_min_um: float | None = given(None, 'Least film accepted anywhere [µm].', above=0.0)
     film_max_um: float | None = given(None, 'Greatest film accepted anywhere [µm].', above=0.0)
 
@@ -258,13 +271,3 @@ class GunEnvelope(Request):
         '--keep-off-m',
         least=0.0,
     )
-
-    @property
-    def middle_m(self) -> float:
-        """Of the whole cylinder, along tool z from the TCP [m]."""
-        return 0.5 * (self.before_m - self.length_m)
-
-    @property
-    def reach_m(self) -> float:
-        """Radius of the sphere about that middle that holds it all [m]."""
-        return math.hypot(self.radius_m, 0.5 * (self.before_m + self.length_m))

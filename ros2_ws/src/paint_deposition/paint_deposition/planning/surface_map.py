@@ -13,17 +13,6 @@ from paint_deposition.errors import PlanError
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
-# Surface that leans further from the gun's side than this is not painted from it.
-STEEPEST_COSINE = math.cos(math.radians(75.0))
-# Mean normals shorter than this share have no side: a closed body.
-LEAST_SIDE = 0.2
-FINEST_CELL_M, COARSEST_CELL_M = 0.004, 0.02
-CELLS_PER_RADIUS = 5.0
-MOST_CELLS = 1_000_000
-# The blend from the surface to what stands in for it outside, in radii.
-OUTSIDE_BLEND = 0.5
-LIFT_M = 1e-3
-
 
 @dataclass(frozen=True)
 class PassAxes:
@@ -61,7 +50,8 @@ def pass_axes(
     """
     if outward is None:
         outward = surface.vertex_areas_m2 @ surface.normals
-        if np.linalg.norm(outward) < LEAST_SIDE * surface.area_m2:
+        # Mean normals shorter than this share have no side: a closed body.
+        if np.linalg.norm(outward) < 0.2 * surface.area_m2:
             raise PlanError(
                 'the part is closed, it has no side to paint from; say where the gun stands '
                 '(outward)'
@@ -89,12 +79,12 @@ class SurfaceMap:
             raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
         self.surface_m = axes.coordinates_m(surface.vertices_m[self.painted])
         weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]
-        cell = min(max(radius_m / CELLS_PER_RADIUS, FINEST_CELL_M), COARSEST_CELL_M)
+        cell = min(max(radius_m / 5.0, 0.004), 0.02)
         cell = max(cell, surface.longest_edge_m)
         margin = 3.0 * radius_m + 2.0 * cell
         low = self.surface_m[:, :2].min(axis=0) - margin
         high = self.surface_m[:, :2].max(axis=0) + margin
-        cell = max(cell, math.sqrt(float(np.prod(high - low)) / MOST_CELLS))
+        cell = max(cell, math.sqrt(float(np.prod(high - low)) / 1_000_000))
         count = np.ceil((high - low) / cell).astype(int) + 1
         self._lines = [low[k] + cell * np.arange(count[k]) for k in range(2)]
         self._cell_m = cell
@@ -161,7 +151,8 @@ class SurfaceMap:
         inside = binary_closing(surface_map, iterations=3) | surface_map
         nearest = distance_transform_edt(~inside, return_distances=False, return_indices=True)
         held = field[tuple(nearest)]
-        deviation = OUTSIDE_BLEND * self.radius_m / self._cell_m
+        # The blend from the surface to what stands in for it outside, in radii.
+        deviation = 0.5 * self.radius_m / self._cell_m
         blended = gaussian_filter(held, deviation, mode='nearest')
         near = gaussian_filter(inside.astype(float), deviation, mode='nearest')
         # Well inside the fitted plane stands; at the edge it goes over to the blend.
@@ -171,7 +162,8 @@ class SurfaceMap:
 
 def painted_side(surface: Surface, axes: PassAxes) -> np.ndarray:
     """(V,) bool, vertices that face the gun with nothing of the part before them."""
-    starts = surface.vertices_m + LIFT_M * axes.outward
+    starts = surface.vertices_m + 1e-3 * axes.outward
     directions = np.ascontiguousarray(np.broadcast_to(axes.outward, starts.shape))
     in_front = surface.first_faces(starts, directions) < 0
-    return (surface.normals @ axes.outward > STEEPEST_COSINE) & in_front
+    # Surface that leans further from the gun's side than this is not painted from it.
+    return (surface.normals @ axes.outward > math.cos(math.radians(75.0))) & in_front

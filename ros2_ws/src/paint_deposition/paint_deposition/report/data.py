@@ -21,7 +21,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.residuals import root_mean_square
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
-from paint_deposition.report.writers.fitted_model import history_as_list
+from paint_deposition.report.writers.models import history_as_list
 
 
 class Change(NamedTuple):
@@ -32,7 +32,7 @@ class Change(NamedTuple):
     rms_um: float
 
 
-class Painted(NamedTuple):
+class PredictedFilm(NamedTuple):
     """The layer of a part that was measured, with one model."""
 
     film_um: np.ndarray  # (V,) on the surface [um]
@@ -55,7 +55,7 @@ class ReportData:
     def of(
         result: Comparison | SideBySide | Diagnosis, older: Sequence[Mapping[str, Any]] = ()
     ) -> 'ReportData':
-        """Of a diagnosis, models between the first and the last are history only."""
+        """Gather what the report shows; of a diagnosis, the first and the last model."""
         if isinstance(result, SideBySide):
             return ReportData(tuple(result.by_name.values()), names=tuple(result.by_name))
         if isinstance(result, Comparison):
@@ -70,7 +70,7 @@ class ReportData:
 
     @property
     def experiments(self) -> tuple[Experiment, ...]:
-        """Of the campaign."""
+        """The experiments of the campaign."""
         return self.study.campaign.experiments
 
     @property
@@ -126,7 +126,7 @@ class ReportData:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        """Of the models; of two that followed from each other the last has the strong one."""
+        """Colours of the models; a model before is paler than the one after it."""
         return MODELS[: len(self.models)] if self.names else (BEFORE, ACCENT)[-len(self.models) :]
 
     @property
@@ -148,7 +148,7 @@ class ReportData:
 
     @property
     def history(self) -> list[dict[str, Any]]:
-        """Of the model, oldest first, as in its file."""
+        """History of the model, oldest step first, as in its file."""
         if self.diagnosis is None:
             return []
         return history_as_list(self.study, self.diagnosis.history, self.older)
@@ -188,12 +188,12 @@ class ReportData:
         return slice(int(first), int(stop))
 
     @cached_property
-    def painted(self) -> list[list[Painted]]:
+    def painted(self) -> list[list[PredictedFilm]]:
         """The surface painted: for each experiment, with each model."""
         return [[_painted(one, model) for model in self.models] for one in self.experiments]
 
 
-def _painted(experiment: Experiment, model: DepositionModel) -> Painted:
+def _painted(experiment: Experiment, model: DepositionModel) -> PredictedFilm:
     surface, acting = experiment.surface, model.without(experiment.switched_off)
     points = surface.points()
     films = []
@@ -201,7 +201,7 @@ def _painted(experiment: Experiment, model: DepositionModel) -> Painted:
         film = FilmIntegrator(points, acting, 'double', surface.occluder)
         film.add(experiment.path.select(rows))
         films.append((sign, film))
-    return Painted(
+    return PredictedFilm(
         sum_um((sign, film.film_um) for sign, film in films),
         sum(sign * film.emitted_cm3 for sign, film in films),
     )

@@ -18,7 +18,7 @@ from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.style import TWO_SIDED_95
-from paint_deposition.report.writers.fitted_model import PATTERN, REFIT
+from paint_deposition.report.writers.models import PATTERN, REFIT
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
     'incidence_deg': ('Incidence angle', 'deg'),
@@ -78,13 +78,13 @@ def competing_explanations(spray: Spray) -> str:
 
 def separation_words(spray: Spray) -> str:
     """How far apart the explanations are now, and with a spray; the chance that one is left."""
-    several = 'the two least apart of ' if len(spray.separates) > 2 else ''
+    several = 'the closest two of ' if len(spray.separates) > 2 else ''
     words = (
-        f'{several}{competing_explanations(spray)} then differ by {spray.separation:.1f} standard '
-        f'deviations, now by {spray.now:.1f}'
+        f'{several}{competing_explanations(spray)} will differ by {spray.separation:.1f} instead '
+        f'of {spray.now:.1f} standard deviations'
     )
     if spray.chance == spray.chance:
-        words += f'; the chance that one is left alone is {percent(spray.chance)}'
+        words += f'; with a probability of {percent(spray.chance)} only one of them remains'
     return '; '.join(filter(None, [words, spray.film_words]))
 
 

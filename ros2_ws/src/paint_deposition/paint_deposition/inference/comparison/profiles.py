@@ -23,6 +23,9 @@ LINE_STEP_M = 0.01
 # Beyond the first and last reading lines go on for as far as readings are apart, but not off the
 # surface by more [m].
 OFF_SURFACE_M = 0.003
+# Between readings a line breaks where it is this far off the surface, at a cut-out say, or where
+# the nearest surface faces another way, a hem say.
+OFF_SKIN_M, SKIN_COSINE = 0.02, 0.5
 # Readings without rows or columns are shown in strips of the part, about this many to a strip.
 READINGS_A_STRIP = 20
 MOST_STRIPS = 6
@@ -40,8 +43,10 @@ class Profile:
     position_m: np.ndarray  # (n,) of the points along the axis [m]
     # (L,) positions of the model's lines [m]; empty where there are too few readings.
     line_m: np.ndarray
-    lines_um: np.ndarray  # (models, L) what a gauge would show there [um]
-    passes_um: np.ndarray  # (passes, L) paint that each single pass brought, last model [um]
+    # (models, L) what a gauge would show there, and (passes, L) paint that each single pass
+    # brought, last model [um]; NaN where the line leaves the part.
+    lines_um: np.ndarray
+    passes_um: np.ndarray
 
 
 def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile]:
@@ -157,9 +162,11 @@ def _film_along(
         way = axis.direction - (axis.direction @ normals[end]) * normals[end]
         way /= way @ axis.direction
         line[outside, :3] += np.outer(at[outside] - position_m[end], way)
-    off_m = experiment.surface.locate(line[:, :3], line[:, 3:]).distance_m
-    on = ((low <= at) & (at <= high)) | (off_m < OFF_SURFACE_M)
-    at, line = at[on], line[on]
+    nearest = experiment.surface.locate(line[:, :3], line[:, 3:])
+    between, off_m = (low <= at) & (at <= high), nearest.distance_m
+    facing = np.einsum('ij,ij->i', nearest.normals, line[:, 3:]) > SKIN_COSINE
+    on = facing & (off_m < np.where(between, OFF_SKIN_M, OFF_SURFACE_M))
+    at, line, on = at[between | on], line[on], on[between | on]
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)
 
@@ -169,10 +176,13 @@ def _film_along(
         return integrator
 
     path = experiment.path
-    films = [integrated(model, path).gauge_um[: len(at)] for model in models]
+    count = int(on.sum())
+    films = [integrated(model, path).gauge_um[:count] for model in models]
     # Of a pass alone the others are kept, with the gun off.
     passes = [
-        integrated(models[-1], path.with_flow_scaled(path.spray_pass == number)).raw_um[: len(at)]
+        integrated(models[-1], path.with_flow_scaled(path.spray_pass == number)).raw_um[:count]
         for number in np.unique(path.spray_pass[path.spray_pass >= 0])
     ]
-    return at, np.array(films), np.array(passes)
+    lines = np.full((len(films) + len(passes), len(at)), np.nan)
+    lines[:, on] = [*films, *passes]
+    return at, lines[: len(films)], lines[len(films) :]

@@ -11,7 +11,7 @@ from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.writers.film import write_film
+from paint_deposition.report.writers.write import write_film
 
 
 def statistics_of(

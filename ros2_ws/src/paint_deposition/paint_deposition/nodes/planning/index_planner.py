@@ -27,9 +27,14 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     thickness_parameter,
 )
-from paint_deposition.planning.plan import Plan, plan
+from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest, PlanRequest
+from paint_deposition.planning.requests import (
+    FASTEST_M_PER_S,
+    GunEnvelope,
+    IndexRequest,
+    PlanRequest,
+)
 
 SPACING_M = 0.02
 # 0 stands for none in fields of a service request and in optional parameters.
@@ -169,7 +174,9 @@ class IndexPlanner(PaintNode):
             outward=tuple(values['outward']) or None,
         )
         frame_id = values['frame_id'].lstrip('/')
-        planned = plan(surface, self._selected_model(), request, frame_id, progress)
+        planned = kept_clear(
+            plan(surface, self._selected_model(), request, frame_id, progress), GunEnvelope()
+        )
         self.get_logger().info(planned.sentence)
         path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
         self._path_publisher.publish(path)

@@ -19,8 +19,6 @@ FIGURES = (
 )  # fmt: skip
 # Steps in which the film is shown, finer than a gauge's: less is no change that travels.
 STEP_UM = 1.0 / 32.0
-# A gun that has moved by so much leaves another point of its track [m].
-TRACK_STEP_M = 0.01
 # Rows of a series beyond which its older half is forgotten: hours of figures, 500 m of a track.
 MOST_ROWS = 50_000
 
@@ -119,11 +117,8 @@ class Scene:
         with self._lock:
             number, left_m, sprayed = self._guns.get(name, (len(self._guns), None, False))
             sprays = flow > 0.0
-            if (
-                left_m is None
-                or sprays != sprayed
-                or np.linalg.norm(position_m - left_m) > TRACK_STEP_M
-            ):
+            # A gun that has moved by so much leaves another point of its track [m].
+            if left_m is None or sprays != sprayed or np.linalg.norm(position_m - left_m) > 0.01:
                 self._append('track', (number, *position_m.tolist(), sprays))
                 left_m = position_m
             self._guns[name] = number, left_m, sprays

@@ -21,8 +21,6 @@ DEFAULT_HOST, DEFAULT_PORT = '127.0.0.1', 8090
 # The variable of the environment for the token: others can read the words of a command.
 TOKEN = 'PAINT_TOKEN'
 STATIC = Path(__file__).parent / 'static'
-# Browsers are brought up to date this often [s].
-PERIOD_S = 0.1
 # A browser that answers no ping for so long has gone [s].
 PING_S = 10.0
 THIS_MACHINE = ('127.0.0.1', 'localhost', '::1')
@@ -163,6 +161,7 @@ class _Browser(_Guarded, WebSocketHandler):
                     await self.write_message(message, binary=True)
                     page.bytes_sent += len(message)
                 frames = []
-                await asyncio.sleep(PERIOD_S)
+                # Browsers are brought up to date this often [s].
+                await asyncio.sleep(0.1)
         except WebSocketClosedError:
             pass

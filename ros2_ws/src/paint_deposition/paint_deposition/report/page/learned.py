@@ -12,19 +12,13 @@ from paint_deposition.effects.learned.place import LearnedMap, places_m
 from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page import layout
+from paint_deposition.report.page import charts as layout
 from paint_deposition.report.style import ACCENT, INK, MUTED, TWO_SIDED_95
 from paint_deposition.report.words import capital, covariate_label, effect_name, joined
 
 CURVE_POINTS = 201
 # The accent, so pale that grid and curves show through.
 BAND = 'rgba(0,112,140,0.18)'
-HEIGHT_PX = 340
-# Cells of a footprint from one side to the other, and how far out the pattern matters: where it
-# is above this share of its peak.
-CELLS, FAINT = 81, 0.02
-# Contours of the pattern of eq. (1), as shares of its peak.
-CONTOURS = (0.1, 0.5, 0.9)
 
 
 def learned_figure(data: ReportData) -> dict[str, Any] | None:
@@ -94,7 +88,7 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
     law = data.model.effect(LearnedMap.id)
     if not isinstance(law, LearnedMap):
         return None
-    charts, marker = [], {'size': 3, 'color': INK}
+    found, marker = [], {'size': 3, 'color': INK}
     for grid, values in law.values_by_part():
         parts = [e for e in data.experiments if grid.is_of(e.measured_points)]
         neutral, title = 0.0, 'addition [µm]'
@@ -107,8 +101,8 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
         dots = [layout.scatter(p[:, 0], p[:, 1], 'markers', marker=marker, hoverinfo='skip')
                 for p in places]  # fmt: skip
         labels = ('right of the centre [m]', 'above it [m]')
-        charts.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))
-    return layout.figure('maps', charts) if charts else None
+        found.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))
+    return layout.figure('maps', found) if found else None
 
 
 def profile_figure(data: ReportData) -> dict[str, Any] | None:
@@ -144,18 +138,20 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
     if not laws:
         return None
     patterns, brushes = data.model.patterns, data.model.brushes
-    reach = max(planar.radius_of_flux_m(FAINT) for planar in patterns)
-    along, labels = np.linspace(-reach, reach, CELLS), ('tool x [m]', 'tool y [m]')
+    # As far out as the pattern matters: where it is above 2 % of its peak.
+    reach = max(planar.radius_of_flux_m(0.02) for planar in patterns)
+    along, labels = np.linspace(-reach, reach, 81), ('tool x [m]', 'tool y [m]')
     x, y = np.meshgrid(along, along)
     plain = [planar.flux_um_per_s(x, y) for planar in patterns]
     factor = np.maximum(1.0 + laws[0].h(x, y), LEAST_FACTOR)
     of = [f' of brush {brush.number}' for brush in brushes] if len(brushes) > 1 else ['']
-    charts = []
+    found = []
     for flux, whose in zip(plain, of, strict=True):
         colours = layout.FILM_COLOURS, 0.0, float(max(flux.max(), (flux * factor).max()))
         for title, values in (('of eq. (1)', flux), ('as learned', flux * factor)):
             title = f'pattern {title}{whose} [µm/s]'
-            charts.append(_heat_map(title, labels, along, along, values, colours))
+            found.append(_heat_map(title, labels, along, along, values, colours))
+    # Contours of the pattern of eq. (1), as shares of its peak.
     contours = [
         {
             'type': 'contour', 'x': along, 'y': along, 'z': plain[0], 'showscale': False,
@@ -163,11 +159,11 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
             'contours': {'type': 'constraint', 'operation': '=', 'value': share * plain[0].max()},
             'showlegend': False,
         }
-        for share in CONTOURS
+        for share in (0.1, 0.5, 0.9)
     ]  # fmt: skip
     title = f'factor, with contours of eq. (1){of[0]}'
-    charts.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), contours))
-    return layout.figure('footprint', charts)
+    found.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), contours))
+    return layout.figure('footprint', found)
 
 
 def _around(values: np.ndarray, neutral: float) -> tuple[list, float, float]:
@@ -198,4 +194,4 @@ def _heat_map(
         'colorbar': {'thickness': 10, 'outlinewidth': 0,
                      'tickfont': {'size': 11, 'color': MUTED}},
     }  # fmt: skip
-    return layout.chart(title, [heat, *above], arranged, HEIGHT_PX)
+    return layout.chart(title, [heat, *above], arranged, 340)

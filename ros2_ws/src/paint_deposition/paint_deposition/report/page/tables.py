@@ -16,8 +16,6 @@ from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.style import TWO_SIDED_95
 
-# A value below this share of its interval is printed as none.
-NEGLIGIBLE = 1e-4
 LOW, IN, HIGH = 'low', 'in', 'high'
 
 
@@ -49,7 +47,8 @@ def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> di
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
     """A parameter in words: its value, and the ends of its 95 % interval if there is one."""
     unit = effect.parameters()[name]['unit'] if effect else ''
-    if abs(values[0]) < NEGLIGIBLE * np.ptp(values):
+    # A value below this share of its interval is printed as none.
+    if abs(values[0]) < 1e-4 * np.ptp(values):
         values = (0.0, *values[1:])
     printed = zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False)
     return {'words': words.parameter_words(name, unit)} | dict(printed)

@@ -9,28 +9,26 @@ from matplotlib.figure import Figure, FigureBase
 from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
-from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.chart import (
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import HALO, PartPicture, label_points
+from paint_deposition.report.style import (
+    BEFORE,
+    INK,
     MM,
+    MUTED,
     PAGE_IN,
     TEXT_PT,
+    TWO_SIDED_95,
     colour_bar,
     new_figure,
     quiet,
 )
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import HALO, PartPicture
-from paint_deposition.report.style import BEFORE, INK, MUTED, TWO_SIDED_95
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
-# As many letters of a title fit over a chart; one that is longer is written smaller.
-TITLE_LETTERS = 48
 # A profile's two charts with the room around them, as shares of it, and that of the legend [in].
 PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
 PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
-# Few readings beyond the end of the colours do not take the contrast from all others.
-SHOWN_SHARE = 0.98
 
 
 def part_figures(data: ReportData, index: int) -> list[Figure]:
@@ -42,9 +40,17 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
     film_um = data.painted[index][-1].film_um
     title = f'film predicted, {data.model_names[-1]}'
     film, axes = page_film(part, film_um, experiment.path, title, film_scale(film_um))
-    for number, place in enumerate(data.proposals[0], start=1):
-        if place.experiment == experiment.name:
-            _draw_place(axes, part, number, place)
+    places = {
+        str(number): part.view.flat(place.position_m)
+        for number, place in enumerate(data.proposals[0], start=1)
+        if place.experiment == experiment.name
+    }
+    if places:
+        flat_m = np.array(list(places.values()))
+        axes.plot(*flat_m.T, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
+        per_m = 72.0 * PAGE_IN / np.ptp(axes.get_xlim())
+        label_points(axes, flat_m, list(places), 0.7 * per_m, fontsize=10, color='white',
+                     path_effects=HALO, zorder=6)  # fmt: skip
     return [*residual_figures(data, index, part), film]
 
 
@@ -55,7 +61,8 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
     points = experiment.points
     positions, normals = points.positions_m[:count], points.normals[:count]
     room = 0.03 * (part.high_m - part.low_m).max()
-    largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), SHOWN_SHARE))
+    # Few readings beyond the end of the colours do not take the contrast from all others.
+    largest = float(np.quantile(np.abs(np.concatenate(data.residuals_um)), 0.98))
     scale = residual_scale(np.array([largest]))
     places = part.view.flat(positions)
     figures = []
@@ -70,15 +77,6 @@ def residual_figures(data: ReportData, index: int, part: PartPicture) -> list[Fi
         colour_bar(figure, [axes], 'measured minus predicted [µm]', scale)
         figures.append(figure)
     return figures
-
-
-def _draw_place(axes: Axes, part: PartPicture, number: int, place: Place) -> None:
-    x, y = part.view.flat(place.position_m).tolist()
-    axes.plot(x, y, 'D', color='white', markeredgecolor=INK, markersize=6, zorder=5)
-    axes.annotate(
-        str(number), (x, y), xytext=(5, 5), textcoords='offset points', fontsize=10, color='white',
-        path_effects=HALO, zorder=6,
-    )  # fmt: skip
 
 
 def comparison_figure(data: ReportData) -> Figure:
@@ -129,7 +127,7 @@ def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFi
     _draw_residual(residual, data, profile)
     bars_um = TWO_SIDED_95 * data.study.sigma_um
     tops_um = [(data.study.measured_um + bars_um).max()]
-    tops_um += [one.lines_um.max() for one in data.profiles if one.lines_um.size]
+    tops_um += [np.nanmax(one.lines_um) for one in data.profiles if one.lines_um.size]
     film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
     reach_um = 1.05 * max((np.abs(one) + bars_um).max() for one in data.residuals_um)
     residual.set_ylim(-reach_um, reach_um)
@@ -142,7 +140,8 @@ def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
     of = f'{profile.experiment}, ' if len(data.experiments) > 1 else ''
     errors = [f'{c.points.select(profile.rows).rmse_um:.2f}' for c in data.comparisons]
     title = f'{of}{profile.label}:  RMSE {" → ".join(errors)} µm'
-    title_pt = (TEXT_PT + 1.0) * min(1.0, TITLE_LETTERS / len(title))
+    # As many letters of a title fit over a chart; one that is longer is written smaller.
+    title_pt = (TEXT_PT + 1.0) * min(1.0, 41 / len(title))
     axes.set_title(title, loc='left', fontsize=title_pt, color=INK, y=1.0)
     at_mm, line_mm = MM * profile.position_m, MM * profile.line_m
     measured_um = data.study.measured_um[profile.rows]

@@ -14,14 +14,22 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_a
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.pictures.chart import colour_bar, colours_of, new_figure, quiet
 from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
-from paint_deposition.report.style import BARE, BELOW, GRID, HIGH, INK, MUTED, WITHIN
+from paint_deposition.report.style import (
+    BARE,
+    BELOW,
+    GRID,
+    HIGH,
+    INK,
+    MUTED,
+    WITHIN,
+    colour_bar,
+    colours_of,
+    new_figure,
+    quiet,
+)
 
-# The part's share of the picture, and the column beside it [in].
-PART_IN = (7.6, 7.6)
-BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 2.7, 1.0, 3.4
-BINS = 40
+BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 3.1, 1.0, 3.4
 NO_TARGET = GRID
 
 
@@ -41,7 +49,8 @@ def film_picture(
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
-    width, height = (high - low) * min(PART_IN / (high - low))
+    # The part's share of the picture, and the column beside it [in].
+    width, height = (high - low) * min(7.6 / (high - low))
     rows = 2 if statistics.has_target else 1
     figure = new_figure(
         width + BESIDE_IN + AROUND_IN, rows * (max(height, LEAST_HEIGHT_IN) + AROUND_IN)
@@ -111,18 +120,19 @@ def _draw_band(
 ) -> None:
     low, high = part.window(spray)
     part.dress(axes, low, high)
-    of_zone = part.zones(zones.number if zones else np.full(len(film_um), -1))
-    for number, shown in of_zone.items():
-        name = zones.zones.zones[number].name if zones and number >= 0 else ''
-        wanted = s.zones[name] if name else s
+    shares = part.zone_shares(zones) if zones else {}
+    # The first lies below all others, so that no gap is left between smoothed borders.
+    for below, number in enumerate(sorted(shares) or [-1]):
+        zone = zones.zones.zones[number].name if zones and number >= 0 else ''
+        wanted = s.zones[zone] if zone else s
         ends, colours = [s.painted_above_um], [BARE]
         for end, colour in zip(wanted.band_um, (BELOW, WITHIN), strict=True):
             if end > ends[-1]:
                 ends.append(end)
                 colours.append(colour)
         colours.append(HIGH if wanted.target_um else NO_TARGET)
-        part.draw_bands(axes, film_um, ends, colours, shown)
-    part.draw_zones(axes, zones)
+        part.draw_bands(axes, film_um, ends, colours, shares[number] if below else None)
+    part.draw_zones(axes, zones, spray)
     draw_tool_path(axes, spray, part.view, low, high)
 
 
@@ -151,21 +161,18 @@ def _draw_band_legend(
         f'of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'
     )
     if s.zones:
-        title = 'target of each zone\nof the painted area with one'
+        title = 'each zone by its own target,\nof the painted area with a target'
     _draw_patches(shares, entries, title)
     _draw_histogram(figure.add_subplot(column[1]), surface, film_um, s, zones)
     below = figure.add_subplot(column[2])
     below.set_axis_off()
     text = f'Cpk {s.cpk:.2f}\n{fill(CPK_MEANS, 40)}'.replace('-', '−')
-    _write(below, '\n'.join(map(_zone_words, s.zones.items())) or text, 8.0)
-
-
-def _zone_words(named: tuple[str, FilmStatistics]) -> str:
-    name, s = named
-    return (
-        f'{name}: {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
-        f'    mean {s.mean_um:.1f} µm, {100 * s.within_target:.1f} % in the band'
-    )
+    of_zones = [
+        f'{name}: {zone.target_um:g} ± {zone.target_tolerance_um:g} µm\n'
+        f'    mean {zone.mean_um:.1f} µm, {100 * zone.within_target:.1f} % in the band'
+        for name, zone in s.zones.items()
+    ]
+    _write(below, '\n'.join(of_zones) or text, 8.0)
 
 
 def _draw_patches(axes: Axes, entries: list[tuple[str, str]], title: str = '') -> None:
@@ -205,7 +212,7 @@ def _draw_histogram(
     axes.set_title('% of the painted area', loc='left', fontsize=8, color=MUTED)
     axes.axvspan(low, high, color=WITHIN, alpha=0.35, linewidth=0.0)
     if len(film):
-        axes.hist(film, BINS, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
+        axes.hist(film, 40, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
     for limit in (low, middle, high):
         axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 

@@ -5,20 +5,28 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.gridspec import GridSpec
-from matplotlib.patheffects import Normal, Stroke
 
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
-from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
-from paint_deposition.report.pictures.part import PartPicture
-from paint_deposition.report.style import ACCENT, BEFORE, COMPONENTS, INK, MUTED
+from paint_deposition.report.pictures.part import PALE_HALO, PartPicture, label_points
+from paint_deposition.report.style import (
+    ACCENT,
+    BEFORE,
+    COMPONENTS,
+    INK,
+    MM,
+    MUTED,
+    legend,
+    new_figure,
+    quiet,
+    save_picture,
+)
 
 LINE_POINTS = 600
 PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26
-HALO = [Stroke(linewidth=2.4, foreground='white'), Normal()]
 
 
 def write_calibration_pictures(
@@ -137,11 +145,9 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
             *places[which].T, marker, markersize=6, color='white', markeredgecolor=INK,
             linestyle='', label=label,
         )  # fmt: skip
-    for name, place in zip(chosen.names, places, strict=True):
-        axes.annotate(
-            name.removeprefix('P').lstrip('0'), place, xytext=(4, 4), textcoords='offset points',
-            fontsize=8.5, color=INK, path_effects=HALO,
-        )  # fmt: skip
+    names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
+    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
+    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
     axes.set_title(
         f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
         color=INK, pad=24,

@@ -14,17 +14,19 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.chart import new_figure, save_picture
 from paint_deposition.report.pictures.part import View, draw_triangles, dress
-from paint_deposition.report.style import ACCENT, COMPONENTS, GRID, INK, MUTED
+from paint_deposition.report.style import (
+    ACCENT,
+    COMPONENTS,
+    GRID,
+    INK,
+    MUTED,
+    new_figure,
+    save_picture,
+)
 
 PART_COLOUR = '#b8c2cc'
 PASS_COLOURS = (ACCENT, *COMPONENTS, '#c0392b', '#2c5aa0')
-TEXT_COLUMNS = 48
-# Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
-AXIS_SHARE, AXES_APART = 0.09, 0.04
-# Smaller parts of a picture are marked: they would not be seen.
-SMALL = 0.02
 
 
 def write_geometry_picture(
@@ -49,7 +51,7 @@ def write_geometry_picture(
     key = figure.add_subplot(grid[1, 1])
     key.set_axis_off()
     key.legend(handles=_key(), loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
-    text = '\n'.join(fill(f'warning: {line}', TEXT_COLUMNS) for line in geometry.warnings)
+    text = '\n'.join(fill(f'warning: {line}', 48) for line in geometry.warnings)
     key.text(0.0, 0.0, text, fontsize=9, color='#c0392b', transform=key.transAxes)
     figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
     return save_picture(figure, path)
@@ -80,11 +82,12 @@ def _draw(axes: Axes, view: View, surface: Surface, spray: SprayPath, size_m: fl
                 str(number + 1), line[0], fontsize=7.5, color='white', ha='center', va='center',
                 bbox={'boxstyle': 'circle,pad=0.2', 'facecolor': colours[rows[0]], 'linewidth': 0},
             )  # fmt: skip
-    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), AXES_APART * size_m
+    # Tool axes are drawn this long, and so far apart along the way, as shares of the picture.
+    travel, apart_m = np.cumsum(spray.dwell_s * spray.speed_m_per_s), 0.04 * size_m
     evenly_m = np.arange(0.5 * apart_m, travel[-1], apart_m)
     shown = np.unique(np.searchsorted(travel, evenly_m))
     start = spray.position_m[shown]
-    ends = start + AXIS_SHARE * size_m * spray.rotation[shown, :, 2]
+    ends = start + 0.09 * size_m * spray.rotation[shown, :, 2]
     axes.add_collection(
         LineCollection(
             list(np.stack([view.flat(start), view.flat(ends)], axis=1)), linewidths=0.9,
@@ -110,7 +113,8 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
     flat = view.flat(surface.vertices_m)
     draw_triangles(axes, flat[surface.faces[order]], np.repeat(colours[:, np.newaxis], 3, axis=1))
     axes.add_collection(LineCollection(list(view.flat(surface.rim_m)), colors=INK, linewidths=0.7))
-    if np.ptp(flat, axis=0).max() < SMALL * size_m:
+    # Smaller parts of a picture are marked: they would not be seen.
+    if np.ptp(flat, axis=0).max() < 0.02 * size_m:
         axes.plot(*flat.mean(axis=0), marker='s', markersize=5, color=INK)
         axes.annotate(
             'the part', flat.mean(axis=0), xytext=(8, 4), textcoords='offset points', fontsize=9,

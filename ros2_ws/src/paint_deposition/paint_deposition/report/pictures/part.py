@@ -1,6 +1,8 @@
 """A part as a flat picture from the sides of the gun, with the gun's way over it."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,23 +13,22 @@ from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
 from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
+from scipy.spatial import cKDTree
 
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.edges import edges_of
 from paint_deposition.part.orientation import downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
-from paint_deposition.report.style import INK, MUTED
+from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
 
-# Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
-MARGIN_IN_PARTS = 1.0
-# Whether a triangle is hidden is seen from a place so far above it [m].
-LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
-ARROWS_A_WIDTH = 3.0
-# On a page a part is drawn no higher than this, with this room above and below [in].
-HIGHEST_IN, AROUND_IN = 4.2, 1.3
+# Where a label of a point may stand [pt], the best place first.
+AROUND_POINT = 9.0 * np.array(
+    [(1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.2), (0, -1.2)]
+)
+# Rounds of smoothing of a zone's border, over neighbours; a label is so much wider than high.
+SMOOTHINGS, LABEL_SHAPE = 3, np.array([5.0, 1.0])
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
@@ -55,13 +56,13 @@ class View:
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
 
     def from_the_right(self) -> 'View':
-        """The same part seen from the right of this picture."""
+        """View of the part from the right of this picture."""
         return View(
             -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
         )
 
     def from_above(self) -> 'View':
-        """The same part seen from the top of this picture, its front below."""
+        """View of the part from the top of this picture, its front below."""
         return View(
             self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
         )
@@ -101,7 +102,8 @@ class PartPicture:
         first, second = (flat[surface.faces[:, k]] - flat[surface.faces[:, 0]] for k in (1, 2))
         front = surface.faces[first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]]
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
-        above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
+        # Whether a triangle is hidden is seen from a place so far above it [m].
+        above = surface.vertices_m[faces].mean(axis=1) + 1e-3 * view.toward
         seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
         # Creases, where patches share no vertex, and rims have one triangle only.
         edges, of_face = edges_of(faces[seen])
@@ -121,7 +123,8 @@ class PartPicture:
     def window(self, spray: SprayPath) -> tuple[np.ndarray, np.ndarray]:
         """Lowest and highest corner of a picture of the part with its whole passes [m]."""
         low, high = self.low_m, self.high_m
-        margin = MARGIN_IN_PARTS * (high - low).max()
+        # Passes beside the part are shown as far off as the part is large.
+        margin = (high - low).max()
         gun = self.view.flat(spray.position_m[spray.flow > 0.0])
         if len(gun):
             low = np.maximum(np.minimum(low, gun.min(axis=0)), low - margin)
@@ -132,8 +135,9 @@ class PartPicture:
     def on_page(self, low: np.ndarray, high: np.ndarray, title: str) -> tuple[Figure, Axes]:
         """A picture as wide as a page has room for, and its axes to these corners [m]."""
         across, upward = high - low
-        height = min((PAGE_IN - 0.8) * upward / across, HIGHEST_IN)
-        figure = new_figure(PAGE_IN, height + AROUND_IN)
+        # On a page a part is drawn no higher than this, with this room above and below [in].
+        height = min((PAGE_IN - 0.8) * upward / across, 4.2)
+        figure = new_figure(PAGE_IN, height + 1.3)
         axes = figure.subplots()
         self.dress(axes, low, high)
         axes.set_title(title, loc='left', fontsize=TEXT_PT + 1.0, color=INK)
@@ -150,45 +154,63 @@ class PartPicture:
         film_um: np.ndarray,
         ends_um: list[float],
         colours: list[str],
-        shown: np.ndarray | None = None,
+        within: np.ndarray | None = None,
     ) -> None:
         """The part with a colour for each band of the film, (V,) at the vertices [um].
 
-        ``shown`` (n, 3) are the triangles to draw; default: all that are seen.
+        Where ``within`` (V,) is below a half it is left out; default: nowhere.
         """
-        faces = self.faces[self.seen] if shown is None else shown
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], faces)
+        triangles = self._triangles()
         least, most = min(film_um.min(), ends_um[0]), max(film_um.max(), ends_um[-1])
         levels = [least - 1.0, *ends_um, most + 1.0]
-        axes.tricontourf(triangles, film_um, levels, colors=colours)
+        bands = axes.tricontourf(triangles, film_um, levels, colors=colours)
+        if within is not None:
+            outline = axes.tricontourf(triangles, within, [0.5, 2.0], alpha=0.0)
+            bands.set_clip_path(outline.get_paths()[0], axes.transData)
         self._draw_edges(axes)
 
-    def zones(self, number: np.ndarray) -> dict[int, np.ndarray]:
-        """The triangles (n, 3) that are seen of each zone, by numbers (V,) of the vertices."""
-        seen = self.faces[self.seen]
-        of = np.sort(number[seen], axis=1)[:, 1]  # that of two corners, if two agree
-        return {int(k): seen[of == k] for k in np.unique(of)}
+    def zone_shares(self, zones: PointZones) -> dict[int, np.ndarray]:
+        """(V,) 1 in each zone and 0 outside, smoothed: its border is at a half, not by triangles.
 
-    def draw_zones(self, axes: Axes, zones: PointZones | None) -> None:
-        """The borders of the zones of the vertices, with their names and targets."""
+        Zones that are not seen are left out.
+        """
+        seen = self.faces[self.seen]
+        corners = np.bincount(seen.ravel(), minlength=len(self.flat_m))
+        shares = {}
+        for number in np.unique(zones.number[seen]).tolist():
+            share = (zones.number == number).astype(float)
+            for _ in range(SMOOTHINGS):
+                of_face = np.repeat(share[seen].mean(axis=1), 3)
+                total = np.bincount(seen.ravel(), of_face, len(self.flat_m))
+                share = np.divide(total, corners, out=share, where=corners > 0)
+            shares[number] = share
+        return shares
+
+    def draw_zones(self, axes: Axes, zones: PointZones | None, spray: SprayPath) -> None:
+        """The borders of the zones of the vertices, with names and targets clear of the passes."""
         if zones is None:
             return
-        triangles = self.zones(zones.number)
-        for number, zone in enumerate(zones.zones.zones):
-            if number not in triangles:  # it is not seen from here
+        middles = self.flat_m[self.faces[self.seen]].mean(axis=1)
+        passes = self.view.flat(spray.position_m[spray.flow > 0.0])
+        for number, share in self.zone_shares(zones).items():
+            if number < 0:
                 continue
-            faces = triangles[number]
-            edges, of_face = edges_of(faces)
-            border = edges[np.bincount(of_face.ravel(), minlength=len(edges)) == 1]
-            lines = LineCollection(list(self.flat_m[border]), colors=INK, linewidths=1.4)
-            axes.add_collection(lines, False)
-            centres = self.flat_m[faces].mean(axis=1)
-            middle = np.argmin(np.linalg.norm(centres - centres.mean(axis=0), axis=1))
-            label = axes.annotate(
-                f'{zone.name}\n{zone.target_um:g} ± {zone.tolerance_um:g} µm', centres[middle],
-                fontsize=8.5, color=INK, ha='center', va='center', zorder=5,
+            axes.tricontour(self._triangles(), share, [0.5], colors=INK, linewidths=1.4)
+            own = share[self.faces[self.seen]].mean(axis=1) > 0.5
+            if not own.any():
+                continue
+            obstacles = np.concatenate([passes, middles[~own], self.edges_m.mean(axis=1)])
+            away, _ = cKDTree(obstacles / LABEL_SHAPE).query(middles[own] / LABEL_SHAPE)
+            zone = zones.zones.zones[number]
+            axes.annotate(
+                f'{zone.name}  {zone.target_um:g} ± {zone.tolerance_um:g} µm',
+                middles[own][np.argmax(away)], fontsize=8.5, color=INK, ha='center', va='center',
+                zorder=5, path_effects=PALE_HALO,
             )  # fmt: skip
-            label.set_path_effects(PALE_HALO)
+
+    def _triangles(self) -> Triangulation:
+        """The triangles that are seen."""
+        return Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
 
     def draw_contours(self, axes: Axes, film_um: np.ndarray, low: float, high: float) -> None:
         """Lines of equal film, (V,) at the vertices, at round figures between two films [um]."""
@@ -196,8 +218,9 @@ class PartPicture:
         levels = levels[(levels > film_um.min()) & (levels < film_um.max())]
         if not len(levels) or not self.seen.any():
             return
-        triangles = Triangulation(self.flat_m[:, 0], self.flat_m[:, 1], self.faces[self.seen])
-        lines = axes.tricontour(triangles, film_um, levels, colors=INK, linewidths=0.6, alpha=0.55)
+        lines = axes.tricontour(
+            self._triangles(), film_um, levels, colors=INK, linewidths=0.6, alpha=0.55
+        )
         for label in axes.clabel(lines, fontsize=7.5, fmt='%g', inline_spacing=3):
             # Level, or labels on upright lines would read upward here and downward there.
             label.set(path_effects=PALE_HALO, rotation=0.0, transform_rotates_text=False)
@@ -236,25 +259,49 @@ def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
     )
 
 
+def label_points(
+    axes: Axes, places_m: np.ndarray, words: Sequence[str], points_per_m: float, **style: Any
+) -> None:
+    """Write words beside places (n, 2) [m], each on the side with the most room."""
+    places = points_per_m * places_m
+    taken = [*places]
+    for row, (word, place) in enumerate(zip(words, places, strict=True)):
+        others = np.array(taken[:row] + taken[row + 1 :] or [place + 1e3])
+        spots = place + AROUND_POINT
+        away = np.linalg.norm(spots[:, np.newaxis] - others, axis=2).min(axis=1)
+        spot = spots[int(np.argmax(np.round(away)))]
+        taken.append(spot)
+        axes.annotate(
+            word, place / points_per_m, spot - place, textcoords='offset points', ha='center',
+            va='center', **style,
+        )  # fmt: skip
+
+
 def draw_tool_path(
     axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray
 ) -> None:
     """Draw passes as lines with number and arrows, the way between them dashed, within corners."""
     on = spray.flow > 0.0
     apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
-    breaks = 1 + np.flatnonzero((on[1:] != on[:-1]) | (apart_s > 1e-3))
-    number = 0
+    # Coats follow each other in one path: their clocks begin anew.
+    breaks = 1 + np.flatnonzero(
+        (on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0) | (np.abs(apart_s) > 1e-3)
+    )
+    drawn: set[int] = set()
     for rows in np.split(np.arange(len(spray)), breaks):
         line = view.flat(spray.position_m[rows])
         if not on[rows].any():
             axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
             continue
-        number += 1
+        number = int(spray.spray_pass[rows[0]]) + 1
         axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)
         room = 0.02 * (high - low).max()
         shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
-        if len(shown) > 1:
-            _draw_arrows(axes, shown, (high - low).max() / ARROWS_A_WIDTH)
+        if len(shown) < 2:
+            continue
+        _draw_arrows(axes, shown, (high - low).max() / 3.0)
+        if number not in drawn:
+            drawn.add(number)
             axes.annotate(
                 str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
                 bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},

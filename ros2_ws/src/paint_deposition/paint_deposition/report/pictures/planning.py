@@ -9,28 +9,30 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
-from paint_deposition.planning.improvement.improvement import FilmSummary, Improvement
-from paint_deposition.planning.improvement.programme import Opening, Programme, speed_along
+from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
 from paint_deposition.planning.part_place import PartPlaces
+from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import (
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
+from paint_deposition.report.style import (
+    ACCENT,
+    BEFORE,
+    INK,
     MM,
+    MUTED,
     colour_bar,
     legend,
     new_figure,
     quiet,
     save_picture,
 )
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MUTED
 
 PERCENT = 100.0
 POINTS = 600
 CHOSEN = '#c0392b'
-# The colours span this share of both films about the target, to the next 5 %.
-SHOWN, STEP = 0.98, 0.05
-MOST_CHARTS, SAMPLES = 12, 120
+# The colours span the films but for this share at either end.
+SHOWN = 0.99
 FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
 
 
@@ -108,9 +110,9 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
     low, high = _window(part, result)
-    openings = result.retiming.programme.openings[:MOST_CHARTS]
-    columns = min(len(openings), 4)
-    rows = math.ceil(len(openings) / columns)
+    passes = result.changes[:12]
+    columns = min(len(passes), 4)
+    rows = math.ceil(len(passes) / columns)
     width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
     above, below = height + AROUND_IN[1], rows * CHART_IN[1]
     figure = new_figure(max(2.0 * width + AROUND_IN[0], 10.0), above + below)
@@ -121,7 +123,7 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     for name, (one, driven, laid) in zip(('before', 'after'), films, strict=True):
         part.dress(one, low, high)
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
-        part.draw_zones(one, result.wanted.zones)
+        part.draw_zones(one, result.wanted.zones, driven)
         draw_tool_path(one, driven, part.view, low, high)
         one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
@@ -136,11 +138,12 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         loc='outside lower right', frameon=False, fontsize=8.5, ncols=2,
     )  # fmt: skip
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
-    for chart in charts.ravel()[len(openings) :]:
+    for chart in charts.ravel()[len(passes) :]:
         chart.set_axis_off()
-    programmes = result.retiming.original, result.retiming.programme
-    for number, chart in enumerate(charts.ravel()[: len(openings)]):
-        _draw_speeds(chart, number, programmes)
+    for chart, change in zip(charts.ravel(), passes, strict=False):
+        _draw_speeds(chart, change, result)
+    for chart in charts[:, 0]:
+        chart.set_ylabel('speed [m/s]', color=MUTED, fontsize=9.0)
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
     legend(charts[0, 0], loc='best')
     return save_picture(figure, path)
@@ -163,70 +166,71 @@ def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndar
 
 
 def _scale(result: Improvement) -> ColourScale:
-    target = result.target_um
-    off = [
-        np.abs(one.film_um[result.target_region] / target - 1.0)
-        for one in (result.before, result.after)
-    ]
-    reach = float(np.quantile(np.concatenate(off), SHOWN))
-    reach = min(max(math.ceil(reach / STEP) * STEP, 2.0 * STEP), 0.95)
-    film = np.concatenate([result.before.film_um, result.after.film_um])
-    return film_scale(film, target * (1.0 - reach), target * (1.0 + reach))
+    """Colours for all but the most extreme film of both, between round figures."""
+    films = np.concatenate(
+        [one.film_um[result.target_region] for one in (result.before, result.after)]
+    )
+    least, most = np.quantile(films, [1.0 - SHOWN, SHOWN])
+    step = 10.0 ** math.floor(math.log10(max(most - least, 0.01 * most)))
+    low, high = step * math.floor(least / step), step * math.ceil(most / step)
+    return film_scale(films, low, high)
 
 
 def _title(name: str, laid: FilmSummary) -> str:
+    s = laid.statistics
     return (
         f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-        f'{laid.min_um:.1f} to {laid.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
         f'{laid.cycle_s:.1f} s'
     )
 
 
-def _draw_speeds(axes: Axes, number: int, programmes: tuple[Programme, Programme]) -> None:
-    """The speeds along an opening of the gun, over the path from where it first opened."""
-    openings: list[Opening] = [programme.openings[number] for programme in programmes]
-    origin = openings[0].on_m
-    for programme, opening, colour, name in zip(
-        programmes, openings, (BEFORE, ACCENT), ('before', 'after'), strict=True
+def _draw_speeds(axes: Axes, change: PassChange, result: Improvement) -> None:
+    """The speeds along a pass, before and after."""
+    begin, end = change.place_m
+    places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
+    middle = 0.5 * (places[1:] + places[:-1]) - begin
+    programmes = result.retiming.original, result.retiming.programme
+    for programme, colour, name in zip(
+        programmes, (BEFORE, ACCENT), ('before', 'after'), strict=True
     ):
-        places = np.linspace(opening.on_m, opening.off_m, SAMPLES + 1)
-        middle = 0.5 * (places[1:] + places[:-1]) - origin
         axes.plot(middle, speed_along(programme, places), color=colour, linewidth=1.6, label=name)
-    quiet(axes, 'along the pass [m]', 'speed [m/s]' if number % 4 == 0 else '',
-          f'pass {number + 1}', size=9.0)  # fmt: skip
+    quiet(axes, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
 
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:
     """Draw the share of the planned speed at each place, or how much of the motion is reached."""
-    figure = new_figure(7.6, 5.2)
-    axes = figure.subplots()
-    quiet(
-        axes,
-        "x of the part in the robot's base [m]",
-        'y [m]',
-        'Circle: the place to choose. Figures: how much of the motion is reached',
-    )
-    axes.grid(False)
     step = max(np.ptp(places.x_m) / max(len(places.x_m) - 1, 1), 1e-3)
     edges = [np.append(at, at[-1] + step) - 0.5 * step for at in (places.x_m, places.y_m)]
+    low, high = (np.array([one[end] for one in edges]) for end in (0, -1))
+    width, height = (high - low) * min(5.2 / (high - low))
+    figure = new_figure(width + 2.4, height + 1.4)
+    axes = figure.subplots()
+    quiet(axes, "x of the part in the robot's base [m]", 'y [m]')
+    figure.suptitle(
+        'Circle: the place to choose. Figures: how much of the motion is reached.\n'
+        'The robot stands at x = 0, y = 0.',
+        x=0.02, ha='left', fontsize=9, color=INK,
+    )  # fmt: skip
+    axes.grid(False)
     whole = places.reached == 1.0
     shown = np.where(whole, places.speed, np.nan)
     drawn = axes.pcolormesh(*edges, 100.0 * shown, cmap='viridis', vmin=0.0, vmax=100.0)
-    bar = figure.colorbar(drawn, ax=axes, shrink=0.8)
+    bar = figure.colorbar(drawn, ax=axes)
     bar.set_label('planned speed that the joints allow [%]', color=MUTED)
     bar.ax.spines['outline'].set_visible(False)
-    for row, column in np.ndindex(whole.shape):
+    for row, column in np.argwhere(~whole):
+        words = f'{100.0 * places.reached[row, column]:.0f} %'
         at = places.x_m[column], places.y_m[row]
-        if not whole[row, column]:
-            words = f'{100.0 * places.reached[row, column]:.0f} %'
-            axes.annotate(words, at, ha='center', va='center', fontsize=8, color=MUTED)
+        axes.annotate(words, at, ha='center', va='center', fontsize=8, color=MUTED)
     if whole.any():
         row, column = places.best
         axes.plot(places.x_m[column], places.y_m[row], 'o', markersize=9, markerfacecolor='white',
                   markeredgecolor=INK, markeredgewidth=1.6)  # fmt: skip
-    axes.plot(0.0, 0.0, '^', color=ACCENT, markersize=12, clip_on=False)
-    axes.annotate('robot', (0.0, 0.0), (6, 6), textcoords='offset points', color=ACCENT)
-    axes.set_xlim(min(edges[0][0], -0.1), edges[0][-1])
-    axes.set_ylim(min(edges[1][0], -0.1), max(edges[1][-1], 0.1))
+    if (low <= 0.0).all() and (high >= 0.0).all():
+        axes.plot(0.0, 0.0, '^', color=ACCENT, markersize=12)
+        axes.annotate('robot', (0.0, 0.0), (6, 6), textcoords='offset points', color=ACCENT)
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
     axes.set_aspect('equal')
     return save_picture(figure, path)

@@ -16,10 +16,10 @@ from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.report import write_report
-from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.comparison import comparison_figure
 from paint_deposition.report.pictures.inference import write_calibration_pictures
-from paint_deposition.report.writers.fitted_model import write_fitted
+from paint_deposition.report.style import save_picture
+from paint_deposition.report.writers.models import write_fitted
 from paint_deposition.report.writers.write import written
 
 

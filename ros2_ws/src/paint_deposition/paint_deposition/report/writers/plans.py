@@ -1,5 +1,7 @@
-"""How plans, improved programmes, recommendations and chosen points are written."""
+"""Plans, improved programmes, recommendations, places and chosen points on disk."""
 
+import shutil
+import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -9,20 +11,28 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.json_files import write_json
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, PLAN_FILE
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
 from paint_deposition.files.provenance import model_digest, origin
+from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.recordings.bag_files import TRIGGER
+from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
+from paint_deposition.files.tool_path import write_tool_path
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
-from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.part_frame import Rigid, moved
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.planning.improvement.improvement import Improvement
+from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.chart import save_picture
 from paint_deposition.report.pictures.film import film_picture
 from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
@@ -31,16 +41,125 @@ from paint_deposition.report.pictures.planning import (
     write_places,
     write_uniformity,
 )
-from paint_deposition.report.writers.film import write_film
-from paint_deposition.report.writers.passes import Passes, write_passes
-from paint_deposition.report.writers.write import input_files, with_provenance, written
+from paint_deposition.report.style import save_picture
+from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
 
-# What a robot's own frame is called where nobody says (REP-105 and most URDFs).
-ROBOT_FRAME = 'base_link'
+BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
+TOOL_PATH = 'passes.yaml'
 COLUMNS = (
+    'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
+    'brush',
+)  # fmt: skip
+POINT_COLUMNS = (
     'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
     'expected_um', 'speaks_for',
 )  # fmt: skip
+
+
+def write_passes(
+    folder: Path,
+    result: Plan | PartPlan | Improvement,
+    part: tuple[str, Rigid] | None = None,
+    paint_moves: bool = False,
+) -> list[str]:
+    """Write bag, ``passes.csv``, ``passes.mod`` and ``model.yaml`` to a folder; their names.
+
+    Args:
+        folder: where to; made if it is not there.
+        result: the motion in the part's frame, timed and as moves of a robot program.
+        part: the robot's frame and the pose of the part in it; bag and table have their poses in
+            that frame then, and the program defines its work object so. None: the part's frame.
+        paint_moves: whether the program sprays by PaintL and SetBrush.
+
+    Raises:
+        PaintError: the folder holds another folder of the bag's name.
+        OSError: it cannot be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    digest, moves = model_digest(result.model), _in_frame(result.moves, part)
+    _write_bag(folder / BAG, result, part, digest)
+    write_table(folder / TABLE, _table(moves))
+    made = 'Improved' if isinstance(result, Improvement) else 'Planned'
+    head = [f'{made} with the model in {MODEL_FILE}, sha256 {digest}']
+    head += [f'WARNING: {contact}' for contact in result.contacts]
+    module = module_text(result.moves, head, part[1] if part else None, paint_moves)
+    write_text(folder / PROGRAM, module)
+    write_tool_path(folder / TOOL_PATH, moves)
+    write_model(folder / MODEL_FILE, result.model)
+    if not result.drive:
+        return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE]
+    arm = result.drive.arm
+    units = np.where(arm.slides, 'm', 'rad')
+    names = [f'{name}_{unit}' for name, unit in zip(arm.joints, units, strict=True)]
+    rows = [
+        [f'{time_s:.4f}', *(f'{value:.7f}' for value in values)]
+        for time_s, values in zip(result.drive.seconds, result.drive.joints, strict=True)
+    ]
+    write_table(folder / JOINTS, [['time_s', *names], *rows])
+    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, JOINTS]
+
+
+def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
+    if part is None:
+        return moves
+    poses = [part[1].applied(move.position_m, move.quaternion_xyzw) for move in moves]
+    return [
+        replace(move, position_m=position, quaternion_xyzw=quaternion)
+        for move, (position, quaternion) in zip(moves, poses, strict=True)
+    ]
+
+
+def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
+    """A line a move of the TCP: where it ends, how fast, and what the gun does."""
+    yield COLUMNS
+    for number, move in zip(pass_numbers(moves), moves, strict=True):
+        yield [
+            number,
+            *(f'{value:.6f}' for value in move.position_m),
+            *(f'{value:.8f}' for value in move.quaternion_xyzw),
+            f'{move.speed_m_per_s:.6g}',
+            int(move.spraying),
+            f'{move.flow:.6g}' if move.spraying else 0,
+            move.brush,
+        ]
+
+
+def pass_numbers(moves: Sequence[Move]) -> list[int]:
+    """Number of the pass on which each move (M,) ends, from 1, as a simulation counts them."""
+    path, _ = spray_path(timed(moves, gun_known=True))
+    steps_m = np.linalg.norm(np.diff([move.position_m for move in moves], axis=0), axis=1)
+    middle_m = np.cumsum(steps_m) - 0.5 * steps_m
+    row = np.searchsorted(np.cumsum(path.dwell_s * path.speed_m_per_s), middle_m)
+    number = path.spray_pass[np.minimum(row, len(path) - 1)]
+    return [1, *np.maximum(number + 1, 1).tolist()]
+
+
+def _write_bag(
+    target: Path,
+    result: Plan | PartPlan | Improvement,
+    part: tuple[str, Rigid] | None,
+    digest: str,
+) -> None:
+    if target.exists():
+        strangers = [
+            path for path in target.rglob('*')
+            if path.suffix not in ('.mcap', '.yaml') or path.is_dir()
+        ]  # fmt: skip
+        if not target.is_dir() or strangers:
+            raise PaintError(f'{target} is there and no planned bag; move it away')
+    trajectory = result.trajectory
+    placed = moved(trajectory, part[1], part[0]) if part else trajectory
+    # A bag's files are named for their folder, so the folder is made under its own name.
+    with tempfile.TemporaryDirectory(dir=target.parent, prefix='.plan-') as aside:
+        fresh = write_pose_bag(
+            Path(aside) / target.name, placed,
+            custom_data={DIGEST: digest, TRIGGER: STATE_TOPIC},
+            part=(trajectory.frame_id, part[1]) if part else None, drive=result.drive,
+        )  # fmt: skip
+        if target.exists():
+            shutil.rmtree(target)
+        fresh.rename(target)
+    write_model(target / MODEL_FILE, result.model)
 
 
 @written.register
@@ -66,29 +185,27 @@ def _passes(
     folder: Path,
     made_from: Mapping[str, Any] | None = None,
     part_pose: Sequence[float] | None = None,
-    frame_id: str = ROBOT_FRAME,
+    frame_id: str = 'base_link',  # as most URDFs have it (REP-105)
     paint_moves: bool = False,
     pictures: str = 'png',
 ) -> list[Path]:
-    surface, improved = result.surface, isinstance(result, Improvement)
-    made, name = ('Improved', IMPROVEMENT_FILE) if improved else ('Planned', PLAN_FILE)
+    surface = result.surface
+    name = IMPROVEMENT_FILE if isinstance(result, Improvement) else PLAN_FILE
     part = None if part_pose is None else (frame_id, Rigid.of(part_pose))
-    passes = Passes(
-        result.trajectory, result.moves, result.model, made, part, result.drive, paint_moves,
-    )  # fmt: skip
-    files = [folder / one for one in (name, *write_passes(folder, passes))]
+    files = [folder / one for one in (name, *write_passes(folder, result, part, paint_moves))]
     given = result.original.notes if isinstance(result, Improvement) else ()
     part_facts = {'down': surface.down, 'notes': (*surface.notes, *given)}
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
     zones = result.wanted.zones
     files += write_film(
-        folder, surface, result.film_um, result.statistics, zones=zones, overwrite=True
-    )
+        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True,
+        details={'region': 'the painted area of the whole part'},
+    )  # fmt: skip
     if isinstance(result, Improvement):
         return [*files, write_improvement_picture(folder / f'improvement.{pictures}', result)]
     film = film_picture(
-        surface, result.film_um, result.path, result.statistics, 'Planned passes and their film',
+        surface, result.film_um, result.path, result.whole_part, 'Planned passes and their film',
         result.sentence, zones,
     )  # fmt: skip
     if isinstance(result, PartPlan):
@@ -156,7 +273,7 @@ def _gauge_quaternions(chosen: ChosenReadings) -> np.ndarray:
 
 def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
     """A line a reading: all points once, then those that are read twice."""
-    yield COLUMNS
+    yield POINT_COLUMNS
     face_mm = 1e3 * chosen.from_edges_m
     for k in [*range(len(chosen)), *chosen.read_twice]:
         place = (*chosen.positions_m[k], *chosen.normals[k])

@@ -1,4 +1,4 @@
-"""One function that writes every result, and what the writers share."""
+"""One function that writes every result, what the writers share, and films on disk."""
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -7,13 +7,26 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.atomic import replacing
+from paint_deposition.files.gauge_readings import table_text, write_predictions
+from paint_deposition.files.json_files import write_json
+from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.provenance import origin
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.film import Film
+from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 
 Models = DepositionModel | Mapping[str, DepositionModel] | None
 # Modules beside this one that register writers; those that import least come first.
-WRITERS = ('film', 'plans', 'inference')
+WRITERS = ('plans', 'inference')
+# Of a table, as one text: formatted together they take half the time.
+ROWS_AT_ONCE = 10_000
 
 
 @singledispatch
@@ -68,7 +81,7 @@ def writable(folder: Path) -> Iterator[None]:
 
 
 def input_files(made_from: Mapping[str, Any]) -> dict[str, str]:
-    """Of what a command says of its inputs, those that are files."""
+    """Files among what a command says of its inputs, by what they are."""
     keys = ('mesh_file', 'mesh', 'trajectory', 'model_file', 'model', 'zones_file')
     named = {key.removesuffix('_file'): str(made_from[key]) for key in keys if made_from.get(key)}
     return {what: file for what, file in named.items() if Path(file).exists()}
@@ -80,3 +93,105 @@ def with_provenance(
     """The entries with the provenance of their result: the model and the input files."""
     files = input_files(made_from) | dict(more_files or {})
     return {**made_from, 'provenance': origin(model, files)}
+
+
+@written.register
+def _write_simulation(
+    result: Film, folder: Path, made_from: Mapping[str, Any] | None = None, pictures: str = 'png'
+) -> list[Path]:
+    from paint_deposition.report.pictures.film import film_picture
+    from paint_deposition.report.style import save_picture
+
+    models = {gun.name or 'model': gun.model for gun in result.guns}
+    motions = {f'{gun.name}: trajectory': gun.trajectory.source for gun in result.guns if gun.name}
+    found = {what: file for what, file in motions.items() if Path(file).exists()}
+    about = with_provenance(result.to_dict() | dict(made_from or {}), models, found)
+    files = write_film(
+        folder, result.surface, result.film_um, result.statistics, zones=result.zones,
+        coats_um={coat.name: coat.film_um for coat in result.coats}, details=about,
+        overwrite=True,
+    )  # fmt: skip
+    if result.readings is not None and result.predicted_um is not None:
+        files.append(folder / 'predicted.csv')
+        write_predictions(files[-1], result.readings, result.predicted_um)
+    mesh, motion, model = (
+        Path(about.get(key, '')).name for key in ('mesh_file', 'trajectory', 'model_file')
+    )
+    picture = film_picture(
+        result.surface, result.film_um, result.path, result.statistics,
+        f'Film on {mesh or "the part"}', f'{motion}, {model or "default model"}', result.zones,
+    )  # fmt: skip
+    return [*files, save_picture(picture, folder / f'film.{pictures}')]
+
+
+def write_film(
+    folder: str | Path,
+    surface: Surface,
+    film_um: np.ndarray,
+    statistics: FilmStatistics,
+    *,
+    coats_um: Mapping[str, np.ndarray] | None = None,
+    zones: PointZones | None = None,
+    stem: str = 'film',
+    statistics_file: str = 'stats.json',
+    details: Mapping[str, Any] | None = None,
+    color_range_um: tuple[float, float] = (0.0, 0.0),
+    overwrite: bool = False,
+) -> list[Path]:
+    """Write ``<stem>.ply``, ``<stem>.csv`` and the statistics, each file whole or not at all.
+
+    Args:
+        folder: where to; made if it is not there.
+        film_um: (V,) film at the vertices of the surface [um].
+        coats_um: (V,) what each coat adds to the film [um], by name: further columns.
+        zones: of the vertices; their names are a column of the table.
+        details: more to say in the statistics, such as counts of poses and the files used.
+        color_range_um: ends of the colour map in the PLY [um]; both 0 is automatic.
+
+    Raises:
+        PaintError: a file of that name is there, or the folder cannot be written.
+    """
+    folder = Path(folder).expanduser().absolute()
+    paths = [folder / f'{stem}.ply', folder / f'{stem}.csv', folder / statistics_file]
+    for path in paths:
+        if path.exists() and not overwrite:
+            raise PaintError(
+                f'{path} is there already; choose another name, or move the old file away'
+            )
+    with writable(folder), _all_or_none([] if overwrite else paths):
+        shown = film_um > statistics.painted_above_um
+        colours = film_scale(film_um, *color_range_um).rgba(film_um, shown)
+        films = {'thickness_um': film_um}
+        films |= {f'{name}_um': coat_um for name, coat_um in (coats_um or {}).items()}
+        write_mesh_ply(paths[0], surface, colours, **films)
+        columns = {**dict(zip(('x_m', 'y_m', 'z_m'), surface.vertices_m.T, strict=True)), **films}
+        _write_table(paths[1], columns, zones.names if zones else None)
+        write_json(paths[2], {**statistics.to_dict(), **(details or {})})
+    return paths
+
+
+@contextmanager
+def _all_or_none(paths: list[Path]) -> Iterator[None]:
+    """Remove these files if one of them cannot be written."""
+    try:
+        yield
+    except OSError:
+        for path in paths:
+            path.unlink(missing_ok=True)
+        raise
+
+
+def _write_table(path: Path, columns: Mapping[str, np.ndarray], names: np.ndarray | None) -> None:
+    """Columns (V,) of numbers by heading, and the zones' names (V,) as the last one, if any."""
+    rows = np.column_stack([*columns.values()])
+    heading, form = [*columns], ','.join(['%.9g'] * len(columns))
+    if names is not None:
+        each, of = np.unique(names, return_inverse=True)
+        fields = [name and table_text([[name]]).removesuffix('\n') for name in each]
+        rows = np.column_stack([rows.astype(object), np.array(fields)[of]])
+        heading, form = [*heading, 'zone'], f'{form},%s'
+    with replacing(path) as temporary, temporary.open('w', encoding='utf-8') as file:
+        file.write(table_text([heading]))
+        for start in range(0, len(rows), ROWS_AT_ONCE):
+            some = rows[start : start + ROWS_AT_ONCE]
+            file.write(f'{form}\n' * len(some) % tuple(some.ravel().tolist()))

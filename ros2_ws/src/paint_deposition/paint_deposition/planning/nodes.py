@@ -1,4 +1,4 @@
-"""Slowness along the openings of the gun: nodes on the path, and a programme timed by them."""
+"""Slowness along the openings of the gun: nodes, their films, a timed programme."""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,15 +7,19 @@ import numpy as np
 from scipy.interpolate import BSpline, make_interp_spline
 from scipy.sparse import csr_matrix
 
-from paint_deposition.planning.improvement.programme import STANDING_M, Opening, Programme
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.integrator import FilmIntegrator, after_film_effects
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.programme import STANDING_M, Opening, Programme
 from paint_deposition.planning.requests import Limits
 
 # Half the length over which bends of the path and its programmed speed are measured [m].
 BEND_M = 0.02
-# Where the gun is closed, a place much slower than its opening sets how fast that can be. Speeds
-# are taken over so much travel to both sides: poses of recordings jitter [m].
-MUCH_SLOWER, ABOUT_AS_SLOW = 0.8, 1.05
 STEADY_M = 0.01
+ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
 @dataclass(frozen=True)
@@ -106,19 +110,10 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
     return replace(whole, duration_s=duration).without_standstill()
 
 
-@dataclass(frozen=True)
-class SpeedBounds:
-    """(n,) greatest speed at each node [m/s], and (n,) which limit sets it."""
-
-    greatest_m_per_s: np.ndarray
-    limit: np.ndarray
-
-
-ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
-
-
-def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBounds:
-    """How fast the gun may go at the nodes.
+def speed_bounds(
+    programme: Programme, nodes: Nodes, limits: Limits
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) how fast the gun may go at the nodes [m/s], and (n,) which limit sets that.
 
     In a bend no faster than the acceleration allows, unless it was programmed so; where it opens
     and closes, no faster than can be reached from its way there and slowed down on its way on.
@@ -145,7 +140,7 @@ def speed_bounds(programme: Programme, nodes: Nodes, limits: Limits) -> SpeedBou
             fastest = _fastest_m_per_s(programme, end, far, limits)
             if fastest < greatest[node]:
                 greatest[node], limit[node] = fastest, LEAD
-    return SpeedBounds(greatest, limit)
+    return greatest, limit
 
 
 def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: Limits) -> float:
@@ -158,9 +153,69 @@ def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: L
     high = np.minimum(places + STEADY_M, programme.travel_m[-1])
     seconds = programme.seconds_at(high) - programme.seconds_at(low)
     speed = (high - low) / np.maximum(seconds, 1e-9)
-    if speed.min() > MUCH_SLOWER * speed[0]:
+    # A place much slower than the opening of the gun sets how fast that can be.
+    if speed.min() > 0.8 * speed[0]:
         return math.inf
     # What the programme does there itself is possible, whatever acceleration is said to be.
-    slow = np.abs(places - end_m)[speed <= ABOUT_AS_SLOW * speed.min()].min()
+    slow = np.abs(places - end_m)[speed <= 1.05 * speed.min()].min()
     reach = 2.0 * limits.acceleration_m_per_s2 * float(slow)
     return max(math.sqrt(float(speed.min()) ** 2 + reach), float(speed[0]))
+
+
+class FilmAtPoints:
+    """Films at vertices of a part, with the model's effects, the film's own included.
+
+    They are divided by ``share`` (V,), the target of each vertex over the mean target.
+    """
+
+    def __init__(
+        self, surface: Surface, rows: np.ndarray, model: DepositionModel, share: np.ndarray
+    ) -> None:
+        self.model, self._share = model, share
+        self._surface, self._rows = surface, rows
+        points = surface.points().select(rows)
+        self._integrator = FilmIntegrator(points, model, occluder=surface.occluder)
+        narrow = min(min(p.sigma1_m, p.sigma2_m) for p in model.patterns)
+        self.step_m = max(model.max_step_m, narrow / 6.0)
+        self._settles = [e for e in model.effects if type(e).on_film is not Effect.on_film]
+
+    def film_um(self, programme: Programme) -> np.ndarray:
+        """(V,) film of a programme at the points [um]."""
+        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
+        self._integrator.reset()
+        self._integrator.add(path)
+        return self._integrator.raw_um * self._finished_over_arrived(path) / self._share
+
+    def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
+        """(n, V) films for a density of paint of 1 s/m at each node [um].
+
+        Density is slowness times flow. The film is linear in it, but for effects that depend on
+        the speed or on the time since the gun opened: they are taken as they are in this
+        programme, which was timed at a density of paint (n,) [s/m].
+        """
+        path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
+        travel = programme.travel_at_m(path.stamp_ns)
+        # The opening that each sub-step belongs to: the last that has begun.
+        begun = np.searchsorted(programme.ends_m[:, 0], travel, side='right')
+        sprayed, rows = self._integrator.sprayed(path)
+        hats = nodes.hats(travel[rows], np.maximum(begun - 1, 0)[rows])
+        shares = hats.multiply(1.0 / (hats @ density)[:, np.newaxis]).tocsc()
+        films = np.empty((len(nodes), len(self._rows)))
+        for node in range(len(nodes)):
+            column = slice(shares.indptr[node], shares.indptr[node + 1])
+            part = sprayed.select(shares.indices[column])
+            self._integrator.reset()
+            self._integrator.add_sprayed(part.with_(dwell_s=part.dwell_s * shares.data[column]))
+            films[node] = self._integrator.raw_um
+        return films * self._finished_over_arrived(path) / self._share
+
+    def _finished_over_arrived(self, path: SprayPath) -> np.ndarray | float:
+        """(V,) finished film over the film that arrived, from effects on the finished film."""
+        if not self._settles:
+            return 1.0
+        everywhere = self._surface.points()
+        whole = FilmIntegrator(everywhere, self.model, occluder=self._surface.occluder)
+        whole.add(path)
+        raw = whole.raw_um
+        settled = after_film_effects(raw, self._settles, everywhere)
+        return np.divide(settled, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

@@ -1,13 +1,24 @@
-"""A model fitted to readings as a model file: what it started from stays on record."""
+"""Fitted models as model files, and learned laws as effect files."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_file import ModelFile, write_model
+from paint_deposition.files.templates import filled
+from paint_deposition.inference.diagnosis.closed_forms import (
+    ClosedForm,
+    Parameter,
+    at_knots,
+    variable,
+)
 from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -16,12 +27,27 @@ from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 
-# So many leave the film as it was fitted within 1e-6 of its peak; the uncertainty is far larger.
-DIGITS = 8
-# The numbers of a learned law.
-LEARNED = ('learned', 'sd')
 # What a step of the history added, where it was no effect.
 PATTERN, REFIT = 'pattern', 'refit'
+# What a law is over, in the words of an effect's code, and the family of such effects.
+VARIABLES = {
+    'incidence_deg': ('ray.cos_incidence', 'incidence'),
+    'standoff_ratio': ('ray.standoff_ratio', 'standoff'),
+    'time_s': ('path.time_s', 'time'),
+    'spray_pass': ('np.where(np.isnan(path.time_s), np.nan, path.passes_before + 1.0)', 'order'),
+    'stroke_end_m': ('np.minimum(path.from_turn_m, path.to_turn_m)', 'boundary'),
+    'since_trigger_s': ('path.since_on_s', 'boundary'),
+    'speed_m_per_s': ('path.speed_m_per_s', 'time'),
+    'curvature_per_m': ('points.curvature_per_m', 'curvature'),
+    'edge_distance_m': ('points.edge_distance_m', 'boundary'),
+    'sky_view_factor': ('points.sky_view_factor', 'visibility'),
+    'height_fraction': ('points.height_fraction', 'order'),
+    'across_m': ('places_m(points)[:, 0]', 'lateral shift'),
+    'film_um': ('film_um', 'level'),
+}
+# An amplitude may become so many times as far from neutral, a shape so many times as long.
+ROOM = 10.0
+TEMPLATE = Path(__file__).parent / 'templates' / 'effect.py.j2'
 
 
 def write_fitted(
@@ -102,7 +128,10 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
     )
     for effect in model.effects:
         if isinstance(effect, LearnedLaw) and effect not in given:
-            values = {n: _short(v) for n, v in effect if isinstance(v, float) or n in LEARNED}
+            # The numbers of a learned law.
+            values = {
+                n: _short(v) for n, v in effect if isinstance(v, float) or n in ('learned', 'sd')
+            }
         else:
             values = {
                 name: min(max(_short(getattr(effect, name)), info['low']), info['high'])
@@ -114,9 +143,10 @@ def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
 
 
 def _short(value: Any) -> Any:
-    """The same with few digits in all its numbers."""
+    """A value, list or mapping with few digits in all its numbers."""
     if isinstance(value, float):
-        return float(f'{value:.{DIGITS}g}')
+        # Eight digits leave the film within 1e-6 of its peak; the uncertainty is far larger.
+        return float(f'{value:.8g}')
     if isinstance(value, dict):
         return {name: _short(one) for name, one in value.items()}
     return type(value)(map(_short, value))
@@ -131,3 +161,47 @@ def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
             section = 'planar'
         sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     return sections
+
+
+def effect_entry(form: ClosedForm, file: str | Path) -> str:
+    """What stands in a model file for the effect of a form: its file and its values."""
+    return f'file: {file}, ' + ', '.join(f'{n}: {p.value:.6g}' for n, p in form.parameters.items())
+
+
+def write_effect_file(path: Path, law: LearnedCurve, form: ClosedForm) -> Path:
+    """Write a form of a learned law as an effect; absent at its defaults.
+
+    Args:
+        path: the file, named for the effect.
+        law: what was learned.
+        form: one of those that fit it.
+    """
+    value, family = VARIABLES[law.covariate]
+    effect_id = re.sub(r'\W+', '_', path.stem.lower()).strip('_') or 'learned'
+    if effect_id in EFFECTS or not effect_id[0].isalpha():
+        effect_id = f'learned_{effect_id}'
+    acts_on = 'path' if type(law).on_path is not LearnedCurve.on_path else 'film'
+    (name, unit), knots = variable(type(law)), at_knots(law)
+    text = filled(
+        TEMPLATE, law=law, form=form, id=effect_id, family=family, value=value, file=path.name,
+        entry=effect_entry(form, path.name).partition(', ')[2],
+        acts_on='ray' if law.flux_factor is not None else acts_on,
+        functions=', '.join(one for one in ('exp', 'log') if f'{one}(' in form.code),
+        variable=name if unit == '1' else f'{name} [{unit}]', lowest=LEAST_FACTOR,
+        low=f'{float(knots.min()):.6}', high=f'{float(knots.max()):.6}', bounds=_bounds,
+        literal=repr,
+    )  # fmt: skip
+    write_text(path, text)
+    return path
+
+
+def _bounds(found: Parameter) -> str:
+    """Default and bounds of a parameter of the effect, wide about what was learned."""
+    value, neutral = float(f'{found.value:.6g}'), float(f'{found.neutral:.6g}')
+    if found.role == 'shape':
+        role, low, high = "role='shape'", value / ROOM, value * ROOM
+    else:
+        away = ROOM * max(abs(value - neutral), 0.1 if neutral else 1e-3)
+        role, low, high = f'typical={value}', neutral - away, neutral + away
+        low = max(low, 0.0) if found.role == 'level' else low
+    return f'{neutral}, low={low:.4g}, high={high:.4g}, {role}'

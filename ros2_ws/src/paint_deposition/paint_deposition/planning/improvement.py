@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -15,47 +14,42 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
-from paint_deposition.planning.films import evenness
-from paint_deposition.planning.improvement.nodes import BEND, JOINT, LEAD, ROBOT
-from paint_deposition.planning.improvement.programme import Programme, speed_along
-from paint_deposition.planning.improvement.quadratic_program import LIMIT_NAMES
-from paint_deposition.planning.improvement.retiming import Retiming
+from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
+from paint_deposition.planning.planned_film import WantedFilm, evenness
+from paint_deposition.planning.programme import (
+    STANDING_M,
+    Programme,
+    Strokes,
+    speed_along,
+)
+from paint_deposition.planning.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import WantedFilm
+from paint_deposition.planning.retiming import Retiming
 
 DEFAULT_TOLERANCE = 0.1
 # The films of bag and robot program should agree to this share of the peak.
 ALIKE = 2e-3
-# A mean film further from the target than this share gives a warning.
-OFF_TARGET = 0.02
-# Samples of the new speed along a pass.
-SAMPLES = 60
-# Smaller shifts of a trigger are left out of the sentence [m].
-LEAST_SHIFT_M = 0.002
-LEAST_PASS_M = 0.05
 # Of an improvement, by their names in improvement.json.
 FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 'sentence')
 
 
 @dataclass(frozen=True)
 class FilmSummary:
-    """A film where one is wanted, and the paint and time spent on it."""
+    """A film, its evenness where one is wanted, and the paint and time spent on it."""
 
     film_um: np.ndarray  # (V,) at the vertices of the surface
-    # Mean, and standard deviation over mean of the film over its own target, weighted by area.
+    statistics: FilmStatistics  # of the film where one is wanted, with those of its zones
+    whole_part: FilmStatistics  # of the film on the whole part
+    # Where a film is wanted, by area, bare metal included: its mean, standard deviation over mean
+    # of the film over its own target, and share of the area within the tolerance of the target.
     mean_um: float
     sigma_n: float
-    # Least and greatest.
-    min_um: float
-    max_um: float
-    within: float  # share of the area within the tolerance of the target
-    paint_cm3: float  # sprayed, as solids that a part which catches everything would get
-    on_part_cm3: float  # of it on the whole part
+    within: float
     # Time with the gun open, and from the first pose to the last.
     spraying_s: float
     cycle_s: float
-    statistics: FilmStatistics  # of the film there, with those of its zones
 
     @staticmethod
     def of(
@@ -73,29 +67,42 @@ class FilmSummary:
         path, _ = spray_path(trajectory)
         low, high = (limit[region] for limit in wanted.limits_um(target_um, tolerance))
         good = (film >= low) & (film <= high)
-        mean_um, _ = evenness(film, area)
-        _, sigma_n = evenness(film / wanted.share[region], area)
+        zones = wanted.zones
+        elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
         return FilmSummary(
-            film_um, mean_um, sigma_n, float(film.min()), float(film.max()),
-            float((area / area.sum())[good].sum()), emitted_cm3,
-            float(surface.vertex_areas_m2 @ film_um),
-            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
+            film_um,
+            film_statistics(film, area, emitted_cm3, zones=zones and zones.select(region)),
             film_statistics(
-                film, area, emitted_cm3, zones=wanted.zones and wanted.zones.select(region)
+                film_um, surface.vertex_areas_m2, emitted_cm3, target_um=elsewhere_um,
+                target_tolerance_um=tolerance * elsewhere_um, zones=zones,
             ),
+            evenness(film, area)[0],
+            evenness(film / wanted.share[region], area)[1],
+            float(area[good].sum() / area.sum()),
+            float(path.dwell_s[path.flow > 0.0].sum()), trajectory.duration_s,
         )  # fmt: skip
 
+    @property
+    def paint_cm3(self) -> float:
+        """Paint sprayed, as solids that a part which catches everything would get [cm3]."""
+        return self.statistics.emitted_volume_cm3
+
     def figures(self) -> dict[str, float]:
-        """All but the film itself by name."""
-        apart = ('film_um', 'statistics')
-        return {name: value for name, value in vars(self).items() if name not in apart}
+        """Figures by name: film where one is wanted, paint and time."""
+        names = ('mean_um', 'sigma_n', 'within', 'spraying_s', 'cycle_s', 'paint_cm3')
+        return {name: getattr(self, name) for name in names} | {
+            'min_um': self.statistics.min_um,
+            'max_um': self.statistics.max_um,
+            'on_part_cm3': self.whole_part.painted_volume_cm3,
+        }
 
 
 @dataclass(frozen=True)
 class PassChange:
     """What changes in a pass, in the robot's terms."""
 
-    number: int  # of the pass, from 1
+    number: int  # of the pass, from 1, as a simulation counts
+    place_m: tuple[float, float]  # travel of the TCP at its begin and at its end
     speed_m_per_s: tuple[float, float]  # mean speeds before and after
     # After.
     slowest_m_per_s: float
@@ -114,20 +121,21 @@ class PassChange:
         """The change in a line."""
         before, after = self.speed_m_per_s
         parts = [
-            f'{before:.3f} to {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
+            f'{before:.3f} → {after:.3f} m/s on average, now {self.slowest_m_per_s:.3f} to '
             f'{self.fastest_m_per_s:.3f} m/s'
         ]
         for verb, metres, seconds, sides in (
             ('opens', self.opens_earlier_m, self.opens_earlier_s, ('earlier', 'later')),
             ('closes', self.closes_later_m, self.closes_later_s, ('later', 'earlier')),
         ):
-            if abs(metres) >= LEAST_SHIFT_M:
+            # Smaller shifts of a trigger are left out of the sentence [m].
+            if abs(metres) >= 0.002:
                 side = sides[metres < 0.0]
                 parts.append(
                     f'{verb} {1e3 * abs(seconds):.0f} ms {side} ({1e3 * abs(metres):.0f} mm)'
                 )
         if abs(self.flow[1] - self.flow[0]) > 5e-4:
-            parts.append(f'flow {self.flow[0]:.3f} to {self.flow[1]:.3f}')
+            parts.append(f'flow {self.flow[0]:.3f} → {self.flow[1]:.3f}')
         return f'pass {self.number}: ' + '; '.join(parts)
 
     def to_dict(self) -> dict[str, Any]:
@@ -165,6 +173,20 @@ class Improvement:
     program_difference: float
     geometry_warnings: tuple[str, ...] = ()
     drive: Drive | None = None
+    contacts: tuple[Contact, ...] = ()  # the path is the user's, and not looked at
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks for the user on what was done unasked."""
+        sprayed, closed = (
+            Programme.of(self.original).openings, self.retiming.original.openings
+        )  # fmt: skip
+        if sprayed == closed:
+            return ()
+        return (
+            'the programme sprays through turns beside the part; the gun is closed there now '
+            '(--spray-turns keeps it open)',
+        )
 
     @property
     def target_region(self) -> np.ndarray:
@@ -186,15 +208,10 @@ class Improvement:
         """(V,) of the improved programme [um]."""
         return self.after.film_um
 
-    @cached_property
-    def statistics(self) -> FilmStatistics:
-        """Of that film on the whole part."""
-        zones = self.wanted.zones
-        target = (self.wanted.elsewhere_um or 0.0) if zones else self.target_um
-        return film_statistics(
-            self.film_um, self.surface.vertex_areas_m2, self.after.paint_cm3,
-            target_um=target, target_tolerance_um=self.tolerance * target, zones=zones,
-        )  # fmt: skip
+    @property
+    def whole_part(self) -> FilmStatistics:
+        """Statistics of the improved film on the whole part."""
+        return self.after.whole_part
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
@@ -212,7 +229,8 @@ class Improvement:
         found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
         off = self.after.mean_um / self.target_um - 1.0
-        if abs(off) > OFF_TARGET:
+        # A mean film further from the target than this share gives a warning.
+        if abs(off) > 0.02:
             thick = off > 0.0
             other = (
                 (LIMIT_NAMES['slowest'],)
@@ -228,8 +246,8 @@ class Improvement:
             found.append(
                 f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
                 f'bound by {" and ".join(names) or "the path"}; '
-                f'{100 * self.before.within:.0f} to {100 * self.after.within:.0f} % of the area '
-                f'lie within the tolerance; allow {remedy}'
+                f'{100 * self.before.within:.0f} → {100 * self.after.within:.0f} % of the area '
+                f'within the tolerance; allow {remedy}'
             )
         if self.program_difference > ALIKE:
             found.append(
@@ -252,9 +270,19 @@ class Improvement:
         """The improvement in a sentence."""
         a, b = self.before, self.after
         return (
-            f'sigma_n {100 * a.sigma_n:.1f} to {100 * b.sigma_n:.1f} %, within {self.band} '
-            f'{100 * a.within:.0f} to {100 * b.within:.0f} % of the area, paint '
-            f'{a.paint_cm3:.1f} to {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} to {b.cycle_s:.1f} s'
+            f'sigma_n {100 * a.sigma_n:.1f} → {100 * b.sigma_n:.1f} %, within {self.band} '
+            f'{100 * a.within:.0f} → {100 * b.within:.0f} % of the area, paint '
+            f'{a.paint_cm3:.1f} → {b.paint_cm3:.1f} cm3, {a.cycle_s:.1f} → {b.cycle_s:.1f} s'
+        )
+
+    @property
+    def region(self) -> str:
+        """Where its figures are taken, in words."""
+        area = self.surface.vertex_areas_m2
+        where = ' and a film is wanted' if self.wanted.zones else ''
+        return (
+            f'the {float(area[self.target_region].sum()):.2f} of {self.surface.area_m2:.2f} m2 '
+            f'that the programme paints{where}, by area'
         )
 
     @property
@@ -266,8 +294,8 @@ class Improvement:
     def limit_sentences(self) -> tuple[str, ...]:
         """Which limits keep the film from being more even, a line each."""
         found = [
-            f'limited by {limit.name}: sigma_n {100 * limit.sigma_n:.1f} % without it'
-            for limit in self.retiming.binding_limits
+            f'limited by {name}: sigma_n {100 * sigma_n:.1f} % without it'
+            for name, sigma_n in self.retiming.binding_limits.items()
         ]
         found.append(
             'along this path, without limits and without weights for paint, time and smoothness, '
@@ -289,7 +317,9 @@ class Improvement:
         laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}
         region = float(self.surface.vertex_areas_m2[self.target_region].sum())
         return {
+            'region': self.region,
             **both,
+            'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
             **{name: getattr(self, name) for name in FIGURES},
             'zones': [
                 {'name': before['name'], 'before': before, 'after': after}
@@ -297,7 +327,10 @@ class Improvement:
             ],
             'target_region_m2': region,
             'area_m2': self.surface.area_m2,
-            'binding_limits': [asdict(limit) for limit in self.retiming.binding_limits],
+            'binding_limits': [
+                {'name': name, 'sigma_n': sigma_n}
+                for name, sigma_n in self.retiming.binding_limits.items()
+            ],
             'passes': [change.to_dict() for change in self.changes],
             'request': self.request.model_dump(),
             'robot': self.drive and self.drive.to_dict(),
@@ -306,27 +339,39 @@ class Improvement:
 
 
 def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
-    """The changes of all passes; a pass is a straight stretch with the gun open."""
-    path, _ = spray_path(original.trajectory())
-    begins = 1 + np.flatnonzero(np.diff(path.stroke))
-    turns = original.travel_at_m(path.stamp_ns[begins]) - path.from_turn_m[begins]
+    """The changes of all passes, numbered as a simulation of the improved programme does."""
+    strokes = Strokes.of(improved)
+    passes = np.flatnonzero(strokes.begins_pass)
+    given = Programme.of(original.original).openings
+    opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
+    pairs = list(zip(original.openings, improved.openings, strict=True))
     found: list[PassChange] = []
-    for before, after in zip(original.openings, improved.openings, strict=True):
-        inside = turns[(turns > after.on_m + LEAST_PASS_M) & (turns < after.off_m - LEAST_PASS_M)]
-        ends = [after.on_m, *inside.tolist(), after.off_m]
-        for first, last in pairwise(ends):
-            earlier = before.on_m - after.on_m if first == after.on_m else 0.0
-            later = after.off_m - before.off_m if last == after.off_m else 0.0
-            whole = np.array([first, last])
-            old, new = (float(speed_along(p, whole)[0]) for p in (original, improved))
-            speed = speed_along(improved, np.linspace(first, last, SAMPLES + 1))
-            found.append(
-                PassChange(
-                    len(found) + 1,
-                    (old, new),
-                    float(speed.min()), float(speed.max()), earlier, later,
-                    earlier / float(speed[0]), later / float(speed[-1]),
-                    (before.flow, after.flow),
-                )
-            )  # fmt: skip
+    for begin, end, number in zip(
+        strokes.ends_m[passes], strokes.ends_m[passes + 1], strokes.spray_pass[passes], strict=True
+    ):
+        own = [
+            (before, after) for before, after in pairs
+            if min(after.off_m, end) - max(after.on_m, begin) > 0.05
+        ]  # fmt: skip
+        if not own:
+            continue
+        (first_before, first), (last_before, last) = own[0], own[-1]
+        on, off = max(first.on_m, begin), min(last.off_m, end)
+        inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
+        # A turn that the programme sprays through has no trigger that could be earlier or later.
+        opens = on == first.on_m and first_before.on_m in opened_m
+        closes = off == last.off_m and last_before.off_m in closed_m
+        earlier = first_before.on_m - on if opens else 0.0
+        later = off - last_before.off_m if closes else 0.0
+        old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
+        speed = speed_along(improved, np.linspace(*inside, 61))
+        found.append(
+            PassChange(
+                int(number) + 1, (on, off),
+                (old, new),
+                float(speed.min()), float(speed.max()), earlier, later,
+                earlier / float(speed[0]), later / float(speed[-1]),
+                (first_before.flow, first.flow),
+            )
+        )  # fmt: skip
     return tuple(found)

@@ -8,40 +8,25 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.films import FilmAtPoints, stratified_sample
-from paint_deposition.planning.improvement.nodes import Nodes, SpeedBounds, retime, speed_bounds
-from paint_deposition.planning.improvement.programme import Opening, Programme
-from paint_deposition.planning.improvement.quadratic_program import (
+from paint_deposition.planning.nodes import FilmAtPoints, Nodes, retime, speed_bounds
+from paint_deposition.planning.planned_film import (
+    Band,
+    WantedFilm,
+    stratified_sample,
+)
+from paint_deposition.planning.programme import Opening, Programme
+from paint_deposition.planning.quadratic_program import (
     LIMIT_NAMES,
     Density,
     Problem,
     solve,
 )
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import Band, WantedFilm
 
-# Nodes per width of the pattern, within bounds.
-NODES_PER_SIGMA = 2.0
-FINEST_M, COARSEST_M = 0.015, 0.05
 # The film of the solution and that of the timed programme agree to this share of the target.
 FILM_AGREEMENT, ROUNDS = 5e-4, 4
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
-# A limit is reported if sigma_n without it would be lower by this share.
-NAMED_GAIN = 0.02
-# An opening is not cut to less than this share of its length.
-LEAST_SHARE = 0.3
-# It is extended only where the path runs on straight, at nearly the speed of its end.
-STRAIGHT, STEADY = 0.995, 0.99
-CHECKS = 20
-
-
-@dataclass(frozen=True)
-class BindingLimit:
-    """A limit that keeps the film from being more even."""
-
-    name: str  # of the limit, in words
-    sigma_n: float  # what it would be without this limit alone
 
 
 @dataclass(frozen=True)
@@ -52,8 +37,8 @@ class Retiming:
     programme: Programme  # the new one
     target_um: float  # mean film aimed at
     binding: tuple[str, ...]  # names of all limits that bind
-    # Those of them that cost evenness, the strongest first.
-    binding_limits: tuple[BindingLimit, ...]
+    # Those of them that cost evenness, the strongest first, with sigma_n without each alone.
+    binding_limits: dict[str, float]
     # The most even film of any densities of paint along this path, without limits and without
     # weights for paint, time and smoothness.
     sigma_n_of_path: float
@@ -87,19 +72,20 @@ def retime_for_evenness(
     target = wanted.target_um or request.target_um or mean
     bands = wanted.bands(rows, target, request.tolerance)
     narrow = min(min(p.sigma1_m, p.sigma2_m) for m in models for p in m.patterns)
-    spacing = min(max(narrow / NODES_PER_SIGMA, FINEST_M), COARSEST_M)
+    # Nodes per width of the pattern, within bounds.
+    spacing = min(max(narrow / 2.0, 0.015), 0.05)
     search = _Search(programme, films, target, target / mean, bands, request, spacing, progress)
     return search.retiming(explain)
 
 
 @dataclass(frozen=True)
 class _Search:
-    """The original programme and the request; ``level`` is the target over its mean film."""
+    """The search for one programme and request."""
 
     original: Programme
     films: Sequence[FilmAtPoints]
     target_um: float
-    level: float
+    target_over_mean: float  # of the original programme's film
     bands: Sequence[Band]
     request: ImproveRequest
     spacing_m: float
@@ -116,7 +102,7 @@ class _Search:
             relaxed, density = self._problem(wide, nodes, None, open_ends)
             density = solve(relaxed, density, ROUGH_ROUNDS)
             chosen = _openings(
-                nodes, density.density, open_ends, relaxed.bounds, self.original.openings,
+                nodes, density.density, open_ends, relaxed.bounds[0], self.original.openings,
                 self.request,
             )  # fmt: skip
             programme = replace(programme, openings=chosen)
@@ -134,7 +120,7 @@ class _Search:
             if off <= FILM_AGREEMENT * self.target_um:
                 break
         assert found is not None
-        limits: tuple[BindingLimit, ...] = ()
+        limits: dict[str, float] = {}
         of_path = now = _sigma_n(laid)
         if explain:
             limits = self._binding_limits(problem, found, now)
@@ -155,18 +141,20 @@ class _Search:
         timed = self._timed(programme, nodes, now)
         films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
         flow = np.array([opening.flow for opening in original.openings])
-        sprayed_s = self.level * float(flow @ np.diff(original.seconds_at(original.ends_m))[:, 0])
+        sprayed_s = self.target_over_mean * float(
+            flow @ np.diff(original.seconds_at(original.ends_m))[:, 0]
+        )
         return Problem(
             films, self.target_um, self.bands, nodes, bounds, self.request, sprayed_s, open_ends
         ), now
 
     def _mean_density(self, nodes: Nodes) -> Density:
-        """The original mean density of each opening, times the level."""
+        """The original mean density of each opening, scaled for the target."""
         flow = np.array([opening.flow for opening in nodes.openings])
         ends, request = self.original.ends_m, self.request
         seconds = np.diff(self.original.seconds_at(ends))[:, 0]
         slowness = np.clip(
-            self.level * seconds / np.diff(ends)[:, 0],
+            self.target_over_mean * seconds / np.diff(ends)[:, 0],
             1.0 / request.speed_max_m_per_s,
             1.0 / request.speed_min_m_per_s,
         )
@@ -182,14 +170,15 @@ class _Search:
 
     def _binding_limits(
         self, problem: Problem, found: Density, sigma_n: float
-    ) -> tuple[BindingLimit, ...]:
-        limits = []
+    ) -> dict[str, float]:
+        limits: dict[str, float] = {}
         for number, name in enumerate(found.binding):
             self.progress('limits', number / len(found.binding))
             relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
-            if relaxed < (1.0 - NAMED_GAIN) * sigma_n:
-                limits.append(BindingLimit(LIMIT_NAMES[name], relaxed))
-        return tuple(sorted(limits, key=lambda limit: limit.sigma_n))
+            # A limit is reported if sigma_n would be lower by 2 % without it.
+            if relaxed < 0.98 * sigma_n:
+                limits[LIMIT_NAMES[name]] = relaxed
+        return dict(sorted(limits.items(), key=lambda limit: limit[1]))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
@@ -226,15 +215,18 @@ def _usable_m(programme: Programme, from_m: float, side: float, most_m: float) -
     """How far the path continues from an end, straight and at a steady speed."""
     if most_m <= 0.0:
         return 0.0
-    way = np.linspace(0.0, most_m, CHECKS + 1)
+    way = np.linspace(0.0, most_m, 21)
     places = from_m + side * way
     at = programme.positions_at_m(places)
     seconds = np.abs(np.diff(programme.seconds_at(places)))
     speed = np.diff(way) / np.maximum(seconds, 1e-9)
-    inner = from_m - side * way[1]
-    own = way[1] / max(float(np.ptp(programme.seconds_at(np.array([inner, from_m])))), 1e-9)
-    good = speed >= STEADY * own
-    good &= np.linalg.norm(at[1:] - at[0], axis=1) >= STRAIGHT * way[1:]
+    # The opening may end in a turn: it runs on straight as seen from inside.
+    inside = np.array([from_m - side * way[1], from_m])
+    own = way[1] / max(float(np.ptp(programme.seconds_at(inside))), 1e-9)
+    # It is extended only where the path runs on straight, at nearly the speed of its end.
+    good = speed >= 0.99 * own
+    off = np.linalg.norm(at[1:] - programme.positions_at_m(inside[:1]), axis=1)
+    good &= off >= 0.995 * (way[1:] + way[1])
     return float(way[np.argmin(good)] if not good.all() else way[-1])
 
 
@@ -257,7 +249,7 @@ def _openings(
     nodes: Nodes,
     density: np.ndarray,
     open_ends: np.ndarray,
-    bounds: SpeedBounds,
+    greatest_m_per_s: np.ndarray,
     original: tuple[Opening, ...],
     request: ImproveRequest,
 ) -> tuple[Opening, ...]:
@@ -266,7 +258,7 @@ def _openings(
     for number, opening in enumerate(nodes.openings):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
-        least = opening.flow / bounds.greatest_m_per_s[rows]
+        least = opening.flow / greatest_m_per_s[rows]
         worth = (density[rows] - 0.5 * least) / least
         cut = _most_cut_m(original[number], request)
         kept = np.flatnonzero(~open_ends[rows] | (worth > 0.0))
@@ -279,7 +271,8 @@ def _openings(
 
 def _most_cut_m(opening: Opening, request: ImproveRequest) -> float:
     length = opening.off_m - opening.on_m
-    return min(request.trigger_cut_m, 0.5 * (1.0 - LEAST_SHARE) * length)
+    # An opening is not cut to less than 30 % of its length.
+    return min(request.trigger_cut_m, 0.35 * length)
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:

@@ -15,16 +15,15 @@ import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.improvement.nodes import (
+from paint_deposition.planning.nodes import (
     BEND,
     JOINT,
     LEAD,
     ROBOT,
     Nodes,
-    SpeedBounds,
 )
+from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
-from paint_deposition.planning.wanted_film import Band
 
 # Converged when the density changes by less than this share; largest number of rounds.
 SETTLED, ROUNDS = 3e-3, 8
@@ -33,10 +32,6 @@ BOUND_WEIGHT = 100.0
 # Weight that holds the mean of the best known film at the target. The levels of the
 # other models are free: holding them too would cost evenness.
 LEVEL_WEIGHT = 30.0
-# Smoothness is that of slowness over this length [m].
-SLOPE_M = 0.1
-# A constraint that costs more than this, in units of sigma_n squared, binds.
-BINDS = 1e-6
 # Additional weight of film outside the tolerance.
 BEYOND_TOLERANCE = 3.0
 LIMIT_NAMES = {
@@ -82,7 +77,7 @@ class Problem:
     bands: Sequence[Band]  # of the points
     # Of the path.
     nodes: Nodes
-    bounds: SpeedBounds
+    bounds: tuple[np.ndarray, np.ndarray]  # greatest speeds and their limits, see speed_bounds
     request: ImproveRequest  # of the user
     original_s: float  # paint of the original programme [s at the calibrated flow]
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
@@ -136,9 +131,8 @@ def _step(problem: Problem, now: Density) -> Density:
     names = np.repeat(
         [rows.name for rows in constraints], [r.matrix.shape[0] for r in constraints]
     )
-    binding = [
-        name for name in dict.fromkeys(names[costs > BINDS].tolist()) if name in LIMIT_NAMES
-    ]
+    # A constraint that costs more than this, in units of sigma_n squared, binds.
+    binding = [name for name in dict.fromkeys(names[costs > 1e-6].tolist()) if name in LIMIT_NAMES]
     flow = values[count:]
     least, most = problem.request.flow
     if least >= most:
@@ -175,7 +169,8 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     mean = float(weights @ now.density / weights.sum())
     unit = np.eye(problem.size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
-    slope *= (SLOPE_M / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
+    # Smoothness is that of slowness over this length [m].
+    slope *= (0.1 / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
@@ -206,14 +201,14 @@ def _constraints(problem: Problem, now: Density) -> list[Constraint]:
     unit = identity(problem.size, format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
-    greatest = problem.bounds.greatest_m_per_s
+    greatest, limit = problem.bounds
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
     rows = [
         Constraint('slowest', y - diags(1.0 / least) @ f),
         Constraint('positive', -y[closable]),
     ]
     for name in (ROBOT, BEND, LEAD, JOINT):  # y >= f / v
-        some = np.flatnonzero((problem.bounds.limit == name) & ~closable)
+        some = np.flatnonzero((limit == name) & ~closable)
         rows.append(Constraint(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
     # Nodes from which the gun sprays on to the next one for certain.
     pairs = nodes.followed

@@ -1,5 +1,6 @@
 """A given motion as a path and the openings of the gun along it, to be retimed; its moves."""
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -12,12 +13,11 @@ from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory, numbered
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import ImproveRequest
 
 # Intervals that travel less have no speed: the gun waits or turns.
 STANDING_M = 1e-6
-# The shortest time between two poses that is written [s].
-LEAST_STEP_S = 1e-5
 # Stamps begin here: in ROS a stamp of 0 is none.
 BEGIN_NS = 1_000_000_000
 # Moves are straight: the path leaves them by no more than this [m]. A turn of the tool counts by
@@ -25,11 +25,8 @@ BEGIN_NS = 1_000_000_000
 TOLERANCE_M, LEVER_M = 0.0005, 0.3
 # A program's speeds are written in steps of this [m/s].
 SPEED_STEP_M_PER_S = 1e-5
-SLOWEST_M_PER_S = 1e-3
-# Sub-steps this close in time follow each other.
-ROUNDED_NS = 4
-# The speed is sampled so often along an opening.
-STEPS = 400
+# The gun is closed so far before a turn and opened so far behind it: their places are estimates.
+TURN_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -110,6 +107,10 @@ class Programme:
         columns = [np.interp(travel_m, self._rising_m, column) for column in self.positions_m.T]
         return np.stack(columns, axis=1)
 
+    def turns_at_s(self, seconds: np.ndarray) -> Rotation:
+        """Turns (n,) of the tool at times (n,) from the first pose."""
+        return Slerp(self.clock_s, Rotation.from_quat(self.quaternions_xyzw))(seconds)
+
     @property
     def ends_m(self) -> np.ndarray:
         """(k, 2) travel at which each opening begins and ends [m]."""
@@ -123,8 +124,9 @@ class Programme:
         return np.stack([before, after], axis=1)
 
     def with_poses_at(self, travel_m: np.ndarray) -> 'Programme':
-        """The same motion with poses at these lengths of travel too."""
-        wanted = travel_m[(travel_m > 0.0) & (travel_m < self.travel_m[-1])]
+        """Insert poses at these lengths of travel; the motion stays as it is."""
+        wanted = np.unique(travel_m[(travel_m > 0.0) & (travel_m < self.travel_m[-1])])
+        wanted = wanted[np.diff(wanted, prepend=-1.0) > STANDING_M]
         row = np.searchsorted(self.travel_m, wanted, side='right') - 1
         near = np.minimum(
             np.abs(wanted - self.travel_m[row]), np.abs(wanted - self.travel_m[row + 1])
@@ -138,7 +140,7 @@ class Programme:
         between = self.positions_m[row] + share[:, np.newaxis] * (
             self.positions_m[row + 1] - self.positions_m[row]
         )
-        turns = Slerp(clock, Rotation.from_quat(self.quaternions_xyzw))(seconds).as_quat()
+        turns = self.turns_at_s(seconds).as_quat()
         order = np.argsort(np.concatenate([clock, seconds]), kind='stable')
         return replace(
             self,
@@ -150,7 +152,8 @@ class Programme:
 
     def without_standstill(self) -> 'Programme':
         """Without poses that are reached in no time: the gun stood there and does so no more."""
-        kept = np.append(True, self.duration_s > LEAST_STEP_S)
+        # The shortest time between two poses that is written [s].
+        kept = np.append(True, self.duration_s > 1e-5)
         return replace(
             self,
             positions_m=self.positions_m[kept],
@@ -183,6 +186,49 @@ class Programme:
         )
 
 
+@dataclass(frozen=True)
+class Strokes:
+    """The straight stretches of a programme from turn to turn, and the passes among them."""
+
+    ends_m: np.ndarray  # (k + 1,) travel at which they begin and the last one ends
+    spray_pass: np.ndarray  # (k,) number of the pass that runs or ran last, from 0, -1 before any
+    begins_pass: np.ndarray  # (k,) bool, whether a pass begins there; others are links
+
+    @staticmethod
+    def of(programme: Programme) -> 'Strokes':
+        """Number strokes and passes as a simulation of the timed programme does."""
+        path, _ = spray_path(programme.trajectory())
+        begins = 1 + np.flatnonzero(np.diff(path.stroke))
+        travel_m = programme.travel_at_m(path.stamp_ns)
+        turns_m = travel_m[begins] - path.from_turn_m[begins]
+        ends_m = np.concatenate([[0.0], turns_m, programme.travel_m[-1:]])
+        # Turns and passes show a little behind their begin, and not both at once.
+        middle = np.searchsorted(travel_m, 0.5 * (ends_m[1:] + ends_m[:-1]))
+        number = path.spray_pass[np.minimum(middle, len(path) - 1)]
+        return Strokes(ends_m, number, np.diff(number, prepend=-1) > 0)
+
+
+def closed_beside(programme: Programme, surface: Surface) -> Programme:
+    """The programme with the gun closed in all links between passes that lie beside the part.
+
+    Beside it is a link along which the tool's axis meets the part nowhere.
+    """
+    strokes = Strokes.of(programme)
+    openings = programme.openings
+    for begin, end in strokes.ends_m[np.flatnonzero(~strokes.begins_pass)[:, None] + [0, 1]]:
+        # Whether a link meets the part is looked at this often along it [m].
+        places = np.linspace(begin, end, math.ceil((end - begin) / 0.01) + 2)[1:-1]
+        axes = programme.turns_at_s(programme.seconds_at(places)).as_matrix()[:, :, 2]
+        if (surface.first_faces(programme.positions_at_m(places), axes) < 0).all():
+            pieces = [
+                replace(one, on_m=max(one.on_m, low), off_m=min(one.off_m, high))
+                for one in openings
+                for low, high in ((-math.inf, begin - TURN_M), (end + TURN_M, math.inf))
+            ]
+            openings = tuple(one for one in pieces if one.off_m - one.on_m > STANDING_M)
+    return replace(programme, openings=openings)
+
+
 def speed_along(programme: Programme, travel_m: np.ndarray) -> np.ndarray:
     """(N - 1,) mean speed between places (N,) of the path [m/s]."""
     return np.diff(travel_m) / np.maximum(np.diff(programme.seconds_at(travel_m)), 1e-9)
@@ -202,7 +248,8 @@ def _openings(
     sprays = path.flow > 0.0
     breaks = (sprays[1:] != sprays[:-1]) | (path.brush[1:] != path.brush[:-1])
     # The halves of two sub-steps are rounded, each to a nanosecond.
-    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > ROUNDED_NS
+    # Sub-steps this close in time follow each other.
+    breaks |= edges_ns[0, 1:] - edges_ns[1, :-1] > 4
     openings = []
     for rows in filter(len, np.split(np.arange(len(path)), 1 + np.flatnonzero(breaks))):
         on, off = float(on_m[rows[0]]), float(off_m[rows[-1]])
@@ -234,11 +281,12 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
         middle = 0.5 * (whole.travel_m[before] + whole.travel_m[row])
         number = int(np.searchsorted(ends[:, 0], middle, side='right')) - 1
         spraying = bool(moves) and number >= 0 and middle < ends[number, 1]
-        if spraying:
-            pace = length / (clock[row] - clock[before])
+        if spraying:  # a stay where the gun opens is outside
+            left = np.searchsorted(whole.travel_m, whole.travel_m[before] + STANDING_M) - 1
+            pace = length / (clock[row] - clock[left])
         else:
             pace = float(speed[before : max(row, before + 1)].max())
-        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, SLOWEST_M_PER_S)
+        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, 1e-3)
         pose = whole.positions_m[row], whole.quaternions_xyzw[row]
         opening = programme.openings[max(number, 0)]
         flow = opening.flow if spraying else 1.0
@@ -249,7 +297,8 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
 def _stops(programme: Programme, number: int, request: ImproveRequest) -> np.ndarray:
     """Where moves begin and end in an opening: not too close in length, nor in time."""
     opening = programme.openings[number]
-    places = np.linspace(opening.on_m, opening.off_m, STEPS + 1)
+    # The speed is sampled so often along an opening.
+    places = np.linspace(opening.on_m, opening.off_m, 401)
     speed = speed_along(programme, places)
     least = np.maximum(request.move_min_m, speed / request.settings_per_s)
     moves = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])
@@ -273,17 +322,12 @@ def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
         if last - first < 2:
             continue
         between = followed[first + 1 : last]
-        off = _distances(between, followed[first], followed[last])
+        way = followed[last] - followed[first]
+        share = (between - followed[first]) @ way / max(float(way @ way), 1e-12)
+        nearest = followed[first] + np.outer(np.clip(share, 0.0, 1.0), way)
+        off = np.linalg.norm(between - nearest, axis=1)
         if off.max() > TOLERANCE_M:
             middle = first + 1 + int(off.argmax())
             wanted[middle] = True
             spans += [(first, middle), (middle, last)]
     return np.flatnonzero(wanted)
-
-
-def _distances(points: np.ndarray, begin: np.ndarray, end: np.ndarray) -> np.ndarray:
-    """(N,) distances of points (N, D) from a line segment."""
-    way = end - begin
-    square = float(way @ way)
-    share = np.clip((points - begin) @ way / square, 0.0, 1.0) if square > 0.0 else 0.0
-    return np.linalg.norm(points - begin - np.multiply.outer(share, way), axis=-1)

@@ -1,1 +1,0 @@
-"""Speeds, flows and triggers along a given path for a more even film."""

@@ -1,0 +1,249 @@
+"""Joints of a robot whose tip follows given poses, and how fast they can.
+
+All starts are followed side by side by damped Newton steps (Nakamura and Hanafusa 1986), so that
+the best way through all poses can be chosen. The fastest motion along it is a linear program.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import linprog
+from scipy.sparse import coo_array, vstack
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import PlanError
+from paint_deposition.motion.arm import Arm
+
+# Random starts, and how many of those that reach the first pose are followed.
+STARTS, FOLLOWED = 600, 40
+START_ROUNDS, ROUNDS = 60, 12
+# A pose is reached within this [m and rad].
+REACHED = 1e-5
+# A joint without limits begins within this of zero [rad or m].
+UNLIMITED = np.pi
+# Speeds and accelerations keep this share below the limits where they are looked at.
+MARGIN = 0.03
+# No motion is slowed down to less than this share: the robot stands in a singularity there.
+SLOWEST = 0.01
+
+
+@dataclass(frozen=True)
+class Start:
+    """A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad]."""
+
+    joints: np.ndarray
+    roll_rad: float
+
+
+@dataclass(frozen=True)
+class Ways:
+    """S ways to follow N poses.
+
+    Attributes:
+        joints: (S, N, J), NaN behind the last pose that is reached.
+        reached: (S,) number of poses that each reaches within the limits.
+    """
+
+    joints: np.ndarray
+    reached: np.ndarray
+
+    @property
+    def whole(self) -> np.ndarray:
+        """Rows of the ways that reach all poses."""
+        return np.flatnonzero(self.reached == self.joints.shape[1])
+
+
+def starts(
+    arm: Arm, position_m: np.ndarray, axes: np.ndarray, free_roll: bool, seed: int = 0
+) -> list[Start]:
+    """Configurations that reach a pose, the farthest from the limits first.
+
+    With ``free_roll`` the tool is turned about its own axis by any angle.
+    """
+    rng = np.random.default_rng(seed)
+    lower = np.where(np.isfinite(arm.lower), arm.lower, -UNLIMITED)
+    upper = np.where(np.isfinite(arm.upper), arm.upper, UNLIMITED)
+    roll_rad = rng.uniform(-np.pi, np.pi, STARTS) if free_roll else np.zeros(STARTS)
+    joints, error = rng.uniform(lower, upper, (STARTS, len(arm))), np.full(STARTS, np.inf)
+    wanted = axes @ Rotation.from_rotvec(np.outer(roll_rad, (0, 0, 1))).as_matrix()
+    for _ in range(START_ROUNDS):
+        joints, error = towards(arm, joints, position_m, wanted)
+    middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
+    turns = np.round((joints - middle) / (2.0 * np.pi))
+    joints = np.where(arm.slides, joints, joints - 2.0 * np.pi * turns)
+    good = np.flatnonzero((error < REACHED) & within(arm, joints))
+    found: list[Start] = []
+    for row in good[np.argsort(np.abs((joints - middle) / half).max(axis=1)[good])]:
+        # Configurations that differ by less are one [rad or m].
+        if all(np.abs(joints[row] - other.joints).max() > 0.1 for other in found):
+            found.append(Start(joints[row], float(roll_rad[row])))
+    return found[:FOLLOWED]
+
+
+def follow(arm: Arm, begin: np.ndarray, positions_m: np.ndarray, axes: np.ndarray) -> Ways:
+    """Follow poses (S, N, 3) [m] and (S, N, 3, 3) from configurations (S, J) at the first ones."""
+    joints = np.full((*positions_m.shape[:2], len(arm)), np.nan)
+    reached = np.full(len(begin), joints.shape[1])
+    now, left = begin, np.arange(len(begin))
+    for n in range(joints.shape[1]):
+        for _ in range(ROUNDS):
+            now, error = towards(arm, now, positions_m[left, n], axes[left, n])
+            if (error < REACHED).all():
+                break
+        good = (error < REACHED) & within(arm, now)
+        reached[left[~good]] = n
+        now, left = now[good], left[good]
+        joints[left, n] = now
+        if not len(left):
+            break
+    return Ways(joints, reached)
+
+
+def settled(
+    arm: Arm, joints: np.ndarray, positions_m: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Joints (N, J) near given ones that hold poses (N, 3) and (N, 3, 3), and the error (N,)."""
+    error = np.full(len(joints), np.inf)
+    for _ in range(ROUNDS):
+        joints, error = towards(arm, joints, positions_m, axes)
+    return joints, error
+
+
+def towards(
+    arm: Arm, joints: np.ndarray, positions_m: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """A step of joints (..., J) towards poses, positions (..., 3) and axes (..., 3, 3).
+
+    Returns the new joints and the error (...) before the step [m and rad].
+    """
+    position, tip, jacobian = arm.jacobians(joints)
+    turn = 0.5 * np.cross(tip, axes, axis=-2).sum(axis=-1)
+    error = np.concatenate([positions_m - position, turn], axis=-1)
+    # No step turns a joint further [rad or m]; near a singularity steps are damped.
+    square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-3**2 * np.eye(6)
+    step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, error[..., np.newaxis])
+    step = step[..., 0]
+    longest = np.abs(step).max(axis=-1, keepdims=True)
+    step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-12))
+    return joints + step, np.linalg.norm(error, axis=-1)
+
+
+def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
+    """(...) whether joints (..., J) keep their limits."""
+    outside = (joints < arm.lower) | (joints > arm.upper)
+    return np.logical_not(outside.any(axis=-1))
+
+
+@dataclass(frozen=True)
+class PassLimit:
+    """The joint that keeps a pass from its planned speed."""
+
+    number: int  # of the pass, from 1
+    share: float  # of the planned speed that is left
+    joint: str
+    of_speed: bool  # whether its speed limits, not its acceleration
+
+    def __str__(self) -> str:
+        what = 'speed' if self.of_speed else 'acceleration'
+        return (
+            f'pass {self.number} runs at {100 * self.share:.0f} % of the planned speed, which the '
+            f'{what} of {self.joint} allows'
+        )
+
+
+@dataclass(frozen=True)
+class JointPace:
+    """What the joints along a motion allow; they are a function of the planned time."""
+
+    names: tuple[str, ...]
+
+    times_s: np.ndarray
+    joints: CubicSpline
+    fastest: np.ndarray
+    most: np.ndarray
+
+    def shares(self, spray_pass: np.ndarray) -> np.ndarray:
+        """(N,) share of the planned speed at the times, the greatest that the joints allow.
+
+        Of each time (N,) the number of its pass is given, -1 between passes.
+
+        With b the square of the share the joints' accelerations are linear in b and its slope
+        (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
+        share, or its film would be uneven.
+        """
+        count, step = len(self.times_s), self.times_s[1]
+        outside = spray_pass < 0
+        column = np.where(outside, spray_pass.max() + 1 + np.cumsum(outside), spray_pass)
+        # The neighbours count too: the share changes evenly between the times.
+        speed = maximum_filter1d(np.abs(self.joints(self.times_s, 1)), 3, axis=0) / (1.0 - MARGIN)
+        highest = np.minimum(1.0, (self.fastest / np.maximum(speed, 1e-12)).min(axis=1) ** 2)
+        bound = np.ones(column.max() + 1)
+        np.minimum.at(bound, column, highest)
+        slopes, bends = self.joints(self.times_s, 1).T, self.joints(self.times_s, 2).T
+        row, sides, rows = np.arange(count - 1), [], []
+        # At both ends of every step: between them the acceleration is nearly linear.
+        for end in (row, row + 1):
+            for slope, bend, most in zip(slopes, bends, (1.0 - MARGIN) * self.most, strict=True):
+                change = 0.5 * slope[end] / step
+                part = coo_array(
+                    (
+                        np.concatenate([-change, change, bend[end]]),
+                        (np.tile(row, 3), column[np.concatenate([row, row + 1, end])]),
+                    ),
+                    shape=(count - 1, len(bound)),
+                )
+                rows += [part, -part]
+                sides += [np.full(count - 1, most)] * 2
+        weights = np.bincount(column, minlength=len(bound)).astype(float)
+        solved = linprog(
+            -weights, A_ub=vstack(rows).tocsr(), b_ub=np.concatenate(sides),
+            bounds=np.stack([np.full_like(bound, SLOWEST**2), bound], axis=1), method='highs',
+        )  # fmt: skip
+        if solved.x is None:
+            raise PlanError(
+                f'some joints have less than {100 * SLOWEST:.0f} % of the speed or acceleration '
+                'that the motion needs; let the part stand elsewhere, paint place shows where'
+            )
+        return np.sqrt(solved.x)[column]
+
+    def driven(self, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """The joints at these shares (N,) of the planned speed.
+
+        Returned are the times (N,) at which the planned ones are reached; and times (M,) at an
+        even rate with the joints and their speeds (M, J) there. Between planned times the share
+        changes evenly. All is slower where the limits are not kept in between.
+        """
+        steps_s = 2.0 * np.diff(self.times_s) / (shares[1:] + shares[:-1])
+        reached_s = np.append(0.0, np.cumsum(steps_s))
+        # Of the joints that are written.
+        seconds = np.linspace(0.0, reached_s[-1], math.ceil(reached_s[-1] * 250.0) + 1)
+        step = np.clip(np.searchsorted(reached_s, seconds, side='right') - 1, 0, len(shares) - 2)
+        since = seconds - reached_s[step]
+        rise = (np.diff(shares) / steps_s)[step]
+        planned_s = self.times_s[step] + shares[step] * since + 0.5 * rise * since**2
+        share = (shares[step] + rise * since)[:, np.newaxis]
+        joints, slope = self.joints(planned_s), self.joints(planned_s, 1)
+        rate = self.joints(planned_s, 2) * share**2 + slope * rise[:, np.newaxis]
+        too_fast = (np.abs(slope * share) / self.fastest).max()
+        slower = max(1.0, float(too_fast), math.sqrt((np.abs(rate) / self.most).max()))
+        return slower * reached_s, slower * seconds, joints, slope * share / slower
+
+    def limits(self, spray_pass: np.ndarray, shares: np.ndarray) -> tuple[PassLimit, ...]:
+        """For each pass that is slower than planned, the joint that makes it so."""
+        slope = np.abs(self.joints(self.times_s, 1)) / self.fastest
+        bend = np.sqrt(np.abs(self.joints(self.times_s, 2)) / self.most)
+        found = []
+        for number in np.unique(spray_pass[spray_pass >= 0]).tolist():
+            inside = spray_pass == number
+            share = float(shares[inside].min())
+            # Smaller losses of speed are not told.
+            if share > 0.995:
+                continue
+            speed, rate = slope[inside].max(axis=0), bend[inside].max(axis=0)
+            of_speed = speed.max() > rate.max()
+            joint = int(np.argmax(speed if of_speed else rate))
+            found.append(PassLimit(number + 1, share, self.names[joint], bool(of_speed)))
+        return tuple(found)

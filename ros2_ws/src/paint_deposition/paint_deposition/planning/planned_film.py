@@ -1,0 +1,290 @@
+"""The film that a plan aims at, and the film of a planned motion with its figures."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PlanError
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.film.paint_used import PaintUsed, paint_figures
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.motion.programmed import Move
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
+from paint_deposition.planning.clearance import Contact
+from paint_deposition.planning.driving import Drive
+from paint_deposition.planning.passes import PlannedPass
+from paint_deposition.planning.requests import GunEnvelope, PlanRequest
+
+# A mean film this close to the target is on it; speeds this close to a limit keep it.
+NEAR = 0.01
+
+
+class Band(NamedTuple):
+    """What film is accepted at some of V points."""
+
+    points: np.ndarray  # (V,) bool
+    target_um: float  # film wanted
+    tolerance: float | None  # accepted share of it either way; None: any film
+
+
+@dataclass(frozen=True)
+class WantedFilm:
+    """The film wanted on a region of a part; a film over ``share`` should be the mean target.
+
+    Attributes:
+        region: (V,) bool, vertices whose film counts.
+        target_um: mean target there; None: it is that of the film as it is.
+        elsewhere_um: target outside of the zones, None: none.
+        share: (V,) target of each vertex over the mean target.
+        zones: of the vertices, or None. free_m2: what is painted and has no target [m^2].
+    """
+
+    region: np.ndarray
+    target_um: float | None
+    elsewhere_um: float | None
+    share: np.ndarray
+    zones: PointZones | None = None
+    free_m2: float = 0.0
+
+    @staticmethod
+    def of(
+        surface: Surface, region: np.ndarray, target_um: float | None, zones: PointZones | None
+    ) -> WantedFilm:
+        """In zones their targets, and elsewhere ``target_um``, count on a region (V,) bool.
+
+        Raises:
+            PlanError: no vertex of the region has a target of its own.
+        """
+        if zones is None:
+            return WantedFilm(region, target_um, target_um, np.ones(len(region)))
+        targets, _ = zones.wanted_um(target_um)
+        counted = region & ~np.isnan(targets)
+        if not (counted & (zones.number >= 0)).any():
+            raise PlanError(
+                'no zone lies where paint is to land; give zones on the side that the gun faces'
+            )
+        # By zones, and not by vertices: of equal targets it is the very same.
+        area = np.where(counted, surface.vertex_areas_m2, 0.0)
+        kinds, of = np.unique(targets, return_inverse=True)
+        areas = np.bincount(of, area)
+        mean = float((areas / areas.sum())[areas > 0.0] @ kinds[areas > 0.0])
+        return WantedFilm(
+            counted, mean, target_um, np.where(counted, targets / mean, 1.0), zones,
+            float(surface.vertex_areas_m2[region & ~counted].sum()),
+        )  # fmt: skip
+
+    def doubts(self, laid: FilmStatistics) -> Iterator[str]:
+        """What of the film that is laid may not be as expected, a line each."""
+        if self.free_m2:
+            yield (
+                f'{self.free_m2:.2g} m2 of what is painted are in no zone and have no target: any '
+                'film is taken there; give --target-um, or a zone over them'
+            )
+        for one in self.zones.zones.zones if self.zones else ():
+            if one.name not in laid.zones:
+                yield (
+                    f'zone {one.name} is left out: the passes do not paint it, or hardly; give '
+                    'passes over it'
+                )
+        for name, zone in laid.zones.items():
+            low, high = zone.band_um
+            if not low <= zone.mean_um <= high:
+                yield (
+                    f'zone {name}: the mean film is {zone.mean_um:.1f} µm, outside of {low:g} to '
+                    f'{high:g} µm: the passes over it reach its neighbours too; lay passes along '
+                    'the border, or allow other speeds (--speed-min, --speed-max)'
+                )
+
+    def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
+        """Films accepted at vertices (V,), outside of zones by the target and tolerance given."""
+        if self.zones is None:
+            return [Band(np.ones(len(rows), dtype=bool), target_um, tolerance)]
+        here = self.zones.select(rows)
+        found = [Band(own, z.target_um, z.tolerance_um / z.target_um) for z, own in here]
+        if self.elsewhere_um is not None:
+            found.append(Band(here.number < 0, self.elsewhere_um, tolerance))
+        return found
+
+    def limits_um(self, target_um: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+        """Least and greatest film (V,) accepted [um]; the rest as for ``bands``."""
+        low, high = np.full((2, len(self.region)), np.nan)
+        for band in self.bands(np.arange(len(low)), target_um, tolerance):
+            low[band.points] = band.target_um * (1.0 - (band.tolerance or 0.0))
+            high[band.points] = band.target_um * (1.0 + (band.tolerance or 0.0))
+        return low, high
+
+
+def simulated(
+    surface: Surface,
+    model: DepositionModel,
+    trajectory: Trajectory,
+    progress: Callable[[float], None] = lambda share: None,
+) -> tuple[np.ndarray, PaintUsed]:
+    """(V,) film of a motion [um], and what it sprays."""
+    path, _ = spray_path(trajectory, max_step_m=model.max_step_m)
+    integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
+    integrator.add(path, lambda done: progress(done / len(path)))
+    return integrator.film_um, integrator.used
+
+
+def predicted(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    wanted: WantedFilm,
+    trajectory: Trajectory,
+    progress: Callable[[float], None] = lambda share: None,
+) -> dict[str, Any]:
+    """The film of a planned motion and its figures, as fields of a ``PlannedFilm``.
+
+    Within a tenth of the target, if there is one, it is good; in zones within their tolerance.
+    """
+    film, paint = simulated(surface, model, trajectory, progress)
+    region, target = wanted.region, request.target_um or 0.0
+    area = surface.vertex_areas_m2[region]
+    statistics = film_statistics(
+        film[region], area, paint.emitted_cm3, target_um=target, target_tolerance_um=0.1 * target,
+        zones=wanted.zones and wanted.zones.select(region),
+    )  # fmt: skip
+    whole_part = film_statistics(
+        film, surface.vertex_areas_m2, paint.emitted_cm3, target_um=target,
+        target_tolerance_um=0.1 * target, zones=wanted.zones,
+    )  # fmt: skip
+    return {
+        'surface': surface, 'model': model, 'request': request, 'wanted': wanted,
+        'trajectory': trajectory, 'film_um': film, 'paint': paint, 'statistics': statistics,
+        'whole_part': whole_part,
+        'sigma_n': evenness(film[region] / wanted.share[region], area)[1],
+    }  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class PlannedFilm:
+    """Passes on a part with the film that the model predicts."""
+
+    surface: Surface
+    model: DepositionModel
+    request: PlanRequest
+    wanted: WantedFilm  # on the side or the faces that are painted
+    passes: tuple[PlannedPass, ...]  # in running order
+    trajectory: Trajectory  # their timed poses and trigger
+    moves: tuple[Move, ...]  # of a robot program along them
+    film_um: np.ndarray  # (V,) on the refined part
+    paint: PaintUsed
+    statistics: FilmStatistics  # of the film where one is wanted
+    whole_part: FilmStatistics  # of the film on the whole part
+    # Standard deviation over mean there, of the film over its own target, bare metal included.
+    sigma_n: float
+    drive: Drive | None = None  # of the robot that it was made for
+    contacts: tuple[Contact, ...] = ()  # where gun or spray come too close to the part
+    envelope: GunEnvelope = field(default_factory=GunEnvelope)  # of the gun
+
+    @property
+    def painted(self) -> np.ndarray:
+        """(V,) bool, vertices whose film counts."""
+        return self.wanted.region
+
+    @property
+    def mean_um(self) -> float:
+        """Mean film on the painted part, bare metal included [um]."""
+        area = self.surface.vertex_areas_m2[self.painted]
+        return evenness(self.film_um[self.painted], area)[0]
+
+    @property
+    def region(self) -> str:
+        """Where its figures are taken, in words."""
+        area_m2 = self.surface.vertex_areas_m2[self.painted].sum()
+        return f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 to be painted'
+
+    @property
+    def cycle_time_s(self) -> float:
+        """From the first pose to the last [s]."""
+        return self.trajectory.duration_s
+
+    @property
+    def sprayed_speeds_m_per_s(self) -> list[float]:
+        """Speeds of the moves that spray."""
+        return [move.speed_m_per_s for move in self.moves if move.spraying]
+
+    @cached_property
+    def path(self) -> SprayPath:
+        """The motion cut into sub-steps."""
+        return spray_path(self.trajectory)[0]
+
+    @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        return (
+            f'mean film {self.statistics.mean_um:.1f} µm, sigma_n {100 * self.sigma_n:.1f} % on '
+            f'{self.region}, {self.cycle_time_s:.1f} s'
+        )
+
+    @property
+    def warnings(self) -> Iterator[str]:
+        """Where the plan is not what was asked for, a line each."""
+        request, target = self.request, self.request.target_um
+        yield from map(str, self.drive.limits if self.drive else ())
+        yield from map(str, self.contacts)
+        yield from self.wanted.doubts(self.statistics)
+        at_speed = request.speed_m_per_s and not self.wanted.zones
+        if target and at_speed and abs(self.mean_um / target - 1.0) > NEAR:
+            yield (
+                f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
+                f'of {target:g} µm; leave out the speed and it is chosen for the target'
+            )
+        slowest, fastest = min(self.sprayed_speeds_m_per_s), max(self.sprayed_speeds_m_per_s)
+        least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
+        outside = slowest < (1.0 - NEAR) * least or fastest > (1.0 + NEAR) * most
+        if outside and not request.optimise:  # which keeps them
+            yield (
+                f'the passes run at {slowest:.3g} to {fastest:.3g} m/s, where {least:g} to '
+                f'{most:g} m/s are allowed (--speed-min, --speed-max)'
+            )
+
+    def __repr__(self) -> str:
+        return f'{type(self).__name__}({self.sentence})'
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the plan."""
+        return {
+            'direction': self.request.direction,
+            'passes': len(self.passes),
+            'cycle_time_s': self.cycle_time_s,
+            'sprayed_m': sum(planned.sprayed_m for planned in self.passes),
+            'sigma_n': self.sigma_n,
+            'region': self.region,
+            'film': self.statistics.to_dict(),
+            'whole_part': self.whole_part.to_dict(),
+            'paint': paint_figures(self),
+            'gun': self.envelope.model_dump(),
+            'contacts': [contact.to_dict() for contact in self.contacts],
+            'warnings': list(self.warnings),
+            'robot': self.drive and self.drive.to_dict(),
+        }
+
+
+def evenness(film_um: np.ndarray, area_m2: np.ndarray) -> tuple[float, float]:
+    """Mean film [um] and sigma_n, weighted by area."""
+    weight = area_m2 / area_m2.sum()
+    mean = float(weight @ film_um)
+    sigma = math.sqrt(float(weight @ (film_um - mean) ** 2))
+    return mean, sigma / mean if mean > 0.0 else math.nan
+
+
+def stratified_sample(area_m2: np.ndarray) -> np.ndarray:
+    """Rows that stand for equal shares of the area, 1500 at most."""
+    reached = np.cumsum(area_m2)
+    count = min(1500, 4 * len(area_m2))
+    shares = (np.arange(count) + 0.5) / count * reached[-1]
+    return np.searchsorted(reached, shares)
