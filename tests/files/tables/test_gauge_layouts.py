@@ -325,7 +325,7 @@ def test_unlabelled_statistics_below_readings_are_warned_of(file, films, doubt, 
 
 
 def test_decimal_commas_cut_by_the_commas_between_columns_are_warned_of(file):
-    points = file('p.csv', IN_ORDER)
+    points = file('p.csv', 'no,x_m,y_m,z_m\n1,0,0,0\n2,1,0,0\n')
     (doubt,) = read_readings(file('a.csv', 'point,DFT,Remark\n1,20,5\n2,21,0\n'), points).doubts
     assert doubt.startswith("'DFT' has whole numbers only, as has 'Remark' beside it: if decimal")
     for text in ('point,DFT,Remark\n1,20.0,5\n', 'point,DFT,Remark\n1,20,\n', 'DFT,point\n20,1\n'):
@@ -454,7 +454,7 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
     ('text', 'columns', 'message'),
     [
         ('20,5\n21,5\n', {'thickness': 1}, "'20,5' in line 1 may be two numbers or one with a"),
-        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each block"),
+        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each Block"),
         ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
         ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
@@ -469,9 +469,9 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
         ('point,DFT (ell)\nP,1\n', {}, "thickness .*; 'DFT .ell.' is in 'ell': give it in µm"),
         (
-            'Point;Primer thickness;Total thickness\nA;1;2\n',
+            'Point;Inner thickness;Outer thickness\nA;1;2\n',
             {},
-            "it may be 'Primer thickness' or 'Total thickness': name one with columns: {thick",
+            "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick",
         ),
     ],
 )

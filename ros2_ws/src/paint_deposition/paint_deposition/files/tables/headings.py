@@ -36,7 +36,8 @@ UNIT_NAMES = {1.0: 'm', 1e-2: 'cm', 1e-3: 'mm', 1e-6: 'µm', 25.4e-6: 'mil', 25.
 # What a heading says of a coordinate beside its axis. A nominal one counts if there is no other.
 NOMINAL = {'nominal', 'nom', 'soll', 'cad', 'design'}
 BESIDE = {
-    'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', 'ist', 'measured', 'gemessen',
+    'pos', 'position', 'coordinate', 'coordinates', 'koordinate', 'koordinaten', 'act', 'actual',
+    'ist', 'measured', 'gemessen',
 }  # fmt: skip
 BRACKETED = re.compile(r'[\[(]\s*([^\])]*?)\s*[\])]')
 
@@ -77,7 +78,8 @@ class Heading:
 
 def words_of(text: str) -> tuple[str, ...]:
     """The words of a text, small and without accents; '#' counts as one."""
-    return tuple(re.findall(r'[^\W_]+|#', _small(text)))
+    spaced = re.sub(r'(?<=[\u3040-\u9fff])(?=\d)', ' ', _small(text))  # 測定値1
+    return tuple(re.findall(r'[^\W_]+|#', spaced))
 
 
 def length_of(text: str) -> float | None:

@@ -42,6 +42,7 @@ class ReadingTable:
     orders: tuple[tuple[list[int], int], ...]
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
+    layers: list[str]  # what each column of the thickness is a layer of; none where it is not
     left_out: str  # what was not taken for a row, for the user
 
     @staticmethod
@@ -53,9 +54,9 @@ class ReadingTable:
         A row with one of ``labels``, those of the listed points, is no statistic. Raises
         ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
-        numbers = [n for n in layout.columns.values() if isinstance(n, int)]
-        numbered = 0 < len(numbers) == len(layout.columns)
-
+        named = [name for quantity in layout.columns for name in layout.named(quantity)]
+        numbers = [name for name in named if isinstance(name, int)]
+        numbered = 0 < len(numbers) == len(named)
         known = _known(films, layout)
         least = max(numbers) if numbered else 0
         sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet, least)
@@ -73,28 +74,37 @@ class ReadingTable:
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         again = [] if header is None else headings_again(table, header, known)
         table = table.select([row for row in rows if row not in again])
-        refuse_rivals(table, at)
-        refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
+        layers = known_columns.layers_of(headings, layout, at['thickness']) if films else []
+        of_user = not {'thickness', 'layers'}.isdisjoint(layout.columns)
+        refuse_rivals(table, at, of_user or bool(layers))
+        refuse_merged(table, [] if of_user else at.get('thickness', []))
         if numbered and layout.decimal != '.':
             refuse_cut_numbers(table)
+        if films and not layers:
+            table = table.with_repeats_apart(at)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
         table = table.without_units_in_cells(numeric)
         table, doubt = table.with_decimal(numeric, layout.decimal)
         if doubt:
             raise table.error(doubt)
+        failed = ''
+        if films:
+            table, failed = _without_failed(table, at['thickness'])
         if films and layout.zero == 'missing':
-            table = table.without_zeros(at['thickness'])
-        kept, missing, left_out = rows_of_readings(table, at, films, numeric, {*labels})
+            table = table.without(at['thickness'], lambda _, cell: table.is_zero(cell))
+        kept, missing, left_out = rows_of_readings(
+            table, at, films, numeric, {*labels}, bare=numbered
+        )
+        left_out += failed
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
         begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
         orders = orders_of(table, kept, missing, begin)
         table = table.select(kept)
-        return ReadingTable(
-            table, at, layout, orders, _unit_beside(table, at, sheet, header or 0), left_out
-        )
+        unit_m = _unit_beside(table, at, sheet, header or 0)
+        return ReadingTable(table, at, layout, orders, unit_m, layers, left_out)
 
     def __len__(self) -> int:
         return len(self.table)
@@ -124,7 +134,7 @@ class ReadingTable:
     @property
     def named_by(self) -> tuple[str, ...]:
         """The quantities that name a point."""
-        ways = (('point',), ('row', 'column'), ('number',))
+        ways = (('point',), ('row', 'column'), ('block', 'number'), ('number',))
         return next((way for way in ways if self.has(*way)), ())
 
     @property
@@ -190,10 +200,10 @@ class ReadingTable:
                 )
         return tuple(found)
 
-    def films_um(self) -> tuple[np.ndarray, np.ndarray, str]:
-        """All readings (N,) [um], the row of each, and what they are in words.
+    def films_um(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
+        """All readings (N,) [um], the row and the layer of each, and what they are in words.
 
-        A row gives as many readings as it has columns of repeats that are not blank.
+        A row gives as many readings as it has columns of repeats or layers that are not blank.
         """
         films = self.at['thickness']
         values = np.column_stack([self.table.numbers(k, may_be_empty=True) for k in films])
@@ -210,7 +220,10 @@ class ReadingTable:
         how = '' if unit else f' ({GUESSED})'
         factor = round((unit or 1e-6) * 1e6, 9)
         words = f'thickness in {UNIT_NAMES[unit or 1e-6]}{how}{source}'
-        return values[row, which] * factor, row, words
+        layers = (
+            np.array(self.layers)[which] if self.layers else np.array(self.texts('layer'))[row]
+        )
+        return values[row, which] * factor, row, layers, words
 
 
 def holds_readings(path: Path) -> bool:
@@ -227,6 +240,38 @@ def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
         return len(at) if any({*names} <= {*at} for names in needed) else 0
 
     return known
+
+
+def _without_failed(table: Table, films: list[int]) -> tuple[Table, str]:
+    """The table without the readings that the gauge itself marks as none, and how many, in words.
+
+    Raises ReadingsError where what a layout calls a count of readings is none.
+    """
+    gauge = known_columns.format_of(table.headings)
+    words = [known_columns.plain(heading) for heading in table.headings]
+    if gauge is None:
+        return table, ''
+    if (count := gauge.columns.get('number')) and not films == [words.index(count)]:
+        texts = table.texts(words.index(count))
+        if odd := next((text for text in texts if '.' in text or ',' in text), ''):
+            raise table.error(
+                f"'{table.headings[words.index(count)].text}' counts the readings of a "
+                f"{gauge.name}, and is '{odd}'; name the column of the film with columns: "
+                '{thickness: ...} in the campaign'
+            )
+    states = {k: good for k, word in enumerate(words) if (good := gauge.status.get(word))}
+    cells = {k: table.texts(k) for k in states}
+    failed = {
+        row: table.headings[k].text
+        for k, good in states.items()
+        for row, text in enumerate(cells[k])
+        if text.casefold() not in good
+    }
+    if not failed:
+        return table, ''
+    named = ', '.join(dict.fromkeys(failed.values()))
+    table = table.without(films, lambda row, _: row in failed)
+    return table, f', {len(failed)} of them failed by {named}'
 
 
 def _unit_beside(

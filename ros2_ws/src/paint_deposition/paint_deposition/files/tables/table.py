@@ -9,20 +9,17 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError, some
+from paint_deposition.files.tables.gauge_formats import NOTHING
 from paint_deposition.files.tables.headings import UNITS, Heading, unit_of
 from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
 
 # A heading further down than this is none.
-MOST_LINES_ABOVE = 200
+MOST_LINES_ABOVE, MOST_LINES_OF_TITLE = 200, 40
 MOST_COMPLAINTS_SHOWN = 8
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 # With one mark only, three digits behind it may be thousands.
 IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
 UNIT_BEHIND = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
-# Cells with which a gauge says that it has no reading.
-NOTHING = re.compile(
-    r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
-)
 Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {
     **dict.fromkeys(('true', 'on', 'yes', 'wahr', 'ein', 'an', 'ja'), 1.0),
@@ -127,13 +124,43 @@ class Table:
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
 
-    def without_zeros(self: Kind, columns: Collection[int]) -> Kind:
-        """The table with a missing reading in place of each zero of these columns."""
+    def without(
+        self: Kind, columns: Collection[int], is_none: Callable[[int, Cell], bool]
+    ) -> Kind:
+        """The table with n/a in place of the cells of columns that are none, by row and cell."""
         rows = [
-            ['n/a' if k in columns and self._number(c) == 0.0 else c for k, c in enumerate(row)]
-            for row in self.rows
+            ['n/a' if k in columns and is_none(n, c) else c for k, c in enumerate(row)]
+            for n, row in enumerate(self.rows)
         ]
         return replace(self, rows=rows)
+
+    def is_zero(self, cell: Cell) -> bool:
+        """Whether a cell is the number 0."""
+        return self._number(cell) == 0.0
+
+    def with_repeats_apart(self: Kind, at: dict[str, list[int]]) -> Kind:
+        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.
+
+        ``at`` gets the new columns of the thickness.
+        """
+        width, extra = len(self.headings), list[int]()
+        cells = [[text_of(_cell(row, k)).split(';') for k in at['thickness']] for row in self.rows]
+        most = max((len(parts) for row in cells for parts in row), default=1)
+        if most == 1 or max(map(len, self.rows)) > width:
+            return self
+        headings, rows = [*self.headings], [[*r, *[''] * (width - len(r))] for r in self.rows]
+        for place, k in enumerate(at['thickness']):
+            for number in range(most):
+                column = k if number == 0 else len(headings)
+                if number:
+                    text = f'{self.headings[k].text} ({number + 1})'
+                    headings.append(replace(self.headings[k], text=text))
+                    extra.append(column)
+                for row, parts in zip(rows, cells, strict=True):
+                    part = parts[place][number].strip() if number < len(parts[place]) else ''
+                    row[column : column + 1] = [part]
+        at['thickness'] = [*at['thickness'], *extra]
+        return replace(self, headings=headings, rows=rows)
 
     def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
         """The table with the units behind all numbers of a column in its heading instead.
@@ -212,10 +239,17 @@ def find_table(
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
         above = one.rows[:MOST_LINES_ABOVE]
-        ranks = [(known(headings_in(row)), not is_comment(row)) for row in above]
-        best = max(ranks, default=(0, False))
-        if best[0] and _is_split_alike(one.rows, ranks.index(best)):
-            found.append((one, ranks.index(best)))
+        ranked = [
+            (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
+        ]
+        for k in range(min(len(above) - 1, MOST_LINES_OF_TITLE)):
+            if two := _on_two_rows(one, k):
+                ranked.append((known(headings_in(two.rows[k])), True, two, k))
+        if not ranked:
+            continue
+        count, _, best, row = max(ranked, key=lambda rank: rank[:2])
+        if count and _is_split_alike(best.rows, row):
+            found.append((best, row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
         raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
@@ -229,6 +263,24 @@ def find_table(
     apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
     by_marks = [s for s in apart if not s.form.startswith('blanks')]
     return max(by_marks or sheets, key=lambda s: len(widest(s))), None
+
+
+def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
+    """The sheet with two rows as one of headings, None where they hold numbers.
+
+    A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
+    one above it.
+    """
+    upper, lower = sheet.rows[first], sheet.rows[first + 1]
+    if any(map(is_value, [*upper, *lower])) or len(lower) < 2:
+        return None
+    texts, last = list[Cell](), ''
+    for k in range(max(len(upper), len(lower))):
+        above, below = text_of(_cell(upper, k)), text_of(_cell(lower, k))
+        last = above or (last if below else '')
+        texts.append(f'{last} {below}'.strip())
+    rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
+    return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
 
 
 def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
