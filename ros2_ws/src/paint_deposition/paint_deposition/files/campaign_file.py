@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.campaign_coats import LaidCoats, Name, PaintJob
@@ -30,7 +30,9 @@ MAX_EDGE_LENGTH_M = 0.02
 
 Quantity = Literal[
     'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',
+    'layers',
 ]  # fmt: skip
+Column = Text | int | list[Text | int] | dict[Text, Text | int]
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
 _QUANTITIES = ', '.join(get_args(Quantity))
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
@@ -39,7 +41,26 @@ Remark = Callable[[Literal['note', 'warning'], str, str], None]
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
 
-class _File(BaseModel, extra='forbid'):
+class _Band(BaseModel):
+    """The film wanted, and what it may differ."""
+
+    target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
+    tolerance_um: Number | None = Field(
+        None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
+    )
+
+    @model_validator(mode='after')
+    def _check(self) -> '_Band':
+        if (self.target_um is None) != (self.tolerance_um is None):
+            raise ValueError('target_um and tolerance_um belong together; give both or none')
+        try:
+            require_band(self.target_um or 0.0, self.tolerance_um or 0.0)
+        except PaintError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class _File(_Band, extra='forbid'):
     """A campaign as it is written."""
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
@@ -50,24 +71,21 @@ class _File(BaseModel, extra='forbid'):
     cell: Name = ''
     date: Name = ''
     operator: Name = ''
-    target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
-    tolerance_um: Number | None = Field(
-        None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
-    )
     zones: Text | None = Field(None, description='the name of a zones file')
 
-    @model_validator(mode='after')
-    def _band(self) -> '_File':
-        if (self.target_um is None) != (self.tolerance_um is None):
-            raise ValueError('target_um and tolerance_um belong together; give both or none')
-        try:
-            require_band(self.target_um or 0.0, self.tolerance_um or 0.0)
-        except PaintError as error:
-            raise ValueError(str(error)) from None
-        return self
+
+def _columns(columns: dict[str, Any]) -> dict[str, Any]:
+    for quantity, said in columns.items():
+        if isinstance(said, dict) != (quantity == 'layers'):
+            raise ValueError(
+                "give 'layers' the columns by the names of the layers, others a column"
+            )
+        if isinstance(said, list) and quantity != 'thickness':
+            raise ValueError(f'{quantity} has one column; only thickness may have a list of them')
+    return columns
 
 
-class _Entry(PaintJob, OnePart):
+class _Entry(PaintJob, OnePart, _Band):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
@@ -83,8 +101,10 @@ class _Entry(PaintJob, OnePart):
     )
     zones: Text | None = Field(None, description="the name of a zones file, if not the campaign's")
     points: Text | None = Field(None, description='the name of a file of measuring points')
-    columns: dict[Quantity, Text | int] = Field(
-        {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
+    columns: Annotated[dict[Quantity, Column], AfterValidator(_columns)] = Field(
+        {},
+        description=f'the heading, or the number from 1, of the column of {_QUANTITIES}; of '
+        "thickness also a list; of layers by their names; 'none' for a quantity that there is not",
     )
     unit: dict[Literal['position', 'thickness'], Unit] = Field(
         {}, description='position: m, mm, cm or inch, and thickness: um, mil or mm'
@@ -187,7 +207,8 @@ def _read_experiments(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
             surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,
         )  # fmt: skip
-        experiment = replace(experiment, layer=layer)
+        band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
+        experiment = replace(experiment, layer=layer, target=band if band[0] else None)
         # What is wanted is the whole film.
         made.append(_with_zones(experiment, entry, zones) if layer == TOTAL else experiment)
     return made

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from scipy.spatial.transform import Rotation
+
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
@@ -84,8 +86,20 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
             skipped = tuple(f'{path}: {n} {what}: left out' for what, n in bag.skipped.items())
             if skipped and source.strict:
                 raise RecordingError(f'{skipped[0]}; mend the recording, or leave out --strict')
-            return replace(brought, warnings=(*brought.warnings, *bag.warnings, *skipped))
-    return _in_part_frame(replace(recorded, source=str(path)), source, None)
+            warnings = (*brought.warnings, *bag.warnings, *skipped)
+            return _turned(replace(brought, warnings=warnings), source)
+    return _turned(_in_part_frame(replace(recorded, source=str(path)), source, None), source)
+
+
+def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
+    """The motion with the axis along which the tool sprays as its z."""
+    if source.tool_axis == 'z':
+        return recorded
+    sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
+    turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])
+    turned = (Rotation.from_quat(recorded.quaternions_xyzw) * turn).as_quat()
+    note = f'its tool sprays along {source.tool_axis}'
+    return _with_note(replace(recorded, quaternions_xyzw=turned), note)
 
 
 def holds_joints(path: Path) -> bool:

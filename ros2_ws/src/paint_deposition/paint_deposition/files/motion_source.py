@@ -67,6 +67,9 @@ class MotionSource(BaseModel, extra='forbid'):
     angle_unit: Literal['deg', 'rad'] | None = Field(
         None, description="'deg' or 'rad', the unit of recorded angles and joints"
     )
+    tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] = Field(
+        'z', description='the axis of the recorded tool along which it sprays, as x of a KUKA'
+    )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
         None, description=f'the pose of the part in the frame of the poses, {POSE_FORMAT}'

@@ -51,7 +51,9 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
         value = first['input']
         of_kind = 'text' if isinstance(value, str) else quoted(value)
         of_kind = 'a list' if isinstance(value, list) else of_kind
-        return f'{where} is {of_kind}; expected the keys {", ".join(model.model_fields)}'
+        fields = model.model_fields
+        keys = sorted(fields, key=lambda name: not fields[name].is_required())
+        return f'{where} is {of_kind}; expected the keys {", ".join(keys)}'
     if first['type'] == 'extra_forbidden':
         return f'{where}: unknown key {quoted(key)}; {did_you_mean(key, model.model_fields)}{more}'
     field = _field(model, first['loc'])
