@@ -1,9 +1,10 @@
 """One file of each layout that gauges write, read without a word about it.
 
-Each holds 21.5, 22.5, 24 and 19.5 um at the points P1 to P4 of a list, in that order, unless it says
-otherwise. The layouts of the makers follow their manuals.
+Each holds 21.5, 22.5, 24 and 19.5 um at the points P1 to P4 of a list, in that order, unless it
+says otherwise. The layouts of the makers follow their manuals.
 """
 
+import json
 import zipfile
 from pathlib import Path
 
@@ -27,21 +28,19 @@ COATMASTER_ROWS = [
     STATES.format('a3', 'door', 3, 0, 'NOK', 'NOK', 'fit failed'),
     STATES.format('a4', 'door', 4, 19.5, 'OK', 'OK', ''),
 ]
-COATMASTER_JSON = '{"instrument": "Flex", "results": [%s]}' % ', '.join(
-    '{%s}'
-    % ', '.join(
-        f'"{key}": {value if key == "thickness" else chr(34) + value + chr(34)}'
-        for key, value in zip(COATMASTER.split(','), row.split(','), strict=True)
-    )
-    for row in COATMASTER_ROWS
-)
+COATMASTER_JSON = json.dumps({
+    'instrument': 'Flex',
+    'results': [
+        dict(zip(COATMASTER.split(','), row.split(','), strict=True)) for row in COATMASTER_ROWS
+    ],
+})  # fmt: skip
 BYK = 'Checkzone;No.;Gloss;Thickness [µm]\n' + ''.join(
     f'{zone};{number};90;{film}\n'
     for zone, number, film in zip('AABB', '1212', ('21,5', '22,5', '24', '19,5'), strict=True)
 )
 BATCH = {
     'header.txt': 'Name,B1\nSerial,784001\nUnits,mil\n',
-    'readings.txt': 'Reading,Value,Time\n1,0.8465,8:15\n2,0.8858,8:15\n3,0.9449,8:16\n4,0.7677,8:17\n',
+    'readings.txt': 'Reading,Value\n1,0.8465\n2,0.8858\n3,0.9449\n4,0.7677\n',
     'statistics.txt': 'Set,Mean,Min,Max\n1,0.86,0.77,0.94\n',
     'B1.json': '{"readings": [{"reading": 1, "value": 0.8465}]}',
 }
@@ -64,12 +63,17 @@ MERGED = [
 
 # The file, its content, the films of each row (or FILMS_UM), and their points (or all in order).
 CASES: dict[str, tuple] = {
-    'coatmaster Flex, CSV or JSON': ('f.csv', '\n'.join([COATMASTER, *COATMASTER_ROWS]), '21.5 22.5 19.5',
-                            'P1 P2 P4'),
+    'coatmaster Flex, CSV or JSON': (
+        'f.csv', '\n'.join([COATMASTER, *COATMASTER_ROWS]), '21.5 22.5 19.5', 'P1 P2 P4',
+    ),
     'coatmaster Flex, JSON': ('f.json', COATMASTER_JSON, '21.5 22.5 19.5', 'P1 P2 P4'),
     'BYK auto-chart': ('f.csv', BYK),
-    'DeFelsko PosiTector, Value': ('f.csv', BATCH['readings.txt'].replace('Value', 'Value (mils)')),
-    'DeFelsko PosiTector, Thickness': ('f.csv', 'Reading,Thickness\n1,21.5\n2,22.5\n3,24\n4,19.5\n'),
+    'DeFelsko PosiTector, Value': (
+        'f.csv', BATCH['readings.txt'].replace('Value', 'Value (mils)'),
+    ),
+    'DeFelsko PosiTector, Thickness': (
+        'f.csv', 'Reading,Thickness\n1,21.5\n2,22.5\n3,24\n4,19.5\n',
+    ),
     'PosiTector batch, folder': ('B1', BATCH),
     'PosiTector batch, zip': ('B1.zip', BATCH),
     'PosiTector, serial': ('f.txt', SERIAL),

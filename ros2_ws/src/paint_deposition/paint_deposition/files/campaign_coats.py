@@ -175,7 +175,6 @@ def _comb_step_um(thickness_um: np.ndarray) -> float:
 
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:
     """The motion of a gun from what it says itself, its coat, and its experiment."""
-
     said: dict[str, Any] = {}
     for one in reversed(levels):
         given = {key: getattr(one, key) for key in one.model_fields_set}

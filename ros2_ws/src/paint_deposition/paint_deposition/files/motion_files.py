@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError

@@ -36,8 +36,8 @@ UNIT_NAMES = {1.0: 'm', 1e-2: 'cm', 1e-3: 'mm', 1e-6: 'µm', 25.4e-6: 'mil', 25.
 # What a heading says of a coordinate beside its axis. A nominal one counts if there is no other.
 NOMINAL = {'nominal', 'nom', 'soll', 'cad', 'design'}
 BESIDE = {
-    'pos', 'position', 'coordinate', 'coordinates', 'koordinate', 'koordinaten', 'act', 'actual',
-    'ist', 'measured', 'gemessen',
+    'pos', 'position', 'coordinate', 'coordinates', 'koordinate', 'koordinaten', 'lage', 'act',
+    'actual', 'ist', 'measured', 'gemessen',
 }  # fmt: skip
 BRACKETED = re.compile(r'[\[(]\s*([^\])]*?)\s*[\])]')
 

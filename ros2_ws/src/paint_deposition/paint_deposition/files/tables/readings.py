@@ -251,7 +251,7 @@ def _without_failed(table: Table, films: list[int]) -> tuple[Table, str]:
     words = [known_columns.plain(heading) for heading in table.headings]
     if gauge is None:
         return table, ''
-    if (count := gauge.columns.get('number')) and not films == [words.index(count)]:
+    if (count := gauge.columns.get('number')) and films != [words.index(count)]:
         texts = table.texts(words.index(count))
         if odd := next((text for text in texts if '.' in text or ',' in text), ''):
             raise table.error(

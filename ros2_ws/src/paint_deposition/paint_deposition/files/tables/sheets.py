@@ -117,7 +117,7 @@ def text_of(cell: Cell) -> str:
 
 
 def _decoded(content: bytes) -> list[tuple[str, str]]:
-    """The text and the encoding's name: by its byte order mark, else UTF-8, else what it may be."""
+    """The text and the encoding's name: by its mark, else UTF-8, else what it may be."""
     marked = [codec for mark, codec in ENCODINGS.items() if content.startswith(mark)]
     found = []
     for codec in marked or ('utf-8', 'cp1252', 'cp932'):

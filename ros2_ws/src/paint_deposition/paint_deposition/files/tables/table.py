@@ -242,9 +242,11 @@ def find_table(
         ranked = [
             (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
         ]
-        for k in range(min(len(above) - 1, MOST_LINES_OF_TITLE)):
-            if two := _on_two_rows(one, k):
-                ranked.append((known(headings_in(two.rows[k])), True, two, k))
+        ranked += [
+            (known(headings_in(two.rows[k])), True, two, k)
+            for k in range(min(len(above) - 1, MOST_LINES_OF_TITLE))
+            if (two := _on_two_rows(one, k))
+        ]
         if not ranked:
             continue
         count, _, best, row = max(ranked, key=lambda rank: rank[:2])
