@@ -17,6 +17,7 @@ from booth import SAMPLES
 from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bag_files import custom_data, open_bag
+from workbook import open_document, open_row
 
 CLAIMED = 1_000_000_000
 J = 0x4E4F534A  # a chunk of JSON
@@ -102,6 +103,11 @@ def _blanks() -> bytes:
     return made.getvalue()
 
 
+def _repeated_cells() -> bytes:
+    row = open_row('A', 1.0, rows=1_000_000, last=16_000)
+    return open_document(open_row('point', 'thickness_um') + row)
+
+
 def _row(text: bytes) -> bytes:
     sheet = targets()['worksheet']
     return sheet.seeds[0].replace(b'</sheetData>', text + b'><v>1</v></c></row></sheetData>')
@@ -135,6 +141,7 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
     'blanks of a workbook': ('workbook', _blanks),
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
+    'repeated cells of an open document': ('workbook', _repeated_cells),
     'arrays of RAPID': ('rapid', lambda: _main(b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;')),
     'copies of RAPID': (
         'rapid',

@@ -162,7 +162,7 @@ class MeasuringPoints:
         """
         labels, by = readings.labels, readings.named_by
         orders = [([str(k) for k in order], count) for order, count in readings.orders]
-        if len(readings) > 1 and len({*(labels or ())}) == 1 and labels[0] not in self.labels:
+        if labels and len(labels) > 1 == len({*labels}) and labels[0] not in self.labels:
             labels = None  # the name of the part, or none
         again = ''
         if labels is not None and by[-1] == 'number' and {*labels}.isdisjoint(self.labels):

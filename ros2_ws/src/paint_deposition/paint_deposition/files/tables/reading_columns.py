@@ -28,8 +28,6 @@ QUANTITIES = (*AXES, *NORMALS, *ALIASES)
 QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
 LAYER = {name: layer for layer, names in LAYERS.items() for name in names}
 FILM_WORDS = {'schichtdicke', 'lackschichtdicke', 'dicke', 'thickness', 'dft', 'film'}
-# Said of a quantity that no column has, whatever stands over it.
-NOT_THERE = ('none', '')
 
 
 @dataclass(frozen=True)
@@ -50,7 +48,7 @@ class Layout:
         said = self.columns.get(quantity)
         said = [*said.values()] if isinstance(said, Mapping) else said
         said = said if isinstance(said, list) else [said]
-        return [name for name in said if str(name or 'none').casefold() not in NOT_THERE]
+        return [name for name in said if str(name).casefold() != 'none']
 
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
@@ -79,13 +77,14 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
     at |= own
     small = [text.casefold() for text in texts]
     for quantity in layout.columns:
-        names = [n if isinstance(n, int) else n.strip().casefold() for n in layout.named(quantity)]
-        numbers = range(1, len(headings) + 1)
-        wanted = [
-            n - 1 if n in numbers else small.index(n) for n in names if n in (*numbers, *small)
-        ]
-        if len(wanted) < len(names):
-            return {}
+        wanted = []
+        for name in layout.named(quantity):
+            if isinstance(name, int) and 1 <= name <= len(headings):
+                wanted.append(name - 1)
+            elif isinstance(name, str) and name.strip().casefold() in small:
+                wanted.append(small.index(name.strip().casefold()))
+            else:
+                return {}
         _assign(at, 'thickness' if quantity == 'layers' else quantity, wanted)
     return at
 
@@ -93,7 +92,7 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
 def layers_of(headings: list[Heading], layout: Layout, films: list[int]) -> list[str]:
     """The layer that each column of the thickness holds; none where they are no layers."""
     if layers := layout.columns.get('layers'):
-        return [*layers]
+        return [name for name, column in layers.items() if column != 'none']
     names = [_layer(headings[k]) for k in films]
     return names if len(films) > 1 and all(names) and 'thickness' not in layout.columns else []
 

@@ -9,6 +9,7 @@ import numpy as np
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.tables import reading_columns as known_columns
 from paint_deposition.files.tables import table as cells_of
+from paint_deposition.files.tables.gauge_formats import ALIASES
 from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
 from paint_deposition.files.tables.reading_columns import (
     AXES,
@@ -68,8 +69,7 @@ class ReadingTable:
         headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
         at = known_columns.columns_of(headings, layout)
         if not known(headings) or (header is None and not numbered):
-            named = [] if header is None else headings
-            why = known_columns.not_found(sheet, named, films, layout)
+            why = known_columns.not_found(sheet, [] if header is None else headings, films, layout)
             raise ReadingsError(f'{path}: {why}')
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         again = [] if header is None else headings_again(table, header, known)
@@ -287,6 +287,6 @@ def _unit_beside(
         return next(iter(units), None)
     for row in sheet.rows[:header]:
         cells = [part for cell in row for part in text_of(cell).split(':') if part]
-        if len(cells) > 1 and ' '.join(words_of(cells[0])) in known_columns.ALIASES['unit']:
+        if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
             return length_of(cells[1])
     return None
