@@ -16,6 +16,7 @@ from mcap.writer import Writer
 from booth import SAMPLES
 from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings import bag_files
 from paint_deposition.files.recordings.bag_files import custom_data, open_bag
 from workbook import open_document, open_row
 
@@ -205,6 +206,27 @@ def test_what_is_nested_without_end_is_refused_in_a_line(what, tmp_path):
     with pytest.raises(PaintError) as refused:
         target.read(path)
     assert '\n' not in str(refused.value)
+
+
+def test_a_recording_that_was_compressed_as_a_whole_is_not_expanded_beyond_measure(
+    tmp_path, monkeypatch
+):
+    """20 MB of zeros in 3 kB, in a place of 10 MB."""
+    monkeypatch.setattr(bag_files, 'MOST_FILE_BYTES', 10_000_000)
+    run = Path(shutil.copytree(SAMPLES / 'panel_577', tmp_path / 'run'))
+    (file,) = run.glob('*.mcap')
+    compressed = file.with_name(f'{file.name}.zstd')
+    compressed.write_bytes(zstandard.ZstdCompressor().compress(file.read_bytes()))
+    file.unlink()
+    told = (run / 'metadata.yaml').read_text().replace(file.name, f'{file.name}.zstd')
+    told = told.replace("compression_format: ''", 'compression_format: zstd')
+    told = told.replace("compression_mode: ''", 'compression_mode: FILE')
+    (run / 'metadata.yaml').write_text(told)
+    with open_bag(run) as bag:
+        assert bag.find('/atomizer/pose')
+    compressed.write_bytes(zstandard.ZstdCompressor().compress(bytes(10_000_000)) * 2)
+    with pytest.raises(PaintError, match=r'it holds over 0\.01 GB, .* \(zstd -d\)'), open_bag(run):
+        pass
 
 
 def test_ten_thousand_headings_are_not_all_shown(tmp_path):
