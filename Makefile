@@ -71,6 +71,7 @@ bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure
 
 docs: build  ## build the site of the documentation into runs/site, links checked
 	@.venv/bin/uv pip install --quiet --require-hashes --python .venv/bin/python -r requirements/docs.txt
+	@$(IN_ENVIRONMENT) PYTHONPATH=docs/site:$$PYTHONPATH python -m generated.files
 	@$(IN_ENVIRONMENT) NO_MKDOCS_2_WARNING=true mkdocs build --quiet
 	@echo 'Built: runs/site/index.html; the search needs python -m http.server --directory runs/site'
 

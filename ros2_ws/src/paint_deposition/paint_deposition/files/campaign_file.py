@@ -34,7 +34,7 @@ Quantity = Literal[
 ]  # fmt: skip
 Column = Text | int | list[Text | int] | dict[Text, Text | int]
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
-_QUANTITIES = ', '.join(get_args(Quantity))
+_QUANTITIES = ', '.join(name for name in get_args(Quantity) if name != 'layers')
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
 # Keys for the head of the report only.
