@@ -216,6 +216,13 @@ def test_what_cannot_be_read_for_certain_is_refused(text, words, tmp_path):
     assert words in str(refused.value)
 
 
+@pytest.mark.parametrize(('suffix', 'rotation'), [('.src', 'kuka'), ('.LS', 'fanuc')])
+def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, tmp_path):
+    (tmp_path / f'door{suffix}').write_text('DEF door()\nLIN P1\nEND\n')
+    with pytest.raises(RecordingError, match=rf'as a table with x, .* --rotation {rotation}$'):
+        read_recording(tmp_path / f'door{suffix}')
+
+
 def test_options_of_other_kinds_of_files_are_refused(tmp_path):
     (tmp_path / 'poses.csv').write_text(LAYOUTS['plain'][0])
     with pytest.raises(RecordingError, match='--pose-topic is for bags'):

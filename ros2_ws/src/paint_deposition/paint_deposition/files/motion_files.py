@@ -26,6 +26,12 @@ if TYPE_CHECKING:
     from paint_deposition.motion.frame_tree import FrameTree
 
 PART = 'part'
+# Programs that are not read, by their suffix: whose they are, and the convention of their angles.
+OTHER_PROGRAMS = {
+    **dict.fromkeys(('.src', '.dat'), ('KUKA', 'kuka')),
+    **dict.fromkeys(('.ls', '.tp'), ('FANUC', 'fanuc')),
+    **dict.fromkeys(('.urp', '.script'), ('Universal Robots', 'rotvec')),
+}
 
 
 @dataclass(frozen=True)
@@ -74,6 +80,12 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         recorded = read_tool_path(path)
     elif is_pose_table(path):
         recorded = read_table(path, source)
+    elif maker := OTHER_PROGRAMS.get(path.suffix.lower()):
+        raise RecordingError(
+            f'{path} is a program for {maker[0]}, which is not read; export the motion from its '
+            'simulation or a trace as a table with x, y, z, the three angles and time_s (or '
+            f'speed_m_per_s), and say --rotation {maker[1]}'
+        )
     else:
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
