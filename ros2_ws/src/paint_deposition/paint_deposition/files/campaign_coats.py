@@ -10,12 +10,12 @@ from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.film.coats import TOTAL, Coats, WetFilms
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.request import validate
 
 # Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.
 TOOTH_UM, FEWEST_TEETH = 5.0, 3
@@ -88,7 +88,7 @@ class LaidCoats:
             ReadingsError: naming the coat or the gun and the key at fault.
         """
         coats = [
-            checked(CoatEntry, f'coat {number}', one, ReadingsError)
+            validate(CoatEntry, f'coat {number}', one, ReadingsError)
             for number, one in enumerate(written, start=1)
         ]
         called = [coat.name for coat in coats]
@@ -100,7 +100,7 @@ class LaidCoats:
         for coat in jobs:
             given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
             for number, one in enumerate(given, start=1):
-                gun = checked(_Gun, f'gun {number}', one, ReadingsError)
+                gun = validate(_Gun, f'gun {number}', one, ReadingsError)
                 whose = f"coat '{coat.name}'" if coats else 'it'
                 whose = whose if given == [{}] else f'gun {number}'
                 guns.append(_motion(folder, (gun, coat, entry), whose))

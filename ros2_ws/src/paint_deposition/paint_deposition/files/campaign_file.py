@@ -14,7 +14,6 @@ from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import Number, OnePart, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
@@ -24,6 +23,7 @@ from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.part.facing import toward_the_guns
+from paint_deposition.request import validate
 
 # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
 MAX_EDGE_LENGTH_M = 0.02
@@ -142,11 +142,11 @@ def read_campaign(
     """
     path = Path(path)
     content = read_yaml(path, 'campaign', ReadingsError)
-    file = checked(_File, f'{path}: campaign', content, ReadingsError)
+    file = validate(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
     names: list[str] = []
     for number, written in enumerate(file.experiments, start=1):
-        entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
+        entry = validate(_Entry, f'{path}: experiment {number}', written, ReadingsError)
         name = entry.name or f'experiment_{number}'
         if name in names:
             raise ReadingsError(f"{path}: two experiments are called '{name}'; rename one")

@@ -15,11 +15,11 @@ from paint_deposition.files.rapid.program import is_rapid, program_trajectory, r
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
 from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, moved
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.request import validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -61,7 +61,7 @@ def read_recording(
         RecordingError: the file, an option, or the frame of the poses is wrong.
     """
     given = {'pose_topic': pose_topic, 'state_topic': state_topic, 'gun_signal': gun_signal}
-    return read_motion(path, checked(MotionSource, 'motion', given | more, RecordingError))
+    return read_motion(path, validate(MotionSource, 'motion', given | more, RecordingError))
 
 
 def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajectory:

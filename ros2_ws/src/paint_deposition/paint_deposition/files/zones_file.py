@@ -9,10 +9,10 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from paint_deposition.errors import PaintError, quoted, some
 from paint_deposition.files.meshes import Triangles, read_triangles
 from paint_deposition.files.motion_source import Number, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
+from paint_deposition.request import validate
 
 # Of each of red, green and blue: brushes mix the colours along their edge.
 SAME_COLOUR = 40
@@ -94,7 +94,7 @@ def read_zones(
         raise PaintError(f"{path}: 'zones' is no list; begin each zone with a dash")
     zones: list[Zone] = []
     for number, written in enumerate(content['zones'], start=1):
-        entry = checked(ZoneEntry, f'{path}: zone {number}', written, PaintError)
+        entry = validate(ZoneEntry, f'{path}: zone {number}', written, PaintError)
         if entry.name in [zone.name for zone in zones]:
             raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
         try:
