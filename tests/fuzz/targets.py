@@ -20,15 +20,13 @@ from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBO
 from paint_deposition.api.shown_results import results_scenes
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.atomic import json_text, write_parquet
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
-from paint_deposition.files.json_files import json_text
 from paint_deposition.files.meshes import read_mesh, write_mesh_ply
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.parquet import write_parquet
-from paint_deposition.files.planned_model import planned_model
-from paint_deposition.files.provenance import origin
+from paint_deposition.files.provenance import origin, planned_model
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover

@@ -13,7 +13,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.inspected import mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
-from paint_deposition.files.json_files import json_text
+from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.effects.user_effects import effect_of
 from paint_deposition.errors import ModelError
-from paint_deposition.files.json_files import plain
+from paint_deposition.files.atomic import plain
 from paint_deposition.model.brush import Brush, SetPoints
 
 COMMENT_COLUMN = 33

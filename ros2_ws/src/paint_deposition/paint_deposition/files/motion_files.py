@@ -209,7 +209,7 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         return recorded
     known = ''
     if bag is not None:
-        from paint_deposition.files.recordings.transforms import read_frames
+        from paint_deposition.files.recordings.pose_topics import read_frames
 
         tree = read_frames(bag)
         if tree.moving_between(named, part):
@@ -238,7 +238,7 @@ def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Traje
     """Bring poses of several frames into one, as the nodes do: a pose without a frame is the
     part's, and one for which no transform is known is left out.
     """
-    from paint_deposition.files.recordings.transforms import lookups, read_frames
+    from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 
     tree, part, frames = read_frames(bag), source.frame_id or PART, np.array(recorded.frames)
     others = Counter(frame for frame in recorded.frames if not is_frame(frame, part))
@@ -267,7 +267,7 @@ def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Traje
 
 def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') -> Trajectory:
     """Transform by where the part is at each time at which it is known."""
-    from paint_deposition.files.recordings.transforms import lookups
+    from paint_deposition.files.recordings.pose_topics import lookups
 
     frames = f"'{part}' in '{recorded.frame_id}'"
     known, transforms = lookups(tree, recorded.frame_id, part, recorded.stamps_ns)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
+from paint_deposition.files.tables.pose_columns import ROTATION_WORDS, is_rotation
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 

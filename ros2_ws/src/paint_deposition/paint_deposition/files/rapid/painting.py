@@ -8,9 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
-from paint_deposition.files.rapid.gun import Gun, Spray, gun_signal, name_of
+from paint_deposition.files.rapid.gun import (
+    Gun,
+    RapidMove,
+    RapidProgram,
+    Spray,
+    gun_signal,
+    name_of,
+)
 from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
-from paint_deposition.files.rapid.moves import RapidMove, RapidProgram
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
 

@@ -10,8 +10,11 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE
-from paint_deposition.files.recordings.pose_topics import pose_topics, read_poses
-from paint_deposition.files.recordings.transforms import moving_transforms
+from paint_deposition.files.recordings.pose_topics import (
+    moving_transforms,
+    pose_topics,
+    read_poses,
+)
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
 

@@ -97,7 +97,7 @@ def motion_of(
         read, log_times_ns, name = read_joint_poses(bag, robot, pose_topic)
     else:
         if tf:
-            from paint_deposition.files.recordings.transforms import read_tf_poses
+            from paint_deposition.files.recordings.pose_topics import read_tf_poses
 
             read, log_times_ns = read_tf_poses(bag, *tf)
             name = f'transforms to {tf[1]}'

@@ -15,9 +15,9 @@ from paint_deposition.files.tables.pose_columns import (
     ROTATION_VECTOR,
     PoseTable,
     column_name,
+    read_rotations,
     translated,
 )
-from paint_deposition.files.tables.rotations import read_rotations
 from paint_deposition.files.tables.table import SWITCHED, find_table
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed

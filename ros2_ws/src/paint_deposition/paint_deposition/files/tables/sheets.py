@@ -11,8 +11,7 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError, some
-from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.parquet import MAGIC, require_pyarrow
+from paint_deposition.files.atomic import MAGIC, read_file, require_pyarrow, require_small_package
 from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES
 
 # Texts without blanks around them; the numbers of a workbook are numbers.

@@ -9,10 +9,15 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.atomic import write_json
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.json_files import write_json
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, PLAN_FILE
-from paint_deposition.files.provenance import model_digest, origin
+from paint_deposition.files.provenance import (
+    DIGEST,
+    IMPROVEMENT_FILE,
+    PLAN_FILE,
+    model_digest,
+    origin,
+)
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
