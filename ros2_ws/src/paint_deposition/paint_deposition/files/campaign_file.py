@@ -25,9 +25,6 @@ from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.request import validate
 
-# Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
-MAX_EDGE_LENGTH_M = 0.02
-
 Quantity = Literal[
     'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',
     'layers',
@@ -174,7 +171,8 @@ def _read_experiments(
     for number, file in enumerate(dict.fromkeys(gun.file for gun in laid.guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
-    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
+    # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
+    surface = read_mesh(files['mesh'], entry.mesh_scale, 0.02, down, entry.body)
     trajectories = [read_motion(gun.file, gun.source) for gun in laid.guns]
     paths = []
     for trajectory, gun in zip(trajectories, laid.guns, strict=True):

@@ -13,8 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import quoted
 
-# Quaternions are written with four digits; further off is damage, not rounding.
-QUATERNION_TOLERANCE = 0.01
 Frame = tuple[np.ndarray, Rotation]  # position [mm] and orientation
 
 
@@ -26,7 +24,8 @@ def frame(pose: Any) -> Frame:
             f'{quoted(pose)} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]'
         )
     norm = math.hypot(*quaternion)
-    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+    # Quaternions are written with four digits; further off is damage, not rounding.
+    if abs(norm - 1.0) > 0.01:
         raise ValueError(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
     return np.array(position), Rotation.from_quat([*quaternion[1:], quaternion[0]])
 

@@ -30,10 +30,6 @@ POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
-# For a trigger without stamps the log times are used, if those of the poses show that recorder and
-# robot have the same clock.
-MAX_CLOCK_OFFSET_S = 1.0
-QUEUE_DEPTH = 500
 
 
 def trajectory_of(
@@ -63,7 +59,9 @@ def trajectory_of(
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
     gun = read_trigger(bag, state_topic)
     offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
-    if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
+    # For a trigger without stamps the log times are used, if those of the poses show that
+    # recorder and robot have the same clock.
+    if gun.by_log_time and abs(offset_s) > 1.0:
         raise RecordingError(
             f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
@@ -188,7 +186,7 @@ def _joint_trajectory(types: Typestore, header: Any, drive: Drive) -> Any:
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
-    qos = [offered_qos(1 if latched else QUEUE_DEPTH, latched=latched)]
+    qos = [offered_qos(1 if latched else 500, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 

@@ -1,4 +1,4 @@
-"""The poses of a recording: from a topic, or from its transforms, /tf_static, part_pose and /tf."""
+"""The poses of a recording: of a topic, or by its transforms, /tf_static, part_pose and /tf."""
 
 import re
 from collections import Counter, defaultdict
@@ -18,7 +18,6 @@ from paint_deposition.motion.frame_tree import FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid
 from paint_deposition.motion.trajectory import Trajectory
 
-STATIC = 'tf_static'
 PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
 
 
@@ -42,7 +41,7 @@ def part_pose_topics(bag: Bag) -> list[str]:
 def _edges(bag: Bag, static: bool) -> list[Edge]:
     """The transforms of a bag, either the static ones or those over time."""
     topics = [topic.name for topic in bag.topics_of(*TF_TYPES)]
-    topics = [name for name in topics if (name.rsplit('/', 1)[-1] == STATIC) == static]
+    topics = [name for name in topics if (name.rsplit('/', 1)[-1] == 'tf_static') == static]
     placed = part_pose_topics(bag) if static else []
     rows: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     parts: dict[tuple[str, str], list[tuple]] = defaultdict(list)
@@ -143,7 +142,6 @@ POSES: dict[str, Callable[[Any], Any]] = {
     PART_POSE_TYPE: lambda message: message.transform,
     ARRAY_TYPE: lambda message: message.poses,
 }
-ELEMENT = re.compile(r'(?P<topic>.*)\[(?P<number>\d+)\]')
 
 
 def pose_topics(bag: Bag) -> list[BagTopic]:
@@ -172,7 +170,7 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
 def _element(name: str) -> tuple[str, int | None]:
     """The topic and the number of '/poses[2]'."""
-    element = ELEMENT.fullmatch(name)
+    element = re.fullmatch(r'(?P<topic>.*)\[(?P<number>\d+)\]', name)
     return (element['topic'], int(element['number'])) if element else (name, None)
 
 

@@ -20,8 +20,6 @@ from paint_deposition.files.tables.table import Table, find_table, headings_in, 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
 
-# No run is longer: the unit is another one.
-LONGEST_RUN_S = 1e6
 POSITION = ('x', 'y', 'z')
 QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ROTATION_VECTOR, ROLL_PITCH_YAW = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
@@ -133,7 +131,8 @@ class PoseTable(Table):
             raise RecordingError(f'{written} has a time that is not finite')
         # Written out, a time of a few letters may have a thousand million digits.
         span_s = (times.max() - times.min()) * scale
-        if span_s > LONGEST_RUN_S or np.abs(times).max() * scale * 1e9 >= 2**63:
+        # No run is longer: the unit is another one.
+        if span_s > 1e6 or np.abs(times).max() * scale * 1e9 >= 2**63:
             raise RecordingError(
                 f'{written} spans {span_s:.3g} s; write its unit in the heading, as in time [ms]'
             )
@@ -191,7 +190,6 @@ def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
     return usual, 'a log of abb_libegm: what the robot measured (R_FB)'
 
 
-ABB_QUATERNION = ('q2', 'q3', 'q4', 'q1')  # the scalar is the first one, q1
 EULER = ('ex', 'ey', 'ez')
 # Angles in the order in which a convention takes them, and the maker who calls them so.
 IN_ORDER = {
@@ -208,7 +206,6 @@ ROTATION_WORDS = (
     'tool, xyz about fixed axes), or kuka, abb, fanuc, rpy, staubli, kawasaki'
 )
 ROTVEC = 'rotvec'
-LARGEST_RAD = 2.0 * np.pi + 1e-6
 
 
 def is_rotation(name: str) -> bool:
@@ -227,7 +224,8 @@ def read_rotations(
     one that can be read in two ways.
     """
     if rotation is None:
-        for names in (QUATERNION, ABB_QUATERNION):
+        # ABB has the scalar first, q1.
+        for names in (QUATERNION, ('q2', 'q3', 'q4', 'q1')):
             if columns := table.find_all(names):
                 order = 'scalar last' if names == QUATERNION else 'q1 the scalar'
                 note = f'quaternion {table.written(columns)} ({order})'
@@ -237,7 +235,7 @@ def read_rotations(
     unit = _unit(table, columns, convention, angle_unit)
     angles = table.values(columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
-    if unit == 'rad' and largest > LARGEST_RAD:
+    if unit == 'rad' and largest > 2.0 * np.pi + 1e-6:
         raise RecordingError(
             f'{written} reach {largest:.4g} and are read in rad; write the unit in the heading, '
             'as in roll [deg], or give --angle-unit deg'

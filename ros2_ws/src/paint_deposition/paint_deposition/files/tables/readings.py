@@ -26,8 +26,6 @@ from paint_deposition.files.tables.reading_columns import (
 from paint_deposition.files.tables.sheets import Sheet, text_of
 from paint_deposition.files.tables.table import Table, is_nothing, is_value
 
-# Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
-LARGEST_PART_M = 20.0
 GUESSED = 'no unit is given'
 
 
@@ -165,7 +163,8 @@ class ReadingTable:
         unit, how = units.pop(), ''
         if unit is None:
             largest = float(np.nanmax(np.abs(values), initial=0.0))
-            unit = 1e-3 if largest > LARGEST_PART_M else 1.0
+            # No part is so large in metres.
+            unit = 1e-3 if largest > 20.0 else 1.0
             how = f' ({GUESSED}; the largest is {largest:.4g})'
         # A division by 1000 comes nearer to the text than a product with 0.001.
         metric = unit in (1.0, 1e-2, 1e-3)
@@ -293,10 +292,6 @@ def _unit_beside(
     return None
 
 
-FEWEST_READINGS = 3
-MOST_FIGURES = 6
-
-
 def rows_of_readings(
     table: Table,
     at: dict[str, list[int]],
@@ -381,7 +376,7 @@ def figures_at_end(texts: Sequence[str]) -> str:
     """
     values = [float(text) for text in texts]
     decimals = [len(text.partition('.')[2]) for text in texts]
-    for count in range(min(MOST_FIGURES, len(values) - FEWEST_READINGS), 0, -1):
+    for count in range(min(6, len(values) - 3), 0, -1):
         before = values[:-count]
         least, most = min(before), max(before)
         if least == most:

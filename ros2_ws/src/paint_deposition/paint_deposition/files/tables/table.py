@@ -16,10 +16,8 @@ from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_
 # A heading further down than this is none.
 MOST_LINES_ABOVE, MOST_LINES_OF_TITLE = 200, 40
 MOST_COMPLAINTS_SHOWN = 8
+NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
-# With one mark only, three digits behind it may be thousands.
-IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
-UNIT_BEHIND = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {
     **dict.fromkeys(('true', 'on', 'yes', 'wahr', 'ein', 'an', 'ja'), 1.0),
@@ -199,7 +197,10 @@ class Table:
                 if isinstance(cell, str) and re.fullmatch(r'[+−-]?[\d.,]+(e[+-]?\d+)?', cell):
                     for mark in {'.', ','} & {*cell}:
                         seen.setdefault(mark, f"'{cell}' in line {line}")
-                    only_in_doubt &= ',' not in cell or bool(IN_DOUBT.fullmatch(cell))
+                    # With one mark only, three digits behind it may be thousands.
+                    only_in_doubt &= ',' not in cell or bool(
+                        re.fullmatch(r'[+-]?[1-9]\d{0,2},\d{3}', cell)
+                    )
         mark, doubt = given or (',' if ',' in seen else '.'), ''
         if not given and len(seen) > 1:
             doubt = (
@@ -342,7 +343,7 @@ def is_nothing(cell: Cell) -> bool:
 
 def _behind(cell: Cell) -> re.Match | None:
     """A number and what stands behind it, such as its unit."""
-    return None if isinstance(cell, float) else UNIT_BEHIND.fullmatch(cell)
+    return None if isinstance(cell, float) else NUMBER_AND_MORE.fullmatch(cell)
 
 
 def _cell(row: list[Cell], column: int) -> Cell:
