@@ -30,6 +30,9 @@ POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
+# For a trigger without stamps the log times are used, if those of the poses show that recorder and
+# robot have the same clock.
+MAX_CLOCK_OFFSET_S = 1.0
 
 
 def trajectory_of(
@@ -59,9 +62,7 @@ def trajectory_of(
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
     gun = read_trigger(bag, state_topic)
     offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
-    # For a trigger without stamps the log times are used, if those of the poses show that
-    # recorder and robot have the same clock.
-    if gun.by_log_time and abs(offset_s) > 1.0:
+    if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
         raise RecordingError(
             f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'

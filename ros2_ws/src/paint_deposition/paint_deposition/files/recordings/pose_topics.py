@@ -18,6 +18,7 @@ from paint_deposition.motion.frame_tree import FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid
 from paint_deposition.motion.trajectory import Trajectory
 
+STATIC = 'tf_static'
 PART_POSE_TYPE = 'geometry_msgs/msg/TransformStamped'
 
 
@@ -41,7 +42,7 @@ def part_pose_topics(bag: Bag) -> list[str]:
 def _edges(bag: Bag, static: bool) -> list[Edge]:
     """The transforms of a bag, either the static ones or those over time."""
     topics = [topic.name for topic in bag.topics_of(*TF_TYPES)]
-    topics = [name for name in topics if (name.rsplit('/', 1)[-1] == 'tf_static') == static]
+    topics = [name for name in topics if (name.rsplit('/', 1)[-1] == STATIC) == static]
     placed = part_pose_topics(bag) if static else []
     rows: dict[tuple[str, str], list[tuple]] = defaultdict(list)
     parts: dict[tuple[str, str], list[tuple]] = defaultdict(list)
