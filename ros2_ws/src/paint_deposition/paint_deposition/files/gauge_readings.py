@@ -11,11 +11,10 @@ import numpy as np
 
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.tables.headings import LENGTHS
+from paint_deposition.files.tables.headings import LENGTHS, shown
 from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.sheets import FORMULA
-from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
 from paint_deposition.part.surface import Surface

@@ -13,9 +13,17 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables import pose_columns
-from paint_deposition.files.tables.headings import ANGLES, BESIDE, TIMES, Heading
+from paint_deposition.files.tables.headings import (
+    ANGLES,
+    BESIDE,
+    TIMES,
+    Heading,
+    find_table,
+    headings_in,
+    rows_below,
+)
 from paint_deposition.files.tables.sheets import text_of
-from paint_deposition.files.tables.table import Table, find_table, headings_in, rows_below
+from paint_deposition.files.tables.table import Table
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading
+from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading, find_table
 from paint_deposition.files.tables.pose_columns import (
     POSITION,
     QUATERNION,
@@ -18,7 +18,7 @@ from paint_deposition.files.tables.pose_columns import (
     read_rotations,
     translated,
 )
-from paint_deposition.files.tables.table import SWITCHED, find_table
+from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality

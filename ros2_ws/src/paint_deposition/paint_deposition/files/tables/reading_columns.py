@@ -16,9 +16,16 @@ from paint_deposition.files.tables.gauge_formats import (
     WET,
     GaugeFormat,
 )
-from paint_deposition.files.tables.headings import BESIDE, NOMINAL, Heading
-from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.table import Table, headings_in, is_value, shown, widest
+from paint_deposition.files.tables.headings import (
+    BESIDE,
+    NOMINAL,
+    Heading,
+    headings_in,
+    shown,
+    widest,
+)
+from paint_deposition.files.tables.sheets import Sheet, is_value, text_of
+from paint_deposition.files.tables.table import Table
 
 AXES = ('x', 'y', 'z')
 ON_FACE = ('from_left', 'height')

@@ -1,7 +1,5 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
-import statistics
-from bisect import bisect
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,22 +7,39 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.tables import reading_columns as known_columns
-from paint_deposition.files.tables import table as cells_of
-from paint_deposition.files.tables.gauge_formats import ALIASES, STATISTIC
-from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
+from paint_deposition.files.tables.gauge_formats import ALIASES
+from paint_deposition.files.tables.headings import (
+    UNIT_NAMES,
+    Heading,
+    find_table,
+    headings_in,
+    length_of,
+    rows_below,
+    words_of,
+)
 from paint_deposition.files.tables.reading_columns import (
     AXES,
+    FILM_UNITS,
+    LENGTH_UNITS,
     NORMALS,
     ON_FACE,
     Layout,
+    columns_of,
     headings_again,
+    layers_of,
+    not_found,
     refuse_cut_numbers,
     refuse_merged,
     refuse_rivals,
 )
+from paint_deposition.files.tables.reading_rows import (
+    figures_at_end,
+    orders_of,
+    rows_of_readings,
+    without_failed,
+)
 from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.table import Table, is_nothing, is_value
+from paint_deposition.files.tables.table import Table
 
 GUESSED = 'no unit is given'
 
@@ -59,21 +74,21 @@ class ReadingTable:
         numbered = 0 < len(numbers) == len(named)
         known = _known(films, layout)
         least = max(numbers) if numbered else 0
-        sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet, least)
+        sheet, header = find_table(path, ReadingsError, known, layout.sheet, least)
         first = 0 if numbered or header is None else header + 1
-        headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
+        headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
         if numbered:
             headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        units_too = 'unit' not in known_columns.columns_of(headings, layout)
-        headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
-        at = known_columns.columns_of(headings, layout)
+        units_too = 'unit' not in columns_of(headings, layout)
+        headings, rows = rows_below(sheet, headings, first, units_too)
+        at = columns_of(headings, layout)
         if not known(headings) or (header is None and not numbered):
-            why = known_columns.not_found(sheet, [] if header is None else headings, films, layout)
+            why = not_found(sheet, [] if header is None else headings, films, layout)
             raise ReadingsError(f'{path}: {why}')
         table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
         again = [] if header is None else headings_again(table, header, known)
         table = table.select([row for row in rows if row not in again])
-        layers = known_columns.layers_of(headings, layout, at['thickness']) if films else []
+        layers = layers_of(headings, layout, at['thickness']) if films else []
         of_user = not {'thickness', 'layers'}.isdisjoint(layout.columns)
         refuse_rivals(table, at, of_user or bool(layers))
         refuse_merged(table, [] if of_user else at.get('thickness', []))
@@ -89,7 +104,7 @@ class ReadingTable:
             raise table.error(doubt)
         failed = ''
         if films:
-            table, failed = _without_failed(table, at['thickness'])
+            table, failed = without_failed(table, at['thickness'])
         if films and layout.zero == 'missing':
             table = table.without(at['thickness'], lambda _, cell: table.is_zero(cell))
         kept, missing, left_out = rows_of_readings(
@@ -154,7 +169,7 @@ class ReadingTable:
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
         units = {given} if given else {heading.unit_m for heading in headings}
         unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
-        if unknown or len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
+        if unknown or len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
             named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
             found = ' and '.join(named)
             raise self.table.error(
@@ -228,7 +243,7 @@ class ReadingTable:
 
 def holds_readings(path: Path) -> bool:
     """Whether a file has a table in which a column is known as the thickness."""
-    return cells_of.find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
+    return find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
 
 
 def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
@@ -236,42 +251,10 @@ def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
     needed = (('thickness',),) if films else (AXES, ON_FACE)
 
     def known(headings: list[Heading]) -> int:
-        at = known_columns.columns_of(headings, layout)
+        at = columns_of(headings, layout)
         return len(at) if any({*names} <= {*at} for names in needed) else 0
 
     return known
-
-
-def _without_failed(table: Table, films: list[int]) -> tuple[Table, str]:
-    """The table without the readings that the gauge itself marks as none, and how many, in words.
-
-    Raises ReadingsError where what a layout calls a count of readings is none.
-    """
-    gauge = known_columns.format_of(table.headings)
-    words = [known_columns.plain(heading) for heading in table.headings]
-    if gauge is None:
-        return table, ''
-    if (count := gauge.columns.get('number')) and films != [words.index(count)]:
-        texts = table.texts(words.index(count))
-        if odd := next((text for text in texts if '.' in text or ',' in text), ''):
-            raise table.error(
-                f"'{table.headings[words.index(count)].text}' counts the readings of a "
-                f"{gauge.name}, and is '{odd}'; name the column of the film with columns: "
-                '{thickness: ...} in the campaign'
-            )
-    states = {k: good for k, word in enumerate(words) if (good := gauge.status.get(word))}
-    cells = {k: table.texts(k) for k in states}
-    failed = {
-        row: table.headings[k].text
-        for k, good in states.items()
-        for row, text in enumerate(cells[k])
-        if text.casefold() not in good
-    }
-    if not failed:
-        return table, ''
-    named = ', '.join(dict.fromkeys(failed.values()))
-    table = table.without(films, lambda row, _: row in failed)
-    return table, f', {len(failed)} of them failed by {named}'
 
 
 def _unit_beside(
@@ -281,7 +264,7 @@ def _unit_beside(
     if 'unit' in at:
         texts = sorted({text for text in table.texts(at['unit'][0]) if text})
         units = {length_of(text) for text in texts}
-        if len(units) > 1 or not units <= {*known_columns.FILM_UNITS}:
+        if len(units) > 1 or not units <= {*FILM_UNITS}:
             found = ', '.join(map(repr, texts))
             raise table.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
         return next(iter(units), None)
@@ -290,114 +273,3 @@ def _unit_beside(
         if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
             return length_of(cells[1])
     return None
-
-
-def rows_of_readings(
-    table: Table,
-    at: dict[str, list[int]],
-    films: bool,
-    numeric: list[int],
-    labels: set[str],
-    bare: bool,
-) -> tuple[list[int], list[int], str]:
-    """Rows that are readings or points, rows without a reading, and in words what else there is.
-
-    A row with a place is one, whatever its label. One without a place, or in a table without
-    places, is a statistic if it begins with the name of one and not with the label of a listed
-    point. In a ``bare`` file, without headings, a row as wide as the others is one too.
-    """
-    kept: list[int] = []
-    unread: list[int] = []
-    nowhere: list[int] = []  # the last rows, if they have neither place nor label
-    count = {'without a reading': 0, 'of statistics': 0, 'of other text': 0}
-    width = len(table.headings)
-    places = [k for q in (*AXES, *ON_FACE) for k in at.get(q, [])]
-    both = 'point' not in at and {'row', 'column'} <= {*at}
-    (label,) = at['column'] if both else at.get('point') or at.get('number') or [-1]
-    thick = at['thickness'] if films else []
-    # The other columns in which the first reading has a number.
-    measured = (row for row in table.rows if any(c < len(row) and is_value(row[c]) for c in thick))
-    first = next(measured, [])[:width]
-    numbered = [c for c, cell in enumerate(first) if is_value(cell) and c not in thick]
-    for k, row in enumerate(table.rows):
-        cells = [*row, *[''] * (width - len(row))]
-        values = [cells[c] for c in thick]
-        placed = any(is_value(cells[c]) for c in places)
-        begins = next(text_of(cell) for cell in cells if cell != '')
-        listed = label >= 0 and (both or text_of(cells[label]) in labels) and cells[label] != ''
-        missing = bool(values) and all(map(is_nothing, values))
-        named = STATISTIC.match(' '.join(words_of(begins))) and not is_nothing(begins)
-        if named and not placed and not listed:
-            count['of statistics'] += 1
-        elif not placed and not any(map(is_value, values)):
-            # A remark has no reading either, but not all other numbers and no n/a in its place.
-            full = bool(numbered) and all(is_value(cells[c]) for c in numbered)
-            missing &= any(values) or full or (bare and len(row) == width)
-            count['without a reading' if missing else 'of other text'] += 1
-            unread += [k] * missing
-        elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
-            table.complain_of_width(k)
-        elif missing:
-            count['without a reading'] += 1
-            unread.append(k)
-        else:
-            kept.append(k)
-            homeless = not placed and (places or label >= 0) and cells[label] == ''
-            nowhere = [*nowhere, k] if homeless else []
-    # Apart from the table, a block of numbers without places or labels is its statistics.
-    if nowhere and nowhere[0] and table.lines[nowhere[0]] > table.lines[nowhere[0] - 1] + 1:
-        kept = kept[: -len(nowhere)]
-        count['of statistics'] += len(nowhere)
-    parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
-    return kept, unread, f'left out: {", ".join(parts)}' if parts else ''
-
-
-def orders_of(
-    table: Table, kept: list[int], unread: list[int], begin: int
-) -> tuple[tuple[list[int], int], ...]:
-    """Numbers of the kept rows from 1 and the number of all; of cells also with blank rows.
-
-    A blank line of a text, or a blank row beside other columns, may part two groups of readings.
-    """
-    lines = table.lines
-    rows, end = sorted([*kept, *unread]), lines[max(kept)] + 1
-    without = [bisect(rows, k) for k in kept]
-    if not table.form.startswith('sheet') or sum(bool(h.text) for h in table.headings) > 1:
-        return ((without, len(rows)),)
-    blank = sorted({*range(begin, end)} - {*lines})
-    with_blank = [n + bisect(blank, lines[k]) for n, k in zip(without, kept, strict=True)]
-    return (without, len(rows)), (with_blank, len(rows) + len(blank))
-
-
-def figures_at_end(texts: Sequence[str]) -> str:
-    """In words the last of these numbers if they are statistics of the rest; else ''.
-
-    One of them is the mean of the rest, as exactly as it is written.
-    """
-    values = [float(text) for text in texts]
-    decimals = [len(text.partition('.')[2]) for text in texts]
-    for count in range(min(6, len(values) - 3), 0, -1):
-        before = values[:-count]
-        least, most = min(before), max(before)
-        if least == most:
-            continue
-        means = {statistics.fmean(before)}
-        figures = means | {
-            statistics.stdev(before), statistics.pstdev(before), statistics.median(before),
-            least, most, most - least, sum(before), float(len(before)),
-        }  # fmt: skip
-
-        def are(known: set[float], count: int = count) -> list[bool]:
-            """Which of the last numbers is one of these."""
-            finest = max(decimals[:-count])
-            half = [0.5 * 10.0 ** -max(d, finest) + 1e-9 for d in decimals[-count:]]
-            last = zip(values[-count:], half, strict=True)
-            return [any(abs(v - one) <= near for one in known) for v, near in last]
-
-        if any(are(means)) and all(are(figures)):
-            named = ', '.join(texts[-count:])
-            last = f'its last {count} values' if count > 1 else 'its last value'
-            return (
-                f'{last}, {named}, may be {"statistics" if count > 1 else "the mean"} of the rest'
-            )
-    return ''

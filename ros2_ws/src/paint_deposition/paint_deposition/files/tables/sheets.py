@@ -12,7 +12,7 @@ from pathlib import Path
 
 from paint_deposition.errors import PaintError, some
 from paint_deposition.files.atomic import MAGIC, read_file, require_pyarrow, require_small_package
-from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES
+from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -266,3 +266,23 @@ def _cell(value: object) -> Cell:
         return float(value)
     text = ' '.join(str(value).strip().splitlines())
     return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
+
+
+def cell_at(row: list[Cell], column: int) -> Cell:
+    """The cell of a row in a column, '' where the row is shorter."""
+    return row[column] if column < len(row) else ''
+
+
+def is_comment(row: list[Cell]) -> bool:
+    """Whether a row is a comment; '#' alone heads a column of numbers."""
+    return text_of(row[0]).startswith('#') and (row[0] != '#' or len(row) == 1)
+
+
+def is_value(cell: Cell) -> bool:
+    """Whether a cell looks like a number, with or without a unit behind it."""
+    return isinstance(cell, float) or re.match(r'[+\-−<>]?\s*[.,]?\d', cell) is not None
+
+
+def is_nothing(cell: Cell) -> bool:
+    """Whether a cell is blank or says that there is no reading."""
+    return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None

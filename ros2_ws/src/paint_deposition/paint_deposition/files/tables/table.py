@@ -8,13 +8,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from paint_deposition.errors import PaintError, some
-from paint_deposition.files.tables.gauge_formats import NOTHING
-from paint_deposition.files.tables.headings import UNITS, Heading, unit_of
-from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
+from paint_deposition.errors import PaintError
+from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
+from paint_deposition.files.tables.sheets import (
+    Cell,
+    cell_at,
+    is_nothing,
+    is_value,
+    text_of,
+)
 
-# A heading further down than this is none.
-MOST_LINES_ABOVE, MOST_LINES_OF_TITLE = 200, 40
 MOST_COMPLAINTS_SHOWN = 8
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
@@ -47,7 +50,7 @@ class Table:
 
     def texts(self, column: int) -> list[str]:
         """A column as texts."""
-        return [text_of(_cell(row, column)) for row in self.rows]
+        return [text_of(cell_at(row, column)) for row in self.rows]
 
     def numbers(
         self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
@@ -60,7 +63,7 @@ class Table:
         values = np.full(len(self), np.nan)
         name = self.headings[column].text or f'column {column + 1}'
         for index, row in enumerate(self.rows):
-            cell = _cell(row, column)
+            cell = cell_at(row, column)
             value = self._number(cell)
             if may_be_empty and is_nothing(cell):
                 continue
@@ -142,7 +145,9 @@ class Table:
         ``at`` gets the new columns of the thickness.
         """
         width, extra = len(self.headings), list[int]()
-        cells = [[text_of(_cell(row, k)).split(';') for k in at['thickness']] for row in self.rows]
+        cells = [
+            [text_of(cell_at(row, k)).split(';') for k in at['thickness']] for row in self.rows
+        ]
         most = max((len(parts) for row in cells for parts in row), default=1)
         if most == 1 or max(map(len, self.rows)) > width:
             return self
@@ -167,11 +172,11 @@ class Table:
         """
         headings, rows = [*self.headings], self.rows
         for k in columns:
-            if not any(_behind(_cell(row, k)) for row in rows[:MOST_LINES_ABOVE]):
+            if not any(_behind(cell_at(row, k)) for row in rows[:MOST_LINES_ABOVE]):
                 continue
-            split = [_behind(_cell(row, k)) for row in rows]
+            split = [_behind(cell_at(row, k)) for row in rows]
             bare = any(
-                not s and is_value(_cell(row, k)) for s, row in zip(split, rows, strict=True)
+                not s and is_value(cell_at(row, k)) for s, row in zip(split, rows, strict=True)
             )
             units = [unit_of(found[2]) for found in split if found]
             all_units = {*units, headings[k].unit or ('' if bare else units[0])}
@@ -193,7 +198,7 @@ class Table:
         seen: dict[str, str] = {}
         only_in_doubt = True
         for row, line in zip(self.rows, self.lines, strict=True):
-            for cell in (_cell(row, column) for column in columns):
+            for cell in (cell_at(row, column) for column in columns):
                 if isinstance(cell, str) and re.fullmatch(r'[+−-]?[\d.,]+(e[+-]?\d+)?', cell):
                     for mark in {'.', ','} & {*cell}:
                         seen.setdefault(mark, f"'{cell}' in line {line}")
@@ -216,135 +221,6 @@ class Table:
         return replace(self, decimal=mark, form=form), doubt
 
 
-def find_table(
-    path: Path,
-    refusal: type[PaintError],
-    known: Callable[[list[Heading]], int],
-    sheet: str = '',
-    columns: int = 0,
-) -> tuple[Sheet, int | None]:
-    """The sheet with a table, and the row of its headings; None where none is found.
-
-    ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
-    ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
-    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
-    tables in several sheets.
-    """
-    sheets = read_sheets(path, refusal)
-    if sheet:
-        named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
-        if not named:
-            there = ', '.join(s.form for s in sheets)
-            raise refusal(f"{path}: there is no sheet '{sheet}' (there are: {there})")
-        sheets = named
-    found: list[tuple[Sheet, int]] = []
-    for one in sheets:
-        above = one.rows[:MOST_LINES_ABOVE]
-        ranked = [
-            (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
-        ]
-        ranked += [
-            (known(headings_in(two.rows[k])), True, two, k)
-            for k in range(min(len(above) - 1, MOST_LINES_OF_TITLE))
-            if (two := _on_two_rows(one, k))
-        ]
-        if not ranked:
-            continue
-        count, _, best, row = max(ranked, key=lambda rank: rank[:2])
-        if count and _is_split_alike(best.rows, row):
-            found.append((best, row))
-    if len(found) > 1 and found[0][0].form.startswith('sheet'):
-        found_in = ' and '.join(one.form for one, _ in found)
-        raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
-    # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
-    wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
-    if found:
-        return (wide or found[-1:])[0]
-    wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
-    if columns and wide_enough:
-        return wide_enough[0], None
-    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
-    by_marks = [s for s in apart if not s.form.startswith('blanks')]
-    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
-
-
-def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
-    """The sheet with two rows as one of headings, None where they hold numbers.
-
-    A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
-    one above it.
-    """
-    upper, lower = sheet.rows[first], sheet.rows[first + 1]
-    if any(map(is_value, [*upper, *lower])) or len(lower) < 2:
-        return None
-    texts, last = list[Cell](), ''
-    for k in range(max(len(upper), len(lower))):
-        above, below = text_of(_cell(upper, k)), text_of(_cell(lower, k))
-        last = above or (last if below else '')
-        texts.append(f'{last} {below}'.strip())
-    rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
-    return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
-
-
-def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
-    """Whether numbers below headings of several cells stand in several cells, too.
-
-    Else the headings are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
-    """
-    below = rows[header + 1 : header + 1 + MOST_LINES_ABOVE]
-    counts = [len(row) > 1 for row in below if re.search(r'\d', ''.join(map(text_of, row)))]
-    return len(rows[header]) == 1 or 2 * sum(counts) >= len(counts)
-
-
-def widest(sheet: Sheet) -> list[Cell]:
-    """The cells of the first row of a sheet with the most of them that are not blank."""
-    above = ([cell for cell in row if cell != ''] for row in sheet.rows[:MOST_LINES_ABOVE])
-    return max(above, key=len, default=[])
-
-
-def headings_in(row: list[Cell]) -> list[Heading]:
-    """The cells of a row as headings."""
-    return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
-
-
-def rows_below(
-    sheet: Sheet, headings: list[Heading], first: int, units_too: bool = True
-) -> tuple[list[Heading], list[int]]:
-    """Rows from ``first`` on without comments; a row of units, if any, goes to the headings."""
-    rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
-    cells = sheet.rows[rows[0]] if rows and units_too else []
-    units = [unit_of(text_of(cell)) for cell in cells]
-    if not UNITS.keys() & {*units} or any(map(is_value, cells)):
-        return headings, rows
-    pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
-    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs], rows[1:]
-
-
-def shown(headings: Sequence[Heading]) -> str:
-    """The headings of a table in brackets, for a message."""
-    named = [repr(heading.text) for heading in headings if heading.text]
-    return f'(columns: {some(named, 20) or "none"})'
-
-
-def is_comment(row: list[Cell]) -> bool:
-    """Whether a row is a comment; '#' alone heads a column of numbers."""
-    return text_of(row[0]).startswith('#') and (row[0] != '#' or len(row) == 1)
-
-
-def is_value(cell: Cell) -> bool:
-    """Whether a cell looks like a number, with or without a unit behind it."""
-    return isinstance(cell, float) or re.match(r'[+\-−<>]?\s*[.,]?\d', cell) is not None
-
-
-def is_nothing(cell: Cell) -> bool:
-    """Whether a cell is blank or says that there is no reading."""
-    return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None
-
-
 def _behind(cell: Cell) -> re.Match | None:
     """A number and what stands behind it, such as its unit."""
     return None if isinstance(cell, float) else NUMBER_AND_MORE.fullmatch(cell)
-
-
-def _cell(row: list[Cell], column: int) -> Cell:
-    return row[column] if column < len(row) else ''
