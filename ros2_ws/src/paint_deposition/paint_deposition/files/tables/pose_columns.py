@@ -87,7 +87,7 @@ class PoseTable(Table):
         table.refuse_errors()
         table = table.without_units_in_cells(range(len(headings)))
         if not sheet.form.startswith('commas'):
-            table, _ = table.with_decimal(range(len(headings)))
+            table = table.with_decimal(range(len(headings)), certain=False)
         return table
 
     def find(self, *names: str) -> int | None:

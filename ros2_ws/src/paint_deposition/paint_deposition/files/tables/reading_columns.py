@@ -3,6 +3,7 @@
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any
 
 from paint_deposition.errors import did_you_mean
@@ -217,47 +218,41 @@ def headings_again(table: Table, header: int, known: Callable[[list[Heading]], i
     return again
 
 
-def refuse_rivals(table: Table, at: dict[str, list[int]], several: bool) -> None:
-    """Refuse several columns of one quantity; those of the thickness may differ in a number.
+def refuse_misleading(
+    table: Table, at: dict[str, list[int]], layout: Layout, layers: list[str], bare: bool
+) -> None:
+    """Refuse columns that may not be what they are taken for, unless the user names them.
 
-    They may be ``several`` where they are layers, or the user names them.
+    Two of one quantity, of which those of the thickness may differ in a number or be ``layers``;
+    a heading that is merged over several; in a ``bare`` file numbers that commas may have cut.
     """
     every = [heading.text for heading in table.headings]
+    of_user = not {'thickness', 'layers'}.isdisjoint(layout.columns)
     for quantity, columns in at.items():
         texts = [every[k] for k in columns]
         if len({*texts}) < len(texts) or every.count(texts[0]) > 1:
             raise table.error(f"two columns are called '{texts[0]}'; keep one")
         stems = {re.sub(r'\d+', '', text) for text in texts}
-        alike = quantity == 'thickness' and (several or len(stems) == 1)
+        alike = quantity == 'thickness' and (of_user or layers or len(stems) == 1)
         if len(columns) > 1 and not alike:
             named = ', '.join(map(repr, texts))
             raise table.error(
                 f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
             )
-
-
-def refuse_merged(table: Table, films: list[int]) -> None:
-    """Refuse numbers without a heading right of the thickness's: it is merged over them."""
-    for column in range(max(films, default=len(table.headings)) + 1, len(table.headings)):
-        if table.headings[column].text:
-            return
+    # Numbers without a heading right of that of the thickness.
+    films = [] if of_user else at.get('thickness', [])
+    beside = range(max(films, default=len(every)) + 1, len(every))
+    for column in takewhile(lambda k: not every[k], beside):
         for row, line in zip(table.rows, table.lines, strict=True):
             if column < len(row) and is_value(row[column]):
                 raise table.error(
-                    f"'{table.headings[films[-1]].text}' stands over several columns or is a "
-                    f"title: '{text_of(row[column])}' beside it in line {line} has no heading; "
+                    f"'{every[films[-1]]}' stands over several columns or is a title: "
+                    f"'{text_of(row[column])}' beside it in line {line} has no heading; "
                     'give each column one, or say columns: {thickness: ...} in the campaign'
                 )
-
-
-def refuse_cut_numbers(table: Table) -> None:
-    """Refuse lines without headings that may be two numbers, or one with a decimal comma."""
-    cells = [text_of(cell) for row in table.rows for cell in row]
-    if (
-        table.form.startswith('commas')
-        and len(cells) == 2 * len(table)
-        and all(map(str.isdigit, cells))
-    ):
+    cells = [text_of(cell) for row in table.rows for cell in row] if bare else []
+    in_doubt = layout.decimal != '.' and table.form.startswith('commas')
+    if in_doubt and len(cells) == 2 * len(table) and all(map(str.isdigit, cells)):
         raise table.error(
             f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
             'decimal comma; say decimal: point if it is two, else put a heading over the column'

@@ -28,9 +28,7 @@ from paint_deposition.files.tables.reading_columns import (
     headings_again,
     layers_of,
     not_found,
-    refuse_cut_numbers,
-    refuse_merged,
-    refuse_rivals,
+    refuse_misleading,
 )
 from paint_deposition.files.tables.reading_rows import (
     figures_at_end,
@@ -69,56 +67,32 @@ class ReadingTable:
         A row with one of ``labels``, those of the listed points, is no statistic. Raises
         ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
+        # The sheet, its headings, and the columns of the quantities.
         named = [name for quantity in layout.columns for name in layout.named(quantity)]
         numbers = [name for name in named if isinstance(name, int)]
-        numbered = 0 < len(numbers) == len(named)
-        known = _known(films, layout)
-        least = max(numbers) if numbered else 0
-        sheet, header = find_table(path, ReadingsError, known, layout.sheet, least)
-        first = 0 if numbered or header is None else header + 1
-        headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
-        if numbered:
-            headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        units_too = 'unit' not in columns_of(headings, layout)
-        headings, rows = rows_below(sheet, headings, first, units_too)
-        at = columns_of(headings, layout)
-        if not known(headings) or (header is None and not numbered):
-            why = not_found(sheet, [] if header is None else headings, films, layout)
-            raise ReadingsError(f'{path}: {why}')
-        table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
-        again = [] if header is None else headings_again(table, header, known)
-        table = table.select([row for row in rows if row not in again])
-        layers = layers_of(headings, layout, at['thickness']) if films else []
-        of_user = not {'thickness', 'layers'}.isdisjoint(layout.columns)
-        refuse_rivals(table, at, of_user or bool(layers))
-        refuse_merged(table, [] if of_user else at.get('thickness', []))
-        if numbered and layout.decimal != '.':
-            refuse_cut_numbers(table)
+        bare = 0 < len(numbers) == len(named)
+        sheet, header, table, at = _columns_in(path, films, layout, max(numbers) if bare else 0)
+        layers = layers_of(table.headings, layout, at['thickness']) if films else []
+        refuse_misleading(table, at, layout, layers, bare)
+        # The cells: one reading in each, its unit in the heading, and none that is no reading.
         if films and not layers:
             table = table.with_repeats_apart(at)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
-        table = table.without_units_in_cells(numeric)
-        table, doubt = table.with_decimal(numeric, layout.decimal)
-        if doubt:
-            raise table.error(doubt)
-        failed = ''
-        if films:
-            table, failed = without_failed(table, at['thickness'])
+        table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
+        table, failed = without_failed(table, at['thickness']) if films else (table, '')
         if films and layout.zero == 'missing':
             table = table.without(at['thickness'], lambda _, cell: table.is_zero(cell))
-        kept, missing, left_out = rows_of_readings(
-            table, at, films, numeric, {*labels}, bare=numbered
-        )
-        left_out += failed
+        # The rows that are readings or points, and their order.
+        kept, missing, left_out = rows_of_readings(table, at, films, numeric, {*labels}, bare)
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
-        begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
+        begin = table.lines[0] if bare else sheet.lines[header or 0] + 1
         orders = orders_of(table, kept, missing, begin)
         table = table.select(kept)
         unit_m = _unit_beside(table, at, sheet, header or 0)
-        return ReadingTable(table, at, layout, orders, unit_m, layers, left_out)
+        return ReadingTable(table, at, layout, orders, unit_m, layers, left_out + failed)
 
     def __len__(self) -> int:
         return len(self.table)
@@ -244,6 +218,30 @@ class ReadingTable:
 def holds_readings(path: Path) -> bool:
     """Whether a file has a table in which a column is known as the thickness."""
     return find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
+
+
+def _columns_in(
+    path: Path, films: bool, layout: Layout, wide: int
+) -> tuple[Sheet, int | None, Table, dict[str, list[int]]]:
+    """The sheet, the row of its headings, the rows below, and the columns of each quantity.
+
+    ``wide`` is the number of columns of a table without headings, 0 for one that has them.
+    """
+    known = _known(films, layout)
+    sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide)
+    headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
+    if wide:
+        headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
+    first = 0 if wide or header is None else header + 1
+    units_too = 'unit' not in columns_of(headings, layout)
+    headings, rows = rows_below(sheet, headings, first, units_too)
+    if not known(headings) or (header is None and not wide):
+        why = not_found(sheet, [] if header is None else headings, films, layout)
+        raise ReadingsError(f'{path}: {why}')
+    table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
+    again = [] if header is None else headings_again(table, header, known)
+    table = table.select([row for row in rows if row not in again])
+    return sheet, header, table, columns_of(headings, layout)
 
 
 def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:

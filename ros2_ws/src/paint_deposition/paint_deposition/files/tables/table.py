@@ -190,10 +190,12 @@ class Table:
             ]
         return replace(self, headings=headings, rows=rows)
 
-    def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
-        """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
+    def with_decimal(
+        self: Kind, columns: Iterable[int], given: str = '', certain: bool = True
+    ) -> Kind:
+        """The table with the decimal mark of these columns, ``given`` where the user says it.
 
-        ``given`` is the mark where the user says it.
+        A mark that is in doubt is refused, unless it need not be ``certain``.
         """
         seen: dict[str, str] = {}
         only_in_doubt = True
@@ -217,8 +219,10 @@ class Table:
                 f'{seen[","]} may have a decimal comma or a comma between thousands; say '
                 'decimal: comma, or leave the thousands unmarked'
             )
+        if doubt and certain:
+            raise self.error(doubt)
         form = self.form + (', decimal comma' if mark == ',' else '')
-        return replace(self, decimal=mark, form=form), doubt
+        return replace(self, decimal=mark, form=form)
 
 
 def _behind(cell: Cell) -> re.Match | None:
