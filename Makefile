@@ -82,7 +82,7 @@ wheel: build  ## build the wheel with compiled code in it, for this Python, into
 	@setup/wheel.sh
 
 lock: build  ## pin the newest library versions that all supported Pythons can use
-	$(PIN) requirements/core.in -o requirements/core.txt
+	$(PIN) requirements/core.in -c requirements/constraints.txt -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
 	$(PIN) requirements/docs.in -c requirements/core.txt -c requirements/dev.txt -o requirements/docs.txt
 	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt --excludes requirements/excluded.txt -o requirements/ros.txt

@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-import numpy as np
 from pydantic_core import to_json, to_jsonable_python
 
 from paint_deposition.errors import ManyError, PaintError
@@ -147,6 +146,8 @@ def plain(value: Any) -> Any:
 
 
 def _without_numpy(value: Any) -> Any:
+    import numpy as np  # what only writes text does without
+
     if isinstance(value, np.ndarray | np.generic):
         return value.tolist()
     raise ValueError(f'{type(value).__name__} cannot be written as JSON')

@@ -104,7 +104,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
 
 def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
     """The motion with the axis along which the tool sprays as its z."""
-    if source.tool_axis == 'z':
+    if not source.tool_axis:
         return recorded
     sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
     turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])

@@ -67,8 +67,8 @@ class MotionSource(BaseModel, extra='forbid'):
     angle_unit: Literal['deg', 'rad'] | None = Field(
         None, description="'deg' or 'rad', the unit of recorded angles and joints"
     )
-    tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] = Field(
-        'z', description='the axis of the recorded tool along which it sprays, as x of a KUKA'
+    tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] | None = Field(
+        None, description='the axis of the recorded tool along which it sprays: x, ... or -z'
     )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(
