@@ -15,7 +15,7 @@ from paint_deposition.files.rapid.program import is_rapid, program_trajectory, r
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
 from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, moved
 from paint_deposition.motion.trajectory import Trajectory
@@ -126,8 +126,10 @@ def holds_joints(path: Path) -> bool:
 def read_table(path: Path, source: MotionSource) -> Trajectory:
     """The motion in a table, in the frame of its poses."""
     source.require_kind(path, 'a table of poses')
-    layout = PoseLayout(source.state_topic, source.pose_unit, source.rotation, source.angle_unit)
-    return read_pose_table(path, layout, _robot(path, source))
+    return read_pose_table(
+        path, _robot(path, source), source.state_topic, source.pose_unit, source.rotation,
+        source.angle_unit,
+    )  # fmt: skip
 
 
 def read_gun_motions(
