@@ -195,6 +195,28 @@ def test_a_count_names_no_point(text, message, written, points):
         read_readings(written('f.csv', text), points)
 
 
+@pytest.mark.parametrize(
+    ('text', 'labels'),
+    [
+        # Points in any order, some of them again.
+        ('no;DFT\n3;20\n1;21\n2;22\n', '3 1 2'),
+        ('no;DFT\n3;20\n1;21\n3;22\n1;20\n', '3 1 3 1'),
+        ('no;DFT\n1;20\n1;21\n2;22\n2;20\n', '1 1 2 2'),
+        # A zone whose first reading is missing.
+        ('Zone;no;DFT\nA;1;20\nA;2;21\nB;1;n/a\nB;2;22\n', '1 2 4'),
+    ],
+)
+def test_numbers_of_points_are_no_count(text, labels, written, points):
+    listed = points.with_name('numbers.csv')
+    listed.write_text(points.read_text().replace('P', ''))
+    assert read_readings(written('f.csv', text), listed).point.tolist() == labels.split()
+
+
+def test_one_wrong_label_is_not_the_name_of_the_part(written, points):
+    with pytest.raises(ReadingsError, match="the readings are called 'P9' to 'P9', and there is"):
+        read_readings(written('f.csv', 'point;DFT\n' + 'P9;20\n' * 4), points)
+
+
 def test_rounds_over_all_points_are_repeats(written, points):
     text = 'Round;No.;DFT\n' + ''.join(f'{r};{k};2{r}\n' for r in (1, 2) for k in range(1, 5))
     listed = points.with_name('numbers.csv')

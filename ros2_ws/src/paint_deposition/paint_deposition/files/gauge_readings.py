@@ -12,7 +12,13 @@ import numpy as np
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.tables.headings import LENGTHS, shown
-from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
+from paint_deposition.files.tables.reading_columns import (
+    AXES,
+    NORMALS,
+    ON_FACE,
+    Layout,
+    format_of,
+)
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.sheets import FORMULA
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
@@ -161,8 +167,9 @@ class MeasuringPoints:
         """
         labels, by = readings.labels, readings.named_by
         orders = [([str(k) for k in order], count) for order, count in readings.orders]
-        if labels and len(labels) > 1 == len({*labels}) and labels[0] not in self.labels:
-            labels = None  # the name of the part, or none
+        if labels and {*labels}.isdisjoint(self.labels) and len({*labels}) == 1:
+            # The name of the part, or none.
+            labels = labels if labels[0] and not format_of(readings.table.headings) else None
         again = ''
         if labels is not None and by[-1] == 'number' and {*labels}.isdisjoint(self.labels):
             labels, by = readings.texts('number'), ('number',)
@@ -192,13 +199,22 @@ class MeasuringPoints:
 
 
 def _counts_anew(readings: ReadingTable, numbers: list[str]) -> str:
-    """In words that a count of readings begins anew and names no points, '' where it does not."""
-    block = f' in each {readings.heading("block")}' if readings.has('block') else ''
-    whole = [int(text) for text in numbers if text.isdigit()]
-    falls = len(whole) == len(numbers) and any(b < a for a, b in pairwise(whole))
-    if falls or (block and len({*numbers}) < len(numbers)):
-        return f"'{readings.heading('number')}' counts anew{block}"
-    return ''
+    """In words that a count of readings begins anew and names no points, '' where it does not.
+
+    It does so where another column changes, or from the same number each time.
+    """
+    if not all(map(str.isdigit, numbers)) or len({*numbers}) == len(numbers):
+        return ''
+    table, counted = readings.table, [int(text) for text in numbers]
+    falls = [row for row, (a, b) in enumerate(pairwise(counted), start=1) if b <= a]
+    for column, heading in enumerate(table.headings):
+        texts = table.texts(column)
+        changes = [row for row, (a, b) in enumerate(pairwise(texts), start=1) if a != b]
+        if changes == falls and column not in readings.at['thickness']:
+            return f"'{readings.heading('number')}' counts anew in each {heading.text}"
+    begins = {counted[row] for row in (0, *falls)}
+    again = len(begins) == 1 < len(counted) / (len(falls) + 1)
+    return f"'{readings.heading('number')}' counts anew" if again else ''
 
 
 def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:

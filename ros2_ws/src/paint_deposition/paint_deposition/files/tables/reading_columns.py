@@ -100,7 +100,7 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
 def layers_of(headings: list[Heading], layout: Layout, films: list[int]) -> list[str]:
     """The layer that each column of the thickness holds; none where they are no layers."""
     if layers := layout.columns.get('layers'):
-        return [name for name, column in layers.items() if column != 'none']
+        return [name for name, column in layers.items() if str(column).casefold() != 'none']
     names = [_layer(headings[k]) for k in films]
     return names if len(films) > 1 and all(names) and 'thickness' not in layout.columns else []
 

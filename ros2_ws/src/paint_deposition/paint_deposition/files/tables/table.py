@@ -18,7 +18,7 @@ from paint_deposition.files.tables.sheets import (
     text_of,
 )
 
-MOST_COMPLAINTS_SHOWN = 8
+MOST_COMPLAINTS_SHOWN, MOST_REPEATS = 8, 50
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 Kind = TypeVar('Kind', bound='Table')
@@ -149,7 +149,7 @@ class Table:
             [text_of(cell_at(row, k)).split(';') for k in at['thickness']] for row in self.rows
         ]
         most = max((len(parts) for row in cells for parts in row), default=1)
-        if most == 1 or max(map(len, self.rows)) > width:
+        if not 1 < most <= MOST_REPEATS or max(map(len, self.rows)) > width:
             return self
         headings, rows = [*self.headings], [[*r, *[''] * (width - len(r))] for r in self.rows]
         for place, k in enumerate(at['thickness']):
