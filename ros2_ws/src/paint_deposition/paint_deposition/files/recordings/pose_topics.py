@@ -59,18 +59,18 @@ def _edges(bag: Bag, static: bool) -> list[Edge]:
             )
     # The last static transform replaces earlier ones, as in tf2.
     last = slice(-1, None) if static else slice(None)
-    return [_edge(*pair, its[last]) for pair, its in (parts | rows).items()]
+    edges = []
+    for (parent, child), its in (parts | rows).items():
+        stamps, log_times, values = map(np.array, zip(*its[last], strict=True))
+        _, first = np.unique(stamps, return_index=True)  # in order, each stamp once
+        values = values[first].astype(float)
+        edges.append(Edge(parent, child, stamps[first], log_times[first], values))
+    return edges
 
 
 def moving_transforms(bag: Bag) -> list[Edge]:
     """The transforms of a bag that come more than once and are not static."""
     return [edge for edge in _edges(bag, static=False) if len(edge.stamps_ns) > 1]
-
-
-def _edge(parent: str, child: str, rows: list[tuple]) -> Edge:
-    stamps, log_times, poses = map(np.array, zip(*rows, strict=True))
-    _, first = np.unique(stamps, return_index=True)  # in order, each stamp once
-    return Edge(parent, child, stamps[first], log_times[first], poses[first].astype(float))
 
 
 def read_frames(bag: Bag) -> FrameTree:
