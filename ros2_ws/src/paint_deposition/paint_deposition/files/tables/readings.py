@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.tables.gauge_formats import ALIASES
+from paint_deposition.files.tables.gauge_formats import ALIASES, FOLDERS
 from paint_deposition.files.tables.headings import (
     UNIT_NAMES,
     Heading,
@@ -213,6 +213,14 @@ class ReadingTable:
             np.array(self.layers)[which] if self.layers else np.array(self.texts('layer'))[row]
         )
         return values[row, which] * factor, row, layers, words
+
+
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, a zip, Parquet, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() in ('.json', '.zip', '.parquet')
 
 
 def holds_readings(path: Path) -> bool:
