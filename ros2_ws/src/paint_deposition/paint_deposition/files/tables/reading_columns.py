@@ -252,7 +252,7 @@ def refuse_misleading(
                 )
     cells = [text_of(cell) for row in table.rows for cell in row] if bare else []
     in_doubt = layout.decimal != '.' and table.form.startswith('commas')
-    if in_doubt and len(cells) == 2 * len(table) and all(map(str.isdigit, cells)):
+    if cells and in_doubt and len(cells) == 2 * len(table) and all(map(str.isdigit, cells)):
         raise table.error(
             f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
             'decimal comma; say decimal: point if it is two, else put a heading over the column'
