@@ -143,6 +143,7 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'blanks of a workbook': ('workbook', _blanks),
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
     'repeated cells of an open document': ('workbook', _repeated_cells),
+    'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     'arrays of RAPID': ('rapid', lambda: _main(b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;')),
     'copies of RAPID': (
         'rapid',

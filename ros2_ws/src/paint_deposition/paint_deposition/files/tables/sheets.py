@@ -24,7 +24,7 @@ ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': '
 MOST_CELLS = 10_000_000
 MOST_TABLE_MB = 500
 # The place of a cell, of a row, or of the end of the table.
-XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]{0,3})(\d{1,7})["\']')
+XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
 ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
@@ -61,7 +61,7 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
-    except (zipfile.BadZipFile, RuntimeError) as error:  # encrypted, or of a later version
+    except (zipfile.BadZipFile, RuntimeError, ValueError) as error:  # also encrypted ones
         raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
@@ -208,8 +208,10 @@ def _refuse_far_cells(content: bytes) -> None:
         for name in package.namelist():
             if name.startswith('xl/') and name.endswith('.xml'):
                 places = set(XLSX_CELL.findall(package.read(name)))
-                widths = (sum(26**k * (c & 31) for k, c in enumerate(a[::-1])) for a, _ in places)
-                rows = (int(row) for _, row in places)
+                # As many letters and digits as make any sheet too large.
+                names = (column[:7][::-1] for column, _ in places)
+                widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
+                rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
                 cells = max(cells, max(widths, default=0) * max(rows, default=0))
             if name == 'content.xml':
                 cells = max(cells, _cells_of_open_document(package.read(name)))
