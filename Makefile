@@ -71,6 +71,7 @@ bench-loop: build  ## count what diagnosing is worth in evenness: paint, measure
 
 docs: build  ## build the site of the documentation into runs/site, links checked
 	@.venv/bin/uv pip install --quiet --require-hashes --python .venv/bin/python -r requirements/docs.txt
+	@$(IN_ENVIRONMENT) PYTHONPATH=docs/site:$$PYTHONPATH python -m generated.files
 	@$(IN_ENVIRONMENT) NO_MKDOCS_2_WARNING=true mkdocs build --quiet
 	@echo 'Built: runs/site/index.html; the search needs python -m http.server --directory runs/site'
 
@@ -81,7 +82,7 @@ wheel: build  ## build the wheel with compiled code in it, for this Python, into
 	@setup/wheel.sh
 
 lock: build  ## pin the newest library versions that all supported Pythons can use
-	$(PIN) requirements/core.in -o requirements/core.txt
+	$(PIN) requirements/core.in -c requirements/constraints.txt -o requirements/core.txt
 	$(PIN) requirements/dev.in -c requirements/core.txt -o requirements/dev.txt
 	$(PIN) requirements/docs.in -c requirements/core.txt -c requirements/dev.txt -o requirements/docs.txt
 	$(PIN) requirements/ros.in -c requirements/core.txt -c requirements/dev.txt --excludes requirements/excluded.txt -o requirements/ros.txt

@@ -31,7 +31,7 @@ sys.path[:0] = [str(ROOT), str(ROOT / 'tests')]
 from benchmarks.records import add, kept  # noqa: E402
 from benchmarks.scores import failures, reliability_diagram, table  # noqa: E402
 
-import paint_deposition as pd  # noqa: E402
+import paint_deposition as paint  # noqa: E402
 from paint_deposition.inference.diagnosis.discrepancy import PRIOR  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
@@ -123,9 +123,12 @@ def judged(painted: Painted) -> dict:
     """What the diagnosis says of a campaign, and how far it predicts what it has not seen."""
     with tempfile.TemporaryDirectory() as folder:
         file = painted.write(Path(folder) / 'campaign')
-        campaign, unseen = pd.read_campaign(file), pd.read_campaign(file.with_name('unseen.yaml'))
+        campaign, unseen = (
+            paint.read_campaign(file),
+            paint.read_campaign(file.with_name('unseen.yaml')),
+        )
     started = time.process_time()
-    diagnosis = pd.diagnose(campaign)
+    diagnosis = paint.diagnose(campaign)
     seconds = time.process_time() - started
     unknown = diagnosis.unknown
     return {

@@ -102,26 +102,26 @@ class Stages:
 def run_stages(folder: Path, occlusion: bool) -> dict[str, Any]:
     """What `paint simulate` does, one stage after the other, in this process."""
     stages = Stages()
-    pd = stages.of('loading the libraries', _load)
-    log = stages.of('reading the recording', lambda: pd.read_recording(folder / 'gun'))
+    paint = stages.of('loading the libraries', _load)
+    log = stages.of('reading the recording', lambda: paint.read_recording(folder / 'gun'))
     mesh = (folder / 'part.stl', 1.0, COARSER_THAN_ANY_M)
-    surface = stages.of('reading the mesh', lambda: pd.read_mesh(*mesh))
-    model = pd.DepositionModel()
+    surface = stages.of('reading the mesh', lambda: paint.read_mesh(*mesh))
+    model = paint.DepositionModel()
     if occlusion:
         from paint_deposition.effects.catalogue import EFFECTS
 
         model = model.with_effect(EFFECTS['occlusion'].typical())
-    film = stages.of('painting', lambda: pd.simulate(surface, log, model))
-    stages.of('writing and drawing', lambda: pd.write(film, folder / 'film'))
+    film = stages.of('painting', lambda: paint.simulate(surface, log, model))
+    stages.of('writing and drawing', lambda: paint.write(film, folder / 'film'))
     return {'vertices': len(surface.vertices_m), 'stages': stages.rows}
 
 
 def _load() -> Any:
-    import paint_deposition as pd
+    import paint_deposition as paint
 
     for name in ('read_recording', 'read_mesh', 'simulate', 'write'):
-        getattr(pd, name)
-    return pd
+        getattr(paint, name)
+    return paint
 
 
 def run_command(folder: Path) -> dict[str, float]:

@@ -22,7 +22,7 @@ from tests.virtual_paint_shop.programme import Evenness, Painted, driven
 from tests.virtual_paint_shop.shop import Campaign, generate
 from tests.virtual_paint_shop.truths import choose
 
-import paint_deposition as pd
+import paint_deposition as paint
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.motion.trajectory import Trajectory
@@ -87,11 +87,11 @@ def run_one(job: tuple[int, str, int]) -> list[dict]:
 
 def _turned(world: World) -> dict:
     rng = stream(world.seed, 90)
-    calibration = pd.calibrate(world.campaign('calibration'))
+    calibration = paint.calibrate(world.campaign('calibration'))
     vertices, faces = world.part.mesh()
-    surface = pd.Surface.from_triangles(vertices, faces, 0.02)
+    surface = paint.Surface.from_triangles(vertices, faces, 0.02)
     target = 20.0
-    plan = pd.plan(surface, calibration.model, target_um=target, optimise=True)
+    plan = paint.plan(surface, calibration.model, target_um=target, optimise=True)
     given = plan.trajectory
     judged = scatter(world.part, JUDGED, rng, 0.0)
     judged = _on(surface, plan.painted, world.part, *judged)
@@ -104,14 +104,16 @@ def _turned(world: World) -> dict:
         if turn == TURNS:
             break
         doors.append(door.measured(*spots, NOISE))
-        found = pd.diagnose(world.campaign(f'turn_{turn}', *doors))
+        found = paint.diagnose(world.campaign(f'turn_{turn}', *doors))
         said.append({'verdict': found.verdict, 'accepted': list(found.accepted)})
         if found.verdict != 'none_missing':
             best = found
-        better = pd.improve(surface, given, best.model, posterior=best.posterior, target_um=target)
+        better = paint.improve(
+            surface, given, best.model, posterior=best.posterior, target_um=target
+        )
         trajectory = better.trajectory
     known = _oracle(world, given, rng)
-    ideal = pd.improve(surface, given, known, target_um=target).trajectory
+    ideal = paint.improve(surface, given, known, target_um=target).trajectory
     return {
         'said': said,
         'turns': films,
@@ -124,11 +126,11 @@ def _oracle(world: World, given: Trajectory, rng: np.random.Generator):
     spots = scatter(world.part, ORACLE_READINGS, rng, 0.005)
     dense = world.painted('dense', given, 0).measured(*spots, None)
     campaign = world.campaign('oracle', dense)
-    model = pd.calibrate(campaign).model
+    model = paint.calibrate(campaign).model
     for truth in world.truths:
         if truth.id in EFFECTS and model.effect(truth.id) is None:
-            model = pd.refit(campaign, truth.id, model).model
-    return pd.refit(campaign, 'learned:place', model).model
+            model = paint.refit(campaign, truth.id, model).model
+    return paint.refit(campaign, 'learned:place', model).model
 
 
 def _on(surface, painted, part, x_m, z_m):

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import click
 
-import paint_deposition as pd
+import paint_deposition as paint
 from nature.sprays import HEIGHTS_IN, NOZZLES, SCALE_M_PER_IN, spray_campaign
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -53,7 +53,7 @@ def judged(case: Case, table: Path) -> tuple[str, str]:
     """'right', 'wrong' or 'cannot tell', and the groups that were named."""
     with tempfile.TemporaryDirectory() as folder:
         path = spray_campaign(table, case.nozzle, Path(folder) / 'campaign', **case.options)
-        found = pd.diagnose(pd.read_campaign(path))
+        found = paint.diagnose(paint.read_campaign(path))
     named = [c for c in found.classes if c.best in found.accepted and ':' not in c.best]
     words = ' and '.join('{' + ', '.join(c.members) + '}' for c in named) or 'none'
     if not case.right:

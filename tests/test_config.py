@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.campaign_file import _Entry, _File, read_campaign
+from paint_deposition.files.campaign_file import _Band, _Entry, _File, read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.motion_source import MOTION_KINDS
@@ -42,7 +42,8 @@ def test_campaign_names_every_key_and_can_be_read_with_all_of_them(tmp_path):
     text = re.sub(r'^ *sheet: .*\n', '', text, flags=re.M)  # a CSV file has no sheets
     entries = yaml.safe_load(text)['experiments']
     # Keys of other kinds of motion stand by themselves: no recording has them all.
-    others = {'sheet', 'frame_id', 'guns', 'coats', *MOTION_KINDS} - {'pose_topic', 'state_topic'}
+    others = {'sheet', 'frame_id', 'tool_axis', 'guns', 'coats', *_Band.model_fields}
+    others = others | {*MOTION_KINDS} - {'pose_topic', 'state_topic'}
     assert set(_Entry.model_fields) - others <= set(entries[-1])
     campaign = tmp_path / 'campaign.yaml'
     campaign.write_text(text)

@@ -16,6 +16,15 @@ PAGES = sorted([*ROOT.glob('*.md'), *(ROOT / 'docs').glob('*.md')])
 every_page = pytest.mark.parametrize('page', PAGES, ids=lambda page: page.stem)
 
 
+def test_the_keys_of_files_are_as_the_code_has_them(monkeypatch):
+    """`make docs` writes them anew."""
+    monkeypatch.syspath_prepend(str(ROOT / 'docs/site'))
+    from generated import files
+
+    page = (ROOT / 'docs/files.md').read_text(encoding='utf-8')
+    assert files.written(page) == page
+
+
 @every_page
 def test_links_lead_to_files_and_headings(page: Path):
     broken = []

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 import paint_deposition as pd
 from booth import SAMPLES
-from paint_deposition.files.json_files import json_text
+from paint_deposition.files.atomic import json_text
 
 matplotlib.use('Agg')
 

@@ -2,7 +2,8 @@
 
 The pages are plain Markdown with links that work in the repository. Here a link to a file outside
 docs/ leads to a page that shows the file, `<!-- generated: NAME -->` is replaced by what the code
-says, and formulas become MathML, so that no script has to be fetched to show them.
+says (docs/files.md has it already), and formulas become MathML, so that no script has to be
+fetched to show them.
 """
 
 import html
@@ -12,7 +13,6 @@ import warnings
 from pathlib import Path
 
 from generated import commands, effects, messages, nodes, python
-from generated import files as files_
 from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
@@ -28,7 +28,7 @@ warnings.filterwarnings('ignore', category=DeprecationWarning, module='lark')
 
 MAKERS = {
     module.__name__.rpartition('.')[2]: module.text
-    for module in (commands, effects, files_, messages, nodes, python)
+    for module in (commands, effects, messages, nodes, python)
 } | {'covariates': effects.covariates}
 LANGUAGES = {'.yaml': 'yaml', '.py': 'python', '.xml': 'xml', '.json': 'json', '.csv': 'text'}
 
@@ -66,7 +66,7 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     # Not in blocks of code.
     parts = re.split(r'(^```.*?^```)', markdown, flags=re.DOTALL | re.MULTILINE)
     markdown = ''.join(LINK.sub(link, p) if not p.startswith('```') else p for p in parts)
-    return GENERATED.sub(lambda found: MAKERS[found[1]](), markdown)
+    return GENERATED.sub(lambda found: MAKERS.get(found[1], str)(), markdown)
 
 
 def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files) -> str:

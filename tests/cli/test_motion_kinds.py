@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from files.recorded import Messages, write_bag
-from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.rapid.program import module_text
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.motion.programmed import PROGRAMMED, Move

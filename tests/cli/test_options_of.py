@@ -67,9 +67,9 @@ def test_what_is_out_of_bounds_is_refused_by_the_name_of_its_option(words, said)
 @pytest.mark.parametrize(
     ('values', 'said'),
     [
-        ({'speed_m_per_s': -1.0}, 'speed_m_per_s is -1; give a number above 0'),
-        ({'direction': 'up'}, "direction is 'up'; give 'level' or 'upright'"),
-        ({'speed': 0.4}, "speed is no option here; did you mean 'speed_m_per_s'"),
+        ({'speed_m_per_s': -1.0}, 'speed_m_per_s is -1; expected a number above 0'),
+        ({'direction': 'up'}, "direction is 'up'; expected 'level' or 'upright'"),
+        ({'speed': 0.4}, "unknown key 'speed'; did you mean 'speed_m_per_s'"),
     ],
 )
 def test_a_script_is_refused_by_the_name_of_the_field(values, said):

@@ -11,8 +11,7 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.planned_model import planned_model
-from paint_deposition.files.provenance import model_digest, origin
+from paint_deposition.files.provenance import model_digest, origin, planned_model
 from paint_deposition.motion.programmed import PROGRAMMED
 
 PANEL = SAMPLES / 'panel.stl'

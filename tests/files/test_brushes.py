@@ -13,8 +13,7 @@ from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.files.rapid.program import program_trajectory, read_program
-from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.rapid.program import module_text, program_trajectory, read_program
 from paint_deposition.motion.programmed import GunSwitch, Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))

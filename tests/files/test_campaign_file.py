@@ -94,6 +94,8 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'down': 'z'}, r"down is 'z'; expected \[x, y, z\]"),
         ({'down': [0, 0, float('nan')]}, r'down.2 is nan; expected \[x, y, z\]'),
         ({'columns': {'thick': 'DFT'}}, "columns.thick is 'thick'; expected the heading.* x, y"),
+        ({'columns': {'x': ['a', 'b']}}, 'x has one column; only thickness may have a list'),
+        ({'columns': {'layers': 'a'}}, "give 'layers' the columns by the names of the layers"),
         ({'unit': {'thickness': 'inches'}}, "thickness is 'inches'; expected position: m, mm"),
         ({'points': 'none.csv'}, r'none\.csv: no such file'),
         ({'switched_off': ['light']}, r"switched_off.0 is 'light'; expected"),
@@ -128,7 +130,7 @@ def test_two_experiments_need_two_names(campaign):
         (b'PK\x03\x04\x9c\xff', 'is no text, such as a workbook or a bag; give a campaign YAML'),
         ('experiments: [', 'cannot be read as YAML .*line'),
         ('experiments: []\nexperiments: []', 'line 2: found duplicate key "experiments"'),
-        ('just words', 'campaign is text; expected the keys experiments, model'),
+        ('just words', 'campaign is text; expected the keys experiments, '),
     ],
 )
 def test_a_file_that_is_no_campaign_is_refused(tmp_path, text, message):
@@ -165,6 +167,34 @@ def test_readings_join_their_listed_points(campaign, folder):
     assert joined.thickness_um.tolist() == as_before.thickness_um.tolist()
     assert joined.positions_m.tolist() == as_before.positions_m.tolist()
     assert joined.point.tolist() == as_before.point.tolist()
+
+
+def test_teeth_of_a_comb_read_low_and_as_likely_anywhere_in_their_step(campaign, folder):
+    def tooth(row):
+        return [str(float(v) // 5 * 5) if k == 'thickness_um' else v for k, v in row.items()]
+
+    comb = changed_readings(folder, tooth)
+    dry = read_campaign(campaign(measurements=comb)).readings
+    read = read_campaign(campaign(measurements=comb, wet=True, solids=0.4))
+    assert read.readings.thickness_um == pytest.approx(0.4 * (dry.thickness_um + 2.5))
+    assert read.readings.sigma_um == pytest.approx(0.4 * 5.0 / 12**0.5)
+    assert 'a comb in steps of 5 µm, half of which is added' in read.understood[0]
+
+
+def test_an_experiment_has_its_own_target(campaign):
+    read = read_campaign(campaign(top={'target_um': 25, 'tolerance_um': 4}))
+    assert read.target_of(read.experiments[0]) == (25.0, 4.0)
+    top = {'target_um': 25, 'tolerance_um': 4}
+    read = read_campaign(campaign(top=top, target_um=30, tolerance_um=5))
+    assert read.target_of(read.experiments[0]) == (30.0, 5.0)
+
+
+def test_what_an_experiment_says_of_its_motion_holds_for_its_guns(campaign):
+    """Not the default of a gun that says nothing."""
+    guns = [{'trajectory': 'door'}, {'trajectory': 'door', 'tool_axis': 'z'}]
+    one = read_campaign(campaign(guns=guns, tool_axis='-z')).experiments[0]
+    first, second = np.split(one.path.rotation[:, :, 2], 2)
+    assert first == pytest.approx(-second)
 
 
 def test_normals_pointing_into_the_part_are_refused(campaign, folder):

@@ -71,6 +71,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
         ([HEADER, '0,0,0'], 'line 2: 3 values under 4 column names'),
         ([HEADER, '0,0,0,20', '', '0,0,1,20,5'], 'line 4: 5 values under 4 column names'),
         ([HEADER, '0,0,0,'], 'no readings below the header'),
+        ([HEADER], 'no readings below the header'),
         ([HEADER, '0,0 um,0,20'], "line 2: y_m is '0 um'; expected a number with a decimal point"),
         ([HEADER, '0,nan,0,20'], 'line 2: y_m is nan; expected a finite number'),
         ([HEADER, '0,0,0,-9'], 'line 2: thickness_um is -9; expected -5 to 5000 micrometres'),

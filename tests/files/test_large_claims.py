@@ -16,7 +16,9 @@ from mcap.writer import Writer
 from booth import SAMPLES
 from fuzz.targets import RAPID, targets
 from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings import bag_files
 from paint_deposition.files.recordings.bag_files import custom_data, open_bag
+from workbook import open_document, open_row
 
 CLAIMED = 1_000_000_000
 J = 0x4E4F534A  # a chunk of JSON
@@ -102,6 +104,11 @@ def _blanks() -> bytes:
     return made.getvalue()
 
 
+def _repeated_cells() -> bytes:
+    row = open_row('A', 1.0, rows=1_000_000, last=16_000)
+    return open_document(open_row('point', 'thickness_um') + row)
+
+
 def _row(text: bytes) -> bytes:
     sheet = targets()['worksheet']
     return sheet.seeds[0].replace(b'</sheetData>', text + b'><v>1</v></c></row></sheetData>')
@@ -135,6 +142,8 @@ CLAIMS: dict[str, tuple[str, Callable[[], bytes]]] = {
     'strings of a schema': ('mcap', lambda: _mcap_with(b'string[2000000000] a\n')),
     'blanks of a workbook': ('workbook', _blanks),
     'a far row of a workbook': ('worksheet', lambda: _row(b'<row r="1048576"><c r="XFD1"')),
+    'repeated cells of an open document': ('workbook', _repeated_cells),
+    'a cell no sheet has': ('worksheet', lambda: _row(b'<row r="1"><c r="AAAAA999999991"')),
     'arrays of RAPID': ('rapid', lambda: _main(b'VAR num x{1000,1000,1000}; x{1,1,1}:=1;')),
     'copies of RAPID': (
         'rapid',
@@ -198,6 +207,27 @@ def test_what_is_nested_without_end_is_refused_in_a_line(what, tmp_path):
     with pytest.raises(PaintError) as refused:
         target.read(path)
     assert '\n' not in str(refused.value)
+
+
+def test_a_recording_that_was_compressed_as_a_whole_is_not_expanded_beyond_measure(
+    tmp_path, monkeypatch
+):
+    """20 MB of zeros in 3 kB, in a place of 10 MB."""
+    monkeypatch.setattr(bag_files, 'MOST_FILE_BYTES', 10_000_000)
+    run = Path(shutil.copytree(SAMPLES / 'panel_577', tmp_path / 'run'))
+    (file,) = run.glob('*.mcap')
+    compressed = file.with_name(f'{file.name}.zstd')
+    compressed.write_bytes(zstandard.ZstdCompressor().compress(file.read_bytes()))
+    file.unlink()
+    told = (run / 'metadata.yaml').read_text().replace(file.name, f'{file.name}.zstd')
+    told = told.replace("compression_format: ''", 'compression_format: zstd')
+    told = told.replace("compression_mode: ''", 'compression_mode: FILE')
+    (run / 'metadata.yaml').write_text(told)
+    with open_bag(run) as bag:
+        assert bag.find('/atomizer/pose')
+    compressed.write_bytes(zstandard.ZstdCompressor().compress(bytes(10_000_000)) * 2)
+    with pytest.raises(PaintError, match=r'it holds over 0\.01 GB, .* \(zstd -d\)'), open_bag(run):
+        pass
 
 
 def test_ten_thousand_headings_are_not_all_shown(tmp_path):

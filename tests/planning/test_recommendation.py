@@ -170,14 +170,14 @@ def test_what_is_not_known_with_effects_is_left_out_and_named():
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'speed_m_per_s': -0.2}, 'speed_m_per_s is -0.2'),
-        ({'speed_m_per_s': 200.0}, 'give at most 3: Speed of the passes .m/s.'),
+        ({'speed_m_per_s': 200.0}, 'a number 0.005 to 3: Speed of the passes'),
         ({'speed_m_per_s': None, 'target_um': 2e4}, 'the closest is'),
         ({'tolerance': 1e-5}, r'the closest is 0\.\d+ %'),
         ({'index_min_m': 0.9}, 'is empty'),
         ({'index_min_m': 2.5, 'index_max_m': 3.0}, 'bare stripes'),
         ({'width_m': math.nan}, 'width_m is nan'),
-        ({'width_m': 1200.0}, 'width_m is 1200; give at most 100'),
-        ({'index_min_m': 1e-5}, 'index_min_m is 1e-05; give at least 0.001'),
+        ({'width_m': 1200.0}, 'width_m is 1200; expected a number above 0 and up to 100'),
+        ({'index_min_m': 1e-5}, 'index_min_m is 1e-05; expected a number 0.001 to'),
     ],
 )
 def test_impossible_requests_say_why(what, words):

@@ -1,5 +1,10 @@
-"""The keys of the files that people write, from the models that check them."""
+"""The keys of the files that people write, from the models that check them.
 
+``python -m generated.files`` in docs/site writes them into docs/files.md, as `make docs` does.
+"""
+
+import re
+from pathlib import Path
 from typing import Any
 
 from pydantic import BaseModel
@@ -8,13 +13,21 @@ from generated.markdown import table
 from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
-from paint_deposition.files.tables.reading_columns import ALIASES, OWN
+from paint_deposition.files.tables.gauge_formats import (
+    ALIASES,
+    FOLDERS,
+    FORMATS,
+    LAYERS,
+    LINES,
+    OWN,
+)
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.brush import SetPoints
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
+BEGIN, END = '<!-- generated: files -->', '<!-- end of generated -->'
 MODEL = """
 A model has `planar` or `brushes` by their numbers, `projection`, a list of
 [`effects`](effects.md), and a `name`; a fit adds `uncertainty`, `history` and `posterior`.
@@ -43,10 +56,33 @@ def text() -> str:
         '## A part\n', _keys(OnePart),
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),
+        'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
+        '\nLayouts known by their headings, `#` a number:\n',
+        table(('layout', 'known by', 'columns', 'no reading unless'), _layouts()),
         '## Sweep\n', 'Also the keys of [a motion](#a-motion).\n',
         _keys(SweepFile, without=MOTION),
         '### `passes`\n', _keys(Passes), '### `sample`\n', _keys(Sample),
     ])  # fmt: skip
+
+
+def written(page: str) -> str:
+    """The page docs/files.md with what it says of the code."""
+    made = text().replace('\n\n\n', '\n\n').strip()
+    return re.sub(f'({BEGIN}\n).*?(\n{END})', lambda found: found[1] + made + found[2], page,
+                  flags=re.DOTALL)  # fmt: skip
+
+
+def _layouts() -> list[tuple[str, str, str, str]]:
+    rows = [
+        (
+            one.name, ', '.join(one.shown_by),
+            ', '.join(f'{quantity}: {heading}' for quantity, heading in one.columns.items()),
+            ', '.join(f'{heading} is {good[1]}' for heading, good in one.status.items()),
+        )
+        for one in FORMATS
+    ]  # fmt: skip
+    rows += [(n, 'its lines', ', '.join(line.groupindex), '') for n, line in LINES.items()]
+    return rows + [(f'{n}, folder or zip', ', '.join(f), '', '') for n, f in FOLDERS.items()]
 
 
 def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
@@ -79,3 +115,8 @@ def _default(said: dict[str, Any], key: str, schema: dict[str, Any]) -> str:
         return f'`{value}`'.lower()
     shown = value not in (None, '', [], {}) and not isinstance(value, dict)
     return f'`{value}`' if shown else ''
+
+
+if __name__ == '__main__':
+    page = Path(__file__).resolve().parents[2] / 'files.md'
+    page.write_text(written(page.read_text(encoding='utf-8')), encoding='utf-8')

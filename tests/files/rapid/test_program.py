@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.rapid import interpreter
-from paint_deposition.files.rapid.program import RapidProgram, read_program
-from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.rapid.program import RapidProgram, module_text, read_program
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.programmed import GunSwitch, Move
 from robot_arm import TIP_M, urdf

@@ -74,7 +74,7 @@ POSITECTOR = """"PosiSoft Desktop"
 "3","0.9449","3/12/2026","8:16 AM","A2"
 "4","0.7638","3/12/2026","8:16 AM","A3"
 """
-POINTS = 'Name;X;Y;Z;Bemerkung\nA1;100,0;1,5;50,0;\nA2;100,0;1,5;200,0;\nA3;250,0;1,5;350,0;\n'
+POINTS = 'Name;X;Y;Z;Bemerkung\nA1;100,0;0,0;50,0;\nA2;100,0;0,0;200,0;\nA3;250,0;0,0;350,0;\n'
 
 # A measuring robot's list: aligned by blanks, nominal and measured places, the normal.
 ROBOT = """ROBOT CELL 4 / PART 1187-L
@@ -106,37 +106,43 @@ def require_the_four_readings(readings, within_um=1e-9):
     assert readings.positions_m == pytest.approx(POINTS_M[[0, 0, 1, 2]], abs=1e-12)
 
 
-def test_elcometer(file):
-    readings = read_readings(file('batch.csv', ELCOMETER, 'utf-8-sig'))
-    require_the_four_readings(readings)
-    assert readings.understood == (
-        "batch.csv: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from 'Reading'; "
-        'left out: 1 row without a reading, 7 rows of statistics'
-    )
+MAKERS = {
+    'Elcometer': (
+        ELCOMETER, 'utf-8-sig',
+        "a.txt: 4 readings, commas, UTF-8; x, y, z in mm, thickness in µm from 'Reading'; left "
+        'out: 1 row without a reading, 7 rows of statistics',
+    ),
+    'Fischer': (
+        FISCHER, 'cp1252', 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm from',
+    ),
+    'PosiTector': (
+        POSITECTOR, 'utf-8',
+        'of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by '
+        "'Point', thickness in mil from 'Thickness'",
+    ),
+    'measuring robot': (
+        ROBOT, 'utf-16', 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350), '
+        "thickness in µm (no unit is given) from 'DFT'",
+    ),
+}  # fmt: skip
 
 
-def test_fischer(file):
+@pytest.mark.parametrize('maker', MAKERS)
+def test_layouts_of_makers(file, maker):
+    text, encoding, words = MAKERS[maker]
+    points = file('points.csv', POINTS) if maker == 'PosiTector' else None
+    readings = read_readings(file('a.txt', text, encoding), points)
+    require_the_four_readings(readings, 2e-3 if points else 1e-9)
+    assert words in readings.understood
+
+
+def test_predictions_are_written_beside_the_columns_of_the_file(file):
     path = file('panel.txt', FISCHER, 'cp1252')
-    readings = read_readings(path)
-    require_the_four_readings(readings)
-    assert 'tabs, cp1252, decimal comma; x, y, z in mm, thickness in µm' in readings.understood
-    assert '6 rows of statistics' in readings.understood
     written = path.with_name('predicted.csv')
-    write_predictions(written, readings, np.array([1.0, 1.0, 2.0, 3.0]))
+    write_predictions(written, read_readings(path), np.array([1.0, 1.0, 2.0, 3.0]))
     lines = written.read_text().splitlines()
     assert lines[1] == 'A1,"100,0","0,0","50,0","21,5","22,1",1.0000'
     assert len(lines) == 4
-
-
-def test_positector_with_a_list_of_points(file):
-    readings = read_readings(file('B1.csv', POSITECTOR), file('points.csv', POINTS))
-    assert readings.positions_m[:, 1] == pytest.approx(0.0015)
-    readings.positions_m[:, 1] = 0.0
-    require_the_four_readings(readings, within_um=2e-3)
-    assert "of 3 points in points.csv (semicolons, UTF-8, decimal comma), joined by 'Point'" in (
-        readings.understood
-    )
-    assert "thickness in mil from 'Thickness'" in readings.understood
 
 
 def test_spreadsheet(tmp_path):
@@ -176,15 +182,6 @@ def test_open_document_whose_empty_rest_is_said_to_repeat(tmp_path):
     path = tmp_path / 'tuer.ods'
     path.write_bytes(open_document(''.join(open_row(*row, empty=16_379) for row in rows) + rest))
     require_the_four_readings(read_readings(path))
-
-
-def test_measuring_robot(file):
-    readings = read_readings(file('list.txt', ROBOT, 'utf-16'))
-    require_the_four_readings(readings)
-    assert 'blanks, UTF-16; x, y, z in mm (no unit is given; the largest is 350)' in (
-        readings.understood
-    )
-    assert 'thickness in µm (no unit is given)' in readings.understood
 
 
 IN_ORDER = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},0.{k},0,0\n' for k in range(1, 7))
@@ -325,7 +322,7 @@ def test_unlabelled_statistics_below_readings_are_warned_of(file, films, doubt, 
 
 
 def test_decimal_commas_cut_by_the_commas_between_columns_are_warned_of(file):
-    points = file('p.csv', IN_ORDER)
+    points = file('p.csv', 'no,x_m,y_m,z_m\n1,0,0,0\n2,1,0,0\n')
     (doubt,) = read_readings(file('a.csv', 'point,DFT,Remark\n1,20,5\n2,21,0\n'), points).doubts
     assert doubt.startswith("'DFT' has whole numbers only, as has 'Remark' beside it: if decimal")
     for text in ('point,DFT,Remark\n1,20.0,5\n', 'point,DFT,Remark\n1,20,\n', 'DFT,point\n20,1\n'):
@@ -454,7 +451,7 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
     ('text', 'columns', 'message'),
     [
         ('20,5\n21,5\n', {'thickness': 1}, "'20,5' in line 1 may be two numbers or one with a"),
-        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each block"),
+        ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each Block"),
         ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
         ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
@@ -469,9 +466,9 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
         ('a,x,y,z,DFT\n,m,m,m,ell\nP,0,0,0,1\n', {}, "thickness .*; 'DFT' is in 'ell': give it"),
         ('point,DFT (ell)\nP,1\n', {}, "thickness .*; 'DFT .ell.' is in 'ell': give it in µm"),
         (
-            'Point;Primer thickness;Total thickness\nA;1;2\n',
+            'Point;Inner thickness;Outer thickness\nA;1;2\n',
             {},
-            "it may be 'Primer thickness' or 'Total thickness': name one with columns: {thick",
+            "it may be 'Inner thickness' or 'Outer thickness': name one with columns: {thick",
         ),
     ],
 )

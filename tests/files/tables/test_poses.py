@@ -136,6 +136,15 @@ def test_the_trigger_holds_from_its_row_on(heading, flows, options, tmp_path):
     assert f'gun by {heading}' in read.notes[0]
 
 
+@pytest.mark.parametrize('axis', ['x', 'y', 'z', '-x', '-y', '-z'])
+def test_the_tool_may_spray_along_another_of_its_axes(axis, tmp_path):
+    (tmp_path / 'poses.csv').write_text(LAYOUTS['plain'][0])
+    read = read_recording(tmp_path / 'poses.csv', tool_axis=axis)
+    sprays = Rotation.from_quat(read.quaternions_xyzw).as_matrix()[:, :, 2]
+    column = TURNS.as_matrix()[:, :, 'xyz'.index(axis[-1])]
+    assert sprays == pytest.approx(-column if axis[0] == '-' else column, abs=1e-6)
+
+
 def test_what_could_be_the_trigger_is_named(tmp_path):
     rows = [f'{k / 10},{k},2,3,0,0,0,1,{word},0' for k, word in enumerate(('AUS', 'EIN', 'aus'))]
     (tmp_path / 'p.csv').write_text('t,x,y,z,qx,qy,qz,qw,Pistole,DO2\n' + '\n'.join(rows))
@@ -205,6 +214,13 @@ def test_what_cannot_be_read_for_certain_is_refused(text, words, tmp_path):
         read_recording(tmp_path / 'poses.csv')
     assert str(tmp_path / 'poses.csv') in str(refused.value)
     assert words in str(refused.value)
+
+
+@pytest.mark.parametrize(('suffix', 'rotation'), [('.src', 'kuka'), ('.LS', 'fanuc')])
+def test_a_program_that_is_not_read_says_what_to_export(suffix, rotation, tmp_path):
+    (tmp_path / f'door{suffix}').write_text('DEF door()\nLIN P1\nEND\n')
+    with pytest.raises(RecordingError, match=rf'as a table with x, .* --rotation {rotation}$'):
+        read_recording(tmp_path / f'door{suffix}')
 
 
 def test_options_of_other_kinds_of_files_are_refused(tmp_path):

@@ -16,7 +16,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.fog_gradient import FogGradient
-from paint_deposition.files.json_files import json_text
+from paint_deposition.files.atomic import json_text
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
 from paint_deposition.inference.diagnosis.proposals import Place

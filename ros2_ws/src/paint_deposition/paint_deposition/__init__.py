@@ -1,6 +1,6 @@
 """Film build of rotary bell spray painting: simulation, calibration, diagnosis and planning.
 
-`import paint_deposition as pd` costs nothing: the public names, which `__init__.pyi` lists with
+`import paint_deposition as paint` costs nothing: the public names, which `__init__.pyi` lists with
 the modules that define them, are loaded one by one when they are first used.
 """
 

@@ -27,8 +27,7 @@ import paint_deposition
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.user_effects import effect_of
 from paint_deposition.errors import ManyError
-from paint_deposition.files.json_files import json_text
-from paint_deposition.files.parquet import write_parquet
+from paint_deposition.files.atomic import json_text, write_parquet
 
 if TYPE_CHECKING:
     import pyarrow as pa

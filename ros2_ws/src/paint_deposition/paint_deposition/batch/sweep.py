@@ -18,8 +18,7 @@ from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.batch.variations import DRAW
 from paint_deposition.errors import ManyError
-from paint_deposition.files.json_files import write_json
-from paint_deposition.files.parquet import require_pyarrow, write_parquet
+from paint_deposition.files.atomic import require_pyarrow, write_json, write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
 from paint_deposition.report.writers.write import written

@@ -7,8 +7,8 @@ from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_va
 
 from paint_deposition.errors import ManyError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.request import validate
 
 MOST_CASES = 1_000_000
 LIST_WORDS = 'a list of at least one value, or {first: A, last: B, steps: N}'
@@ -131,7 +131,7 @@ def read_sweep(path: str | Path) -> SweepFile:
     content = read_yaml(path, 'sweep', ManyError)
     if not isinstance(content, dict):
         raise ManyError(f'{path}: is not a sweep; expected the keys mesh, trajectory and grid')
-    file = checked(SweepFile, f'{path}: sweep', content, ManyError)
+    file = validate(SweepFile, f'{path}: sweep', content, ManyError)
     if not (file.grid or file.cases or file.sample):
         raise ManyError(f'{path}: nothing varies; give one of grid, cases, sample')
     return file

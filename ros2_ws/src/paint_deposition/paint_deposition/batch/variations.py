@@ -193,10 +193,10 @@ def _with_effects(model: DepositionModel, wanted: Iterable[str]) -> DepositionMo
 
 def _changed(section: Any, field: str, value: float, name: str) -> Any:
     """A copy with one value, checked as a model file's is."""
-    from paint_deposition.files.refusals import checked
+    from paint_deposition.request import validate
 
     values = section.model_dump() | {field: float(value)}
-    return checked(type(section), name.partition('.')[0], values, ManyError)
+    return validate(type(section), name.partition('.')[0], values, ManyError)
 
 
 def varied_motion(

@@ -51,8 +51,7 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenMod
 
     ``named`` is as for ``chosen_model``. Warnings go to stderr.
     """
-    from paint_deposition.files.planned_model import planned_model
-    from paint_deposition.files.provenance import model_digest
+    from paint_deposition.files.provenance import model_digest, planned_model
 
     planned = planned_model(motion)
     chosen = chosen_model(given, named=named)

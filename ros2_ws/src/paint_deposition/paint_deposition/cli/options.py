@@ -209,6 +209,8 @@ MOTION = (
     ),
     click.option('--angle-unit', type=click.Choice(['deg', 'rad']),
                  help='Unit of joints and angles; default: that of the headings, else rad.'),
+    click.option('--tool-axis', type=click.Choice(['x', 'y', 'z', '-x', '-y', '-z']),
+                 help='Axis of the recorded tool along which it sprays, x for a KUKA; default: z'),
     click.option('--frame-id', help="Name of the part's frame; default: part."),
     click.option('--strict', is_flag=True,
                  help='Refuse a recording with a pose or state that would be left out.'),

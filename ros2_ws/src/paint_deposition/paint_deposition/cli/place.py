@@ -101,7 +101,7 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
     From three or more named points that the robot touched.
     """
     from paint_deposition.api.robot import locate_by_points
-    from paint_deposition.files.json_files import json_text
+    from paint_deposition.files.atomic import json_text
     from paint_deposition.files.provenance import origin
 
     place = locate_by_points(touched, points, pose_unit)

@@ -13,7 +13,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.inspected import mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
 from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
-from paint_deposition.files.json_files import json_text
+from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
@@ -80,13 +80,15 @@ def _contents(
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
-    from paint_deposition.files.refusals import checked
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
-    from paint_deposition.files.tables.readings import holds_readings
+    from paint_deposition.files.tables.readings import holds_readings, is_gauge_file
+    from paint_deposition.request import validate
 
-    source = checked(MotionSource, 'motion', motion, RecordingError)
+    source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         return mesh_in(path)
+    if is_gauge_file(path):
+        return readings_in(path, points_file)
     if is_pose_table(path) and (points_file or holds_readings(path) or not may_hold_poses(path)):
         return readings_in(path, points_file)
     if is_pose_table(path):

@@ -86,10 +86,10 @@ def simulate_command(
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions
         from paint_deposition.files.motion_source import MotionSource
-        from paint_deposition.files.refusals import checked
+        from paint_deposition.request import validate
 
         show('reading')
-        source = checked(MotionSource, 'motion', motion, pd.PaintError)
+        source = validate(MotionSource, 'motion', motion, pd.PaintError)
         guns = read_gun_motions(trajectories, source, atomizers)
         chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
         show('refining the mesh')

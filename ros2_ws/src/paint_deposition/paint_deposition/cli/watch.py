@@ -109,7 +109,7 @@ def _replay(
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.recordings.bag_files import custom_data, open_bag
     from paint_deposition.files.recordings.bags import STATE_TOPIC
-    from paint_deposition.files.refusals import checked
+    from paint_deposition.request import validate
 
     show('reading')
     if not run.exists():
@@ -122,7 +122,7 @@ def _replay(
     if not mesh:
         raise click.UsageError(f'{run} does not name the mesh of its part; give --mesh')
     named = Path(recorded['model_file']) if recorded.get('model_file') else None
-    source = checked(MotionSource, 'motion', motion, pd.PaintError)
+    source = validate(MotionSource, 'motion', motion, pd.PaintError)
     guns = read_gun_motions([run], source)
     files = [file for file in (model_file or named,) if file]
     chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)

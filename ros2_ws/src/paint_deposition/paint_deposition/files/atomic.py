@@ -1,14 +1,26 @@
-"""Files that are written whole or not at all, after a power cut too, and read with a limit."""
+"""Files that are written whole or not at all, after a power cut too, and read with a limit.
+
+Texts, JSON that every reader takes (no NaN), Parquet tables, and texts by a template.
+"""
+
+from __future__ import annotations
 
 import os
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
-from paint_deposition.errors import PaintError
+from pydantic_core import to_json, to_jsonable_python
+
+from paint_deposition.errors import ManyError, PaintError
+
+if TYPE_CHECKING:
+    import pyarrow as pa
 
 # Of a file that is read as a whole [MB]: more is no mesh or table of this trade, or would fill the
 # memory. Of a text that a person edits.
@@ -86,3 +98,56 @@ def _sync(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
+
+
+def filled(template: Path, **values: Any) -> str:
+    """A text file by its Jinja template, from these values as they are; each must be there."""
+    from jinja2 import StrictUndefined, Template
+
+    text = template.read_text(encoding='utf-8')
+    made = Template(
+        text, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True,
+        keep_trailing_newline=True,
+    )  # fmt: skip
+    return made.render(values)
+
+
+MAGIC = b'PAR1'
+
+
+def require_pyarrow(what: str) -> None:
+    """Refuse to begin what needs the library of the extra, where it is not installed."""
+    if find_spec('pyarrow') is None:
+        raise ManyError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
+
+
+def write_parquet(path: Path, table: pa.Table) -> Path:
+    """Write a table, whole or not at all."""
+    import pyarrow.parquet as pq
+
+    with replacing(path) as temporary:
+        pq.write_table(table, temporary)
+    return path
+
+
+def write_json(path: str | Path, content: Mapping[str, Any]) -> None:
+    """Write JSON, whole or not at all; see ``json_text``."""
+    write_text(path, json_text(content) + '\n')
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """JSON with arrays as lists and paths as text; numbers that are not finite become null."""
+    return to_json(content, indent=2, inf_nan_mode='null', fallback=_without_numpy).decode()
+
+
+def plain(value: Any) -> Any:
+    """Numbers and containers of Python for those of NumPy; other values raise ValueError."""
+    return to_jsonable_python(value, fallback=_without_numpy)
+
+
+def _without_numpy(value: Any) -> Any:
+    import numpy as np  # what only writes text does without
+
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    raise ValueError(f'{type(value).__name__} cannot be written as JSON')

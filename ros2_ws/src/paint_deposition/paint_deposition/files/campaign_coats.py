@@ -10,13 +10,15 @@ from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.film.coats import TOTAL, Coats, WetFilms
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.brush import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.request import validate
 
+# Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.
+TOOTH_UM, FEWEST_TEETH = 5.0, 3
 # A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 
@@ -86,7 +88,7 @@ class LaidCoats:
             ReadingsError: naming the coat or the gun and the key at fault.
         """
         coats = [
-            checked(CoatEntry, f'coat {number}', one, ReadingsError)
+            validate(CoatEntry, f'coat {number}', one, ReadingsError)
             for number, one in enumerate(written, start=1)
         ]
         called = [coat.name for coat in coats]
@@ -98,7 +100,7 @@ class LaidCoats:
         for coat in jobs:
             given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
             for number, one in enumerate(given, start=1):
-                gun = checked(_Gun, f'gun {number}', one, ReadingsError)
+                gun = validate(_Gun, f'gun {number}', one, ReadingsError)
                 whose = f"coat '{coat.name}'" if coats else 'it'
                 whose = whose if given == [{}] else f'gun {number}'
                 guns.append(_motion(folder, (gun, coat, entry), whose))
@@ -123,7 +125,8 @@ class LaidCoats:
         """Readings of a layer as its dry film alone.
 
         Args:
-            wet: whether they were taken wet.
+            wet: whether they were taken wet. Where all are teeth of a comb, the film is as likely
+                anywhere between the tooth that is read and the next.
             under_um: film that was there before the first coat, part of all total readings [um].
 
         Raises:
@@ -132,6 +135,12 @@ class LaidCoats:
         film_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
         if wet:
             share = self._solids(layer)
+            if (step_um := _comb_step_um(film_um)) and np.isnan(sigma_um).all():
+                film_um, sigma_um = (
+                    film_um + 0.5 * step_um,
+                    np.full(len(film_um), step_um / 12**0.5),
+                )
+                words += f'; a comb in steps of {step_um:g} µm, half of which is added'
             film_um, sigma_um = share * film_um, share * sigma_um
             words += f'; wet film, times {share:g} solids'
         if under_um and layer == TOTAL:
@@ -156,18 +165,28 @@ class LaidCoats:
         return share
 
 
+def _comb_step_um(thickness_um: np.ndarray) -> float:
+    """The least step between the teeth of a comb [um], 0 where the readings are no teeth."""
+    teeth = np.unique(thickness_um)
+    if len(teeth) < FEWEST_TEETH or np.any(teeth % TOOTH_UM):
+        return 0.0
+    return float(np.diff(teeth).min())
+
+
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:
     """The motion of a gun from what it says itself, its coat, and its experiment."""
-
-    def said(key: str) -> Any:
-        return next((v for one in levels if (v := getattr(one, key)) is not None), None)
-
-    file = said('trajectory')
+    said: dict[str, Any] = {}
+    for one in reversed(levels):
+        given = {key: getattr(one, key) for key in one.model_fields_set}
+        said |= {key: value for key, value in given.items() if value is not None}
+    file = said.get('trajectory')
     if file is None:
         raise ReadingsError(
             f"{whose} has no 'trajectory'; give the name of a recording, RAPID module or table"
         )
-    source = MotionSource(**{key: said(key) for key in MotionSource.model_fields})
+    source = MotionSource(
+        **{key: v for key, v in said.items() if key in MotionSource.model_fields}
+    )
     if source.urdf:
         source = source.model_copy(update={'urdf': str(folder / source.urdf)})
-    return GunMotionFile(str(folder / file), source, said('brush'))
+    return GunMotionFile(str(folder / file), source, said.get('brush'))

@@ -3,10 +3,10 @@
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args
 
 import numpy as np
-from pydantic import BaseModel, Field, model_validator
+from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.campaign_coats import LaidCoats, Name, PaintJob
@@ -14,7 +14,6 @@ from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
 from paint_deposition.files.motion_source import Number, OnePart, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
@@ -24,22 +23,41 @@ from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.part.facing import toward_the_guns
-
-# Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
-MAX_EDGE_LENGTH_M = 0.02
+from paint_deposition.request import validate
 
 Quantity = Literal[
     'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',
+    'layers',
 ]  # fmt: skip
+Column = Text | int | list[Text | int] | dict[Text, Text | int]
 Unit = Literal['m', 'mm', 'cm', 'inch', 'um', 'µm', 'mil']
-_QUANTITIES = ', '.join(get_args(Quantity))
+_QUANTITIES = ', '.join(name for name in get_args(Quantity) if name != 'layers')
 # Called with 'note' or 'warning', the name of an experiment and a line on it.
 Remark = Callable[[Literal['note', 'warning'], str, str], None]
 # Keys for the head of the report only.
 HEAD = ('part', 'batch', 'paint', 'cell', 'date', 'operator')
 
 
-class _File(BaseModel, extra='forbid'):
+class _Band(BaseModel):
+    """The film wanted, and what it may differ."""
+
+    target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
+    tolerance_um: Number | None = Field(
+        None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
+    )
+
+    @model_validator(mode='after')
+    def _check(self) -> '_Band':
+        if (self.target_um is None) != (self.tolerance_um is None):
+            raise ValueError('target_um and tolerance_um belong together; give both or none')
+        try:
+            require_band(self.target_um or 0.0, self.tolerance_um or 0.0)
+        except PaintError as error:
+            raise ValueError(str(error)) from None
+        return self
+
+
+class _File(_Band, extra='forbid'):
     """A campaign as it is written."""
 
     experiments: list[Any] = Field(min_length=1, description='a list of at least one experiment')
@@ -50,24 +68,21 @@ class _File(BaseModel, extra='forbid'):
     cell: Name = ''
     date: Name = ''
     operator: Name = ''
-    target_um: Number | None = Field(None, gt=0.0, description='the film wanted, above 0 [um]')
-    tolerance_um: Number | None = Field(
-        None, gt=0.0, description='what the film may differ from target_um, above 0 [um]'
-    )
     zones: Text | None = Field(None, description='the name of a zones file')
 
-    @model_validator(mode='after')
-    def _band(self) -> '_File':
-        if (self.target_um is None) != (self.tolerance_um is None):
-            raise ValueError('target_um and tolerance_um belong together; give both or none')
-        try:
-            require_band(self.target_um or 0.0, self.tolerance_um or 0.0)
-        except PaintError as error:
-            raise ValueError(str(error)) from None
-        return self
+
+def _columns(columns: dict[str, Any]) -> dict[str, Any]:
+    for quantity, said in columns.items():
+        if isinstance(said, dict) != (quantity == 'layers'):
+            raise ValueError(
+                "give 'layers' the columns by the names of the layers, others a column"
+            )
+        if isinstance(said, list) and quantity != 'thickness':
+            raise ValueError(f'{quantity} has one column; only thickness may have a list of them')
+    return columns
 
 
-class _Entry(PaintJob, OnePart):
+class _Entry(PaintJob, OnePart, _Band):
     """An experiment as it is written; paths are relative to the campaign's file."""
 
     mesh: Text = Field(description='the name of a mesh file')
@@ -83,8 +98,10 @@ class _Entry(PaintJob, OnePart):
     )
     zones: Text | None = Field(None, description="the name of a zones file, if not the campaign's")
     points: Text | None = Field(None, description='the name of a file of measuring points')
-    columns: dict[Quantity, Text | int] = Field(
-        {}, description=f'the heading, or the number from 1, of the column of {_QUANTITIES}'
+    columns: Annotated[dict[Quantity, Column], AfterValidator(_columns)] = Field(
+        {},
+        description=f'the heading, or the number from 1, of the column of {_QUANTITIES}; of '
+        "thickness also a list; of layers by their names; 'none' for a quantity that there is not",
     )
     unit: dict[Literal['position', 'thickness'], Unit] = Field(
         {}, description='position: m, mm, cm or inch, and thickness: um, mil or mm'
@@ -122,11 +139,11 @@ def read_campaign(
     """
     path = Path(path)
     content = read_yaml(path, 'campaign', ReadingsError)
-    file = checked(_File, f'{path}: campaign', content, ReadingsError)
+    file = validate(_File, f'{path}: campaign', content, ReadingsError)
     experiments: list[Experiment] = []
     names: list[str] = []
     for number, written in enumerate(file.experiments, start=1):
-        entry = checked(_Entry, f'{path}: experiment {number}', written, ReadingsError)
+        entry = validate(_Entry, f'{path}: experiment {number}', written, ReadingsError)
         name = entry.name or f'experiment_{number}'
         if name in names:
             raise ReadingsError(f"{path}: two experiments are called '{name}'; rename one")
@@ -154,7 +171,8 @@ def _read_experiments(
     for number, file in enumerate(dict.fromkeys(gun.file for gun in laid.guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
-    surface = read_mesh(files['mesh'], entry.mesh_scale, MAX_EDGE_LENGTH_M, down, entry.body)
+    # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
+    surface = read_mesh(files['mesh'], entry.mesh_scale, 0.02, down, entry.body)
     trajectories = [read_motion(gun.file, gun.source) for gun in laid.guns]
     paths = []
     for trajectory, gun in zip(trajectories, laid.guns, strict=True):
@@ -187,7 +205,8 @@ def _read_experiments(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
             surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,
         )  # fmt: skip
-        experiment = replace(experiment, layer=layer)
+        band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
+        experiment = replace(experiment, layer=layer, target=band if band[0] else None)
         # What is wanted is the whole film.
         made.append(_with_zones(experiment, entry, zones) if layer == TOTAL else experiment)
     return made

@@ -4,17 +4,23 @@ import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.errors import some
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.tables.headings import LENGTHS
-from paint_deposition.files.tables.reading_columns import AXES, NORMALS, ON_FACE, Layout
+from paint_deposition.files.tables.headings import LENGTHS, shown
+from paint_deposition.files.tables.reading_columns import (
+    AXES,
+    NORMALS,
+    ON_FACE,
+    Layout,
+    format_of,
+)
 from paint_deposition.files.tables.readings import GUESSED, ReadingTable
 from paint_deposition.files.tables.sheets import FORMULA
-from paint_deposition.files.tables.table import shown
 from paint_deposition.inference.readings.readings import Readings, require_repeats_close
 from paint_deposition.part.gauge_places import on_face_m
 from paint_deposition.part.surface import Surface
@@ -33,10 +39,11 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT, Parquet or a workbook. The project's own columns are
-            ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
-            ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual English and German
-            headings. Without labels, readings at exactly one place are repeats.
+        path: CSV, TSV, TXT, JSON, Parquet, a workbook, or a folder or zip. The project's own
+            columns are ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
+            ``group``, ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings,
+            and the layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one
+            place are repeats.
         points: file of the measuring points (label, x, y, z) that readings name.
         layout: what the file does not say itself.
         surface: the part, for points that are given on its face.
@@ -48,14 +55,21 @@ def read_readings(
     listed = None if points is None else MeasuringPoints.read(Path(points), layout, surface)
     read = ReadingTable.read(path, True, layout, listed.labels if listed else ())
     table = read.table
-    thickness, row, film_words = read.films_um()
+    thickness, row, layers, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
         found = f'{read.heading("thickness")} is {thickness[k]:g}'
         span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
         unit = ': it may be in another unit than is said' if thickness[k] > THICKEST_UM else ''
         table.complain(row[k], f'{found}; expected {span}{unit}')
+    doubts = read.doubts
     if listed is not None:
         positions, normals, labels, place_words = listed.joined_to(read)
+        measured, count = len({*labels.tolist()}), len(listed.labels)
+        if 2 * measured < count:
+            doubts += (
+                f'only {measured} of the {count} points in {listed.path.name} have a reading; see '
+                'whether the labels of the readings are those of the points',
+            )
     else:
         positions, normals, place_words = _places(read, surface)
         labels = _labels(read, positions)
@@ -71,7 +85,7 @@ def read_readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
         f'{path.name}: {"; ".join(filter(None, notes))}', layout.zero == 'film',
-        GUESSED in place_words, read.doubts, np.array(read.texts('layer'))[row],
+        GUESSED in place_words, doubts, layers,
     )  # fmt: skip
     require_repeats_close(readings)
     return readings
@@ -154,12 +168,16 @@ class MeasuringPoints:
         """
         labels, by = readings.labels, readings.named_by
         orders = [([str(k) for k in order], count) for order, count in readings.orders]
-        again = by == ('number',) and len({*(labels or ())}) < len(readings)
-        if again and len({*readings.texts('block')}) > 1:
-            raise readings.table.error(
-                f"'{readings.heading('number')}' counts anew in each block; give a column 'point' "
-                'with the labels of the points'
-            )
+        if labels and {*labels}.isdisjoint(self.labels) and len({*labels}) == 1:
+            # The name of the part, or none.
+            labels = labels if labels[0] and not format_of(readings.table.headings) else None
+        again = ''
+        if labels is not None and by[-1] == 'number' and {*labels}.isdisjoint(self.labels):
+            labels, by = readings.texts('number'), ('number',)
+        if labels is not None and by == ('number',):
+            again = _counts_anew(readings, labels)
+            if again and not {*self.labels} <= {*labels}:
+                labels = None
         if labels is not None and (by != ('number',) or labels != orders[0][0]):
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
         for wanted, count in orders:
@@ -167,6 +185,10 @@ class MeasuringPoints:
                 if not {*wanted} <= {*self.labels}:
                     wanted = [self.labels[int(number) - 1] for number in wanted]
                 return wanted, 'by the order of the readings'
+        if again:
+            raise readings.table.error(
+                f"{again}; give a column 'point' with the labels of the points"
+            )
         figures = readings.figures_at_end
         what = f'{figures}; delete it if so' if figures else (
             'which is missing is not known; write n/a in its place'
@@ -177,13 +199,32 @@ class MeasuringPoints:
         )
 
 
+def _counts_anew(readings: ReadingTable, numbers: list[str]) -> str:
+    """In words that a count of readings begins anew and names no points, '' where it does not.
+
+    It does so where another column changes, or from the same number each time.
+    """
+    if not all(map(str.isdigit, numbers)) or len({*numbers}) == len(numbers):
+        return ''
+    table, counted = readings.table, [int(text) for text in numbers]
+    falls = [row for row, (a, b) in enumerate(pairwise(counted), start=1) if b <= a]
+    for column, heading in enumerate(table.headings):
+        texts = table.texts(column)
+        changes = [row for row, (a, b) in enumerate(pairwise(texts), start=1) if a != b]
+        if changes == falls and column not in readings.at['thickness']:
+            return f"'{readings.heading('number')}' counts anew in each {heading.text}"
+    begins = {counted[row] for row in (0, *falls)}
+    again = len(begins) == 1 < len(counted) / (len(falls) + 1)
+    return f"'{readings.heading('number')}' counts anew" if again else ''
+
+
 def write_predictions(path: str | Path, readings: Readings, predicted_um: np.ndarray) -> None:
     """Write the columns of the readings' file and ``predicted_um`` (N,), whole or not at all.
 
     A row with several readings is written once: they are at one place.
     """
     read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
-    _, row, _ = read.films_um()
+    _, row, _, _ = read.films_um()
     rows, first = np.unique(row, return_index=True)
     names = [heading.text for heading in read.table.headings]
     kept = [k for k, name in enumerate(names) if name != 'predicted_um']
@@ -212,7 +253,7 @@ def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
     names = [f'line {line}' for line in read.table.lines]
     _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
     given = read.labels
-    if given is not None and read.named_by == ('number',):
+    if given is not None and read.named_by[-1] == 'number':
         # A gauge counts the readings at one place, a list of points does not.
         one_each = len({*given}) == len(first) == len({*zip(given, place.ravel(), strict=True)})
         given = given if one_each else None

@@ -23,9 +23,6 @@ PLAIN = ('.stl', '.ply', '.obj')
 WITH_UNIT = ('.gltf', '.glb', '.3mf', '.step', '.stp')
 SUFFIXES = (*PLAIN, *WITH_UNIT)
 METRES = {'micron': 1e-6, 'millimeter': 1e-3, 'centimeter': 1e-2, 'inch': 0.0254, 'foot': 0.3048}
-# How finely the surfaces of a STEP file are cut: the film is then off by less than 1 % on folds of
-# 10 mm and more.
-STEP_CUT = {'tol_linear': 0.1, 'tol_angular': 0.15}  # mm, rad
 STEP_READER = 'cascadio'
 # A binary STL: 80 bytes of anything, the number of triangles, and each with its normal.
 STL_HEAD = 84
@@ -129,7 +126,9 @@ def _scene(path: Path, kind: str) -> Scene:
                 f'{path}: STEP files are read by {STEP_READER}, which is not installed; run: pip '
                 f'install {STEP_READER}, or export the part as one of {", ".join(PLAIN)}'
             )
-        options |= STEP_CUT
+        # How finely its surfaces are cut [mm, rad]: the film is then off by less than 1 % on folds
+        # of 10 mm and more.
+        options |= {'tol_linear': 0.1, 'tol_angular': 0.15}
     try:
         return trimesh.load_scene(source, file_type=kind[1:], **options)
     except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke

@@ -15,11 +15,8 @@ from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
 from paint_deposition.part.surface import Surface
 
 LARGEST_M = 50.0
-SMALLEST_M = 0.005
 # Types of a PLY, little-endian.
 PLY = {'float': '<f4', 'uchar': 'u1', 'int': '<i4'}
-# Triangles lower than this have no direction that could be trusted.
-LEAST_HEIGHT_M = 1e-7
 
 
 def read_mesh(
@@ -156,7 +153,7 @@ def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None
     used[faces] = True
     corners_m = vertices_m if used.all() else vertices_m[used]
     extent = float(box_extent_m(corners_m).max())
-    if not SMALLEST_M <= extent <= LARGEST_M:
+    if not 0.005 <= extent <= LARGEST_M:
         found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
         remedy = '--mesh-scale, or mesh_scale'
         if extent > LARGEST_M:
@@ -171,7 +168,8 @@ def _with_area(
     path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
 ) -> np.ndarray:
     """(F,) bool, which of the triangles have an area."""
-    heights_wanted = LEAST_HEIGHT_M * longest_edges_m(vertices_m, faces)
+    # Triangles lower than this have no direction that could be trusted.
+    heights_wanted = 1e-7 * longest_edges_m(vertices_m, faces)
     good = 2.0 * face_areas_m2(vertices_m, faces) > heights_wanted
     if not good.any():
         raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')

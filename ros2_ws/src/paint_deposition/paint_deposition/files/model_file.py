@@ -21,12 +21,12 @@ from paint_deposition.files.model_text import (
     needs_file,
     source_of,
 )
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.brush import MOST, Brush, SetPoints
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
+from paint_deposition.request import validate
 
 A_MAPPING = 'a mapping (key: value)'
 LoadEffect = Callable[[Path], type[Effect]]
@@ -95,7 +95,7 @@ def read_model_file(path: str | Path, load_effect: LoadEffect = load_effect_file
 
 def model_source(path: Path) -> str:
     """The text of a model file, whose effect files are not run. Raises ModelError for another."""
-    checked(_Sections, f'{path}: model', read_yaml(path, 'model', ModelError), ModelError)
+    validate(_Sections, f'{path}: model', read_yaml(path, 'model', ModelError), ModelError)
     return path.read_text(encoding='utf-8')
 
 
@@ -145,8 +145,8 @@ def model_of(values: Mapping[str, Any]) -> DepositionModel:
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
-    sections = checked(_Sections, 'model', content, ModelError)
-    projection = checked(ProjectionSection, 'projection', sections.projection or {}, ModelError)
+    sections = validate(_Sections, 'model', content, ModelError)
+    projection = validate(ProjectionSection, 'projection', sections.projection or {}, ModelError)
     effects: list[Effect] = []
     for number, entry in enumerate(sections.effects or (), start=1):
         effect = _effect(f'effects, entry {number}', entry, load)
@@ -158,7 +158,7 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
             raise ModelError('occlusion is given in projection and in effects; keep the effect')
         effects.append(Occlusion(strength=1.0))
     if sections.brushes is None:
-        planar = checked(PlanarPattern, 'planar', sections.planar or {}, ModelError)
+        planar = validate(PlanarPattern, 'planar', sections.planar or {}, ModelError)
         patterns = DepositionModel(planar=planar)
     elif sections.planar is not None:
         raise ModelError('planar and brushes are both given; keep one of them')
@@ -168,7 +168,7 @@ def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:
     model = patterns.model_copy(update={'projection': eq_2, 'effects': tuple(effects)})
     posterior = None
     if sections.posterior:
-        posterior = checked(Posterior, 'posterior', sections.posterior, ModelError)
+        posterior = validate(Posterior, 'posterior', sections.posterior, ModelError)
         posterior.check_suits(model)
     history = sections.history or []
     return ModelFile(model, sections.name or '', sections.uncertainty or {}, history, posterior)
@@ -184,12 +184,12 @@ def _brushes(section: Mapping[Any, Any]) -> list[Brush]:
             raise ModelError(
                 f'brushes: {quoted(number)} is not a brush number; give 1, 2 and so on'
             )
-        given = checked(_BrushEntry, f'brushes, {number}', entry, ModelError)
+        given = validate(_BrushEntry, f'brushes, {number}', entry, ModelError)
         if given.planar is None:
             raise ModelError(
                 f'brushes, {number}: planar is missing; calibrate the brush, or take it out'
             )
-        planar = checked(PlanarPattern, f'brushes, {number}: planar', given.planar, ModelError)
+        planar = validate(PlanarPattern, f'brushes, {number}: planar', given.planar, ModelError)
         set_points = given.model_dump(exclude={'planar'})
         brushes.append(Brush(number=number, planar=planar, **set_points))
     return brushes
@@ -220,4 +220,4 @@ def _effect(where: str, entry: dict[str, Any], load: Callable[[str], type[Effect
         source = cls.id
     else:
         cls = effect_class(source)
-    return checked(cls, source, values, ModelError)
+    return validate(cls, source, values, ModelError)

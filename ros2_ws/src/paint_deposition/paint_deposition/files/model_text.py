@@ -4,6 +4,7 @@ import ast
 import inspect
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.effects.user_effects import effect_of
 from paint_deposition.errors import ModelError
-from paint_deposition.files.json_files import plain
+from paint_deposition.files.atomic import plain
 from paint_deposition.model.brush import Brush, SetPoints
 
 COMMENT_COLUMN = 33
@@ -97,7 +98,9 @@ def _effect(effect: Effect, folder: Path) -> CommentedMap:
         return text
     source, name = 'id', effect.id
     if effect.file:
-        source, name = 'file', _relative(effect.file, folder)
+        source, name = 'file', effect.file.as_posix()
+        with suppress(ValueError):  # on another drive
+            name = Path(os.path.relpath(effect.file, folder.resolve())).as_posix()
     elif needs_file(type(effect)):
         source, name = 'file', file_name(type(effect))
     text = _fields(effect, **{source: name})
@@ -111,13 +114,6 @@ def _fields(values: BaseModel, **before: str) -> CommentedMap:
         if info.description and name in text:
             text.yaml_add_eol_comment(info.description, name, COMMENT_COLUMN)
     return text
-
-
-def _relative(file: Path, folder: Path) -> str:
-    try:
-        return Path(os.path.relpath(file, folder.resolve())).as_posix()
-    except ValueError:  # another drive
-        return file.as_posix()
 
 
 def needs_file(effect: type[Effect]) -> bool:

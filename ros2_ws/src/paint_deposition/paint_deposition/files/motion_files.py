@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_source import MotionSource
@@ -14,17 +15,23 @@ from paint_deposition.files.rapid.program import is_rapid, program_trajectory, r
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-from paint_deposition.files.refusals import checked
-from paint_deposition.files.tables.poses import PoseLayout, is_pose_table, read_pose_table
+from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
 from paint_deposition.files.tool_path import is_tool_path, read_tool_path
 from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, moved
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.request import validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
     from paint_deposition.motion.frame_tree import FrameTree
 
 PART = 'part'
+# Programs that are not read, by their suffix: whose they are, and the convention of their angles.
+OTHER_PROGRAMS = {
+    **dict.fromkeys(('.src', '.dat'), ('KUKA', 'kuka')),
+    **dict.fromkeys(('.ls', '.tp'), ('FANUC', 'fanuc')),
+    **dict.fromkeys(('.urp', '.script'), ('Universal Robots', 'rotvec')),
+}
 
 
 @dataclass(frozen=True)
@@ -54,7 +61,7 @@ def read_recording(
         RecordingError: the file, an option, or the frame of the poses is wrong.
     """
     given = {'pose_topic': pose_topic, 'state_topic': state_topic, 'gun_signal': gun_signal}
-    return read_motion(path, checked(MotionSource, 'motion', given | more, RecordingError))
+    return read_motion(path, validate(MotionSource, 'motion', given | more, RecordingError))
 
 
 def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajectory:
@@ -73,6 +80,12 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         recorded = read_tool_path(path)
     elif is_pose_table(path):
         recorded = read_table(path, source)
+    elif maker := OTHER_PROGRAMS.get(path.suffix.lower()):
+        raise RecordingError(
+            f'{path} is a program for {maker[0]}, which is not read; export the motion from its '
+            'simulation or a trace as a table with x, y, z, the three angles and time_s (or '
+            f'speed_m_per_s), and say --rotation {maker[1]}'
+        )
     else:
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
@@ -84,8 +97,20 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
             skipped = tuple(f'{path}: {n} {what}: left out' for what, n in bag.skipped.items())
             if skipped and source.strict:
                 raise RecordingError(f'{skipped[0]}; mend the recording, or leave out --strict')
-            return replace(brought, warnings=(*brought.warnings, *bag.warnings, *skipped))
-    return _in_part_frame(replace(recorded, source=str(path)), source, None)
+            warnings = (*brought.warnings, *bag.warnings, *skipped)
+            return _turned(replace(brought, warnings=warnings), source)
+    return _turned(_in_part_frame(replace(recorded, source=str(path)), source, None), source)
+
+
+def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
+    """The motion with the axis along which the tool sprays as its z."""
+    if not source.tool_axis:
+        return recorded
+    sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
+    turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])
+    turned = (Rotation.from_quat(recorded.quaternions_xyzw) * turn).as_quat()
+    note = f'its tool sprays along {source.tool_axis}'
+    return _with_note(replace(recorded, quaternions_xyzw=turned), note)
 
 
 def holds_joints(path: Path) -> bool:
@@ -101,8 +126,10 @@ def holds_joints(path: Path) -> bool:
 def read_table(path: Path, source: MotionSource) -> Trajectory:
     """The motion in a table, in the frame of its poses."""
     source.require_kind(path, 'a table of poses')
-    layout = PoseLayout(source.state_topic, source.pose_unit, source.rotation, source.angle_unit)
-    return read_pose_table(path, layout, _robot(path, source))
+    return read_pose_table(
+        path, _robot(path, source), source.state_topic, source.pose_unit, source.rotation,
+        source.angle_unit,
+    )  # fmt: skip
 
 
 def read_gun_motions(
@@ -184,7 +211,7 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         return recorded
     known = ''
     if bag is not None:
-        from paint_deposition.files.recordings.transforms import read_frames
+        from paint_deposition.files.recordings.pose_topics import read_frames
 
         tree = read_frames(bag)
         if tree.moving_between(named, part):
@@ -213,7 +240,7 @@ def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Traje
     """Bring poses of several frames into one, as the nodes do: a pose without a frame is the
     part's, and one for which no transform is known is left out.
     """
-    from paint_deposition.files.recordings.transforms import lookups, read_frames
+    from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 
     tree, part, frames = read_frames(bag), source.frame_id or PART, np.array(recorded.frames)
     others = Counter(frame for frame in recorded.frames if not is_frame(frame, part))
@@ -242,7 +269,7 @@ def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Traje
 
 def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') -> Trajectory:
     """Transform by where the part is at each time at which it is known."""
-    from paint_deposition.files.recordings.transforms import lookups
+    from paint_deposition.files.recordings.pose_topics import lookups
 
     frames = f"'{part}' in '{recorded.frame_id}'"
     known, transforms = lookups(tree, recorded.frame_id, part, recorded.stamps_ns)

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.tables.rotations import ROTATION_WORDS, is_rotation
+from paint_deposition.files.tables.pose_columns import ROTATION_WORDS, is_rotation
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 
@@ -66,6 +66,9 @@ class MotionSource(BaseModel, extra='forbid'):
     )
     angle_unit: Literal['deg', 'rad'] | None = Field(
         None, description="'deg' or 'rad', the unit of recorded angles and joints"
+    )
+    tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] | None = Field(
+        None, description='the axis of the recorded tool along which it sprays: x, ... or -z'
     )
     frame_id: Text | None = Field(None, description="the name of the part's frame")
     part_pose: Annotated[list[Number], AfterValidator(_pose)] | None = Field(

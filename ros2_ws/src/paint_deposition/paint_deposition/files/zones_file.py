@@ -9,15 +9,11 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 from paint_deposition.errors import PaintError, quoted, some
 from paint_deposition.files.meshes import Triangles, read_triangles
 from paint_deposition.files.motion_source import Number, Text
-from paint_deposition.files.refusals import checked
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
+from paint_deposition.request import validate
 
-# Of each of red, green and blue: brushes mix the colours along their edge.
-SAME_COLOUR = 40
-# A triangle has a colour if that many of its corners have it.
-CORNERS = 2
 Corner = Annotated[list[Number], Field(min_length=3, max_length=3)]
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
 
@@ -94,7 +90,7 @@ def read_zones(
         raise PaintError(f"{path}: 'zones' is no list; begin each zone with a dash")
     zones: list[Zone] = []
     for number, written in enumerate(content['zones'], start=1):
-        entry = checked(ZoneEntry, f'{path}: zone {number}', written, PaintError)
+        entry = validate(ZoneEntry, f'{path}: zone {number}', written, PaintError)
         if entry.name in [zone.name for zone in zones]:
             raise PaintError(f"{path}: two zones are called '{entry.name}'; rename one")
         try:
@@ -133,8 +129,10 @@ def _numbered(mesh: Path, ranges: list[tuple[int, int]], found: Triangles) -> np
 def _coloured(mesh: Path, colour: str, found: Triangles) -> np.ndarray:
     assert found.colours is not None
     wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
-    alike = np.abs(found.colours.astype(int) - wanted).max(axis=2) <= SAME_COLOUR
-    chosen = alike.sum(axis=1) >= CORNERS
+    # Of each of red, green and blue: brushes mix the colours along their edge.
+    alike = np.abs(found.colours.astype(int) - wanted).max(axis=2) <= 40
+    # A triangle has a colour if that many of its corners have it.
+    chosen = alike.sum(axis=1) >= 2
     if not chosen.any():
         there, count = np.unique(found.colours.reshape(-1, 3), axis=0, return_counts=True)
         names = ['#{:02x}{:02x}{:02x}'.format(*one) for one in there[np.argsort(-count)]]

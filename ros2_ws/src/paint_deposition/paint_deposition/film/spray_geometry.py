@@ -113,8 +113,8 @@ def _wrong_axis(view: GunView, boxes: str) -> str:
     remedy = 'z must point from the bell to the surface'
     known = abs(toward[axis]) > ALONG_COSINE
     if known:
-        sign = '-' if toward[axis] < 0.0 else '+'
-        remedy += f', where tool {sign}{"xyz"[axis]} points now; turn the axes of the tool frame'
+        points = f'{"-" if toward[axis] < 0.0 else "+"}{"xyz"[axis]}'
+        remedy += f', where tool {points} points now; say --tool-axis {points.lstrip("+")}'
     if along > ALONG_COSINE:
         return f'tool z runs along the travel, {lean:.0f} degrees off the surface normal; {remedy}'
     if lean > REVERSED_DEG and view.is_behind:

@@ -245,7 +245,7 @@ class ImproveRequest(Limits):
 class MeasureRequest(Request):
     """Where to put the gauge on a part."""
 
-    refusal = ReadingsError
+    error_class = ReadingsError
     points: int = given(60, 'Number of points.', least=1)
     repeats: int = given(
         8, 'Points to be read twice, which show the noise of the gauge; 0 if you know it.',

@@ -13,8 +13,6 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import quoted
 
-# Quaternions are written with four digits; further off is damage, not rounding.
-QUATERNION_TOLERANCE = 0.01
 Frame = tuple[np.ndarray, Rotation]  # position [mm] and orientation
 
 
@@ -26,7 +24,8 @@ def frame(pose: Any) -> Frame:
             f'{quoted(pose)} is no position [x, y, z] with a quaternion [q1, q2, q3, q4]'
         )
     norm = math.hypot(*quaternion)
-    if abs(norm - 1.0) > QUATERNION_TOLERANCE:
+    # Quaternions are written with four digits; further off is damage, not rounding.
+    if abs(norm - 1.0) > 0.01:
         raise ValueError(f'quaternion {quaternion} has the norm {norm:.4f} instead of 1')
     return np.array(position), Rotation.from_quat([*quaternion[1:], quaternion[0]])
 
@@ -81,10 +80,6 @@ def _to_digits(to_whole: Callable[[float], float]) -> Callable:
     return lambda value, dec=0.0: to_whole(value * 10.0**dec) / 10.0**dec
 
 
-def _half_up(value: float) -> float:
-    return math.copysign(math.floor(abs(value) + 0.5), value)
-
-
 def _of_vectors(calculate: Callable) -> Callable:
     """An operator that takes positions too."""
 
@@ -108,7 +103,8 @@ OPERATORS: dict[str, Callable] = {
 }  # fmt: skip
 FUNCTIONS: dict[str, Callable] = {
     'abs': abs, 'sqrt': math.sqrt, 'pow': math.pow,
-    'round': _to_digits(_half_up), 'trunc': _to_digits(math.trunc),
+    'round': _to_digits(lambda a: math.copysign(math.floor(abs(a) + 0.5), a)),
+    'trunc': _to_digits(math.trunc),
     'sin': lambda a: math.sin(math.radians(a)), 'cos': lambda a: math.cos(math.radians(a)),
     'tan': lambda a: math.tan(math.radians(a)), 'atan': lambda x: math.degrees(math.atan(x)),
     'atan2': lambda y, x: math.degrees(math.atan2(y, x)),

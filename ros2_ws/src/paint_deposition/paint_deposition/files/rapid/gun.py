@@ -1,21 +1,51 @@
-"""The gun of a RAPID program: its output, flow and brush, and what switches them during moves."""
+"""The moves of a RAPID program and its gun: output, flow and brush, and what switches them."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.rapid.moves import RapidProgram
 from paint_deposition.files.rapid.parser import Instruction, Node
 from paint_deposition.files.rapid.values import Values
 from paint_deposition.model.brush import MOST
-from paint_deposition.motion.programmed import GunSwitch
+from paint_deposition.motion.programmed import GunSwitch, Move
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Outputs that `writer` uses: an analogue one for the relative flow, a group output for the brush.
 FLOW_SIGNAL, BRUSH_SIGNAL = 'aoflow', 'gobrush'
 OUTPUTS = ('setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo', 'invertdo')
+
+
+@dataclass(frozen=True, kw_only=True)
+class RapidMove(Move):
+    """A move of the TCP as programmed; on the robot, zones cut its corners.
+
+    The pose is in the world frame, or in ``frame``: that of the work object if the modules do not
+    define it, or of the mechanical unit that moves it.
+    """
+
+    instruction: str  # in lower case
+    zone_m: float  # radius in which the corner is cut, 0: stop
+    tool: str
+    work_object: str
+    frame: str = ''  # '' for the world
+
+
+@dataclass
+class RapidProgram:
+    """The moves in order, and notes on everything left out or assumed, one line each."""
+
+    module: str
+    gun_signal: str = ''  # the digital output that opens the gun
+    moves: list[RapidMove] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    def note(self, text: str) -> None:
+        """Note something once."""
+        if text not in self.notes:
+            self.notes.append(text)
 
 
 class Trigger(NamedTuple):

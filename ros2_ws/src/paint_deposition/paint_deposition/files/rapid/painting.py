@@ -8,9 +8,15 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
-from paint_deposition.files.rapid.gun import Gun, Spray, gun_signal, name_of
+from paint_deposition.files.rapid.gun import (
+    Gun,
+    RapidMove,
+    RapidProgram,
+    Spray,
+    gun_signal,
+    name_of,
+)
 from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
-from paint_deposition.files.rapid.moves import RapidMove, RapidProgram
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
 
@@ -170,9 +176,11 @@ class Painting(Interpreter):
     ) -> None:  # fmt: skip
         speed, zone, tool = how
         name, (position, rotation) = at
+        stop, radius_mm, *_ = self._record(self.known(zone), 'zonedata')
+        zone_m = 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
         move = RapidMove(
             position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at), via_m=via_m,
-            line=i.line, instruction=i.name, zone_m=self._zone_m(zone), tool=self._tool(tool),
+            line=i.line, instruction=i.name, zone_m=zone_m, tool=self._tool(tool),
             work_object=name_of(i.options.get('wobj')) or 'wobj0', frame=name, **spray._asdict(),
         )  # fmt: skip
         self.program.moves.append(move)
@@ -229,11 +237,6 @@ class Painting(Interpreter):
                 self.program.note("vmax is the robot's own; 5 m/s assumed")
             speed = self.number(self._record(self.known(node), 'speeddata')[0], 'the speed')
         return min(speed * self._speed_share, self._fastest_mm_per_s) * 1e-3
-
-    def _zone_m(self, node: object) -> float:
-        """Radius in which the corner is cut; 0 for a stop point."""
-        stop, radius_mm, *_ = self._record(self.known(node), 'zonedata')
-        return 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
 
     def _record(self, value: object, kind: str) -> list:
         if not isinstance(value, list) or len(value) != len(RECORDS[kind]):

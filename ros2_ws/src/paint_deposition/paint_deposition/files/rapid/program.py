@@ -1,17 +1,25 @@
-"""ABB RAPID programs: read as moves of the TCP, as a trajectory, and as text."""
+"""ABB RAPID programs: read as moves of the TCP, as a trajectory, as text, and written."""
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from paint_deposition.errors import RecordingError
-from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
-from paint_deposition.files.rapid.moves import RapidProgram, with_one_frame, with_one_tool
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
+from paint_deposition.files.rapid.functions import Frame, inverse, product
+from paint_deposition.files.rapid.gun import RapidMove, RapidProgram
 from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
-from paint_deposition.motion.programmed import PROGRAMMED, timed
+from paint_deposition.motion.part_frame import Rigid
+from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -50,8 +58,8 @@ def read_program(
         program = painting.program
         if not program.moves:
             raise RecordingError(f'{path} has no moves of the TCP; nothing to read')
-        with_one_frame(program, str(path))
-        with_one_tool(program, painting.tools, str(path))
+        _with_one_frame(program, str(path))
+        _with_one_tool(program, painting.tools, str(path))
     except RecursionError:
         raise RecordingError(f'{path}: its values are nested too deeply to be RAPID') from None
     return program
@@ -98,6 +106,68 @@ def _start(modules: list[Module], procedure: str | None, path: Path) -> Routine:
     return routines[start]
 
 
+def _with_one_frame(program: RapidProgram, source: str) -> None:
+    """Leave out moves with the gun closed in another frame than that of the paint.
+
+    Raises RecordingError if the gun sprays in two frames whose relation is not known.
+    """
+    painted = _painting_moves(program)
+    names = {move.frame: move.line for move in reversed(painted)}
+    if len(names) > 1:
+        lines = ' and '.join(
+            f'line {line} in that of {name or "the world"}' for name, line in sorted(names.items())
+        )
+        raise RecordingError(
+            f'{source}: it sprays in frames whose relation is not known: {lines}; declare the '
+            'work objects, or give the programs of the parts one by one'
+        )
+    kept = [move for move in program.moves if move.frame in names]
+    if left_out := [str(m.line) for m in program.moves if m.frame not in names]:
+        program.note(
+            f'moves of lines {", ".join(left_out)} are left out: their frame is another than that '
+            'of the paint, and the gun is closed'
+        )
+    program.moves[:] = kept
+
+
+def _with_one_tool(program: RapidProgram, tools: Mapping[str, Frame | None], source: str) -> None:
+    """Bring all moves to the tool of the paint, by the frames of the ``tools`` [mm].
+
+    Raises RecordingError if the gun sprays with two tools that differ.
+    """
+    painted = _painting_moves(program)
+    bell = painted[0].tool
+    for number, move in enumerate(program.moves):
+        if move.tool == bell:
+            continue
+        own, wanted = tools[move.tool], tools[bell]
+        step = product(inverse(own), wanted) if own and wanted else None
+        if step and np.allclose(step[0], 0.0, atol=1e-3) and step[1].magnitude() < 1e-5:
+            continue
+        if any(move is one for one in painted):
+            raise RecordingError(
+                f'{source} line {move.line}: it sprays with {move.tool} and with {bell}; only one '
+                'of them can be the bell, give a program for each'
+            )
+        if step is None:
+            program.note(
+                f'the frame of tool {bell} or {move.tool} is not in the modules: the moves of '
+                f'{move.tool}, with the gun closed, are taken as those of {bell}'
+            )
+            continue
+        at = (move.position_m * 1e3, Rotation.from_quat(move.quaternion_xyzw))
+        position, rotation = product(at, step)
+        program.moves[number] = replace(
+            move, position_m=position * 1e-3, quaternion_xyzw=rotation.as_quat()
+        )
+
+
+def _painting_moves(program: RapidProgram) -> list[RapidMove]:
+    """The moves that spray; all, where nothing switches the gun."""
+    spraying = [m for m in program.moves if m.spraying or any(s.on for s in m.switches)]
+    return spraying or program.moves
+
+
 def program_trajectory(program: RapidProgram) -> Trajectory:
     """Poses along a program, from the end of its first move on, at the programmed speeds.
 
@@ -137,3 +207,81 @@ def program_as_text(program: RapidProgram) -> str:
             f'{m.speed_m_per_s:6.3f}  {m.zone_m:6.4f}  {gun}'
         )
     return '\n'.join([*lines, *(f'note: {note}' for note in program.notes)])
+
+
+TEMPLATE = Path(__file__).parent / 'templates' / 'passes.mod.j2'
+
+
+def module_text(
+    moves: Sequence[Move],
+    comments: Sequence[str] = (),
+    part: Rigid | None = None,
+    paint_moves: bool = False,
+) -> str:
+    """A module whose `main` runs the moves: poses in the work object, the gun by TriggL.
+
+    Tool and work object are taught on the robot; ``part``, its pose in the robot's world, defines
+    the work object too. The approach is a joint move, gun off. Flows of their own set the analogue
+    output aoFlow as the gun opens, brushes with a number the group output goBrush. With
+    ``paint_moves`` it sprays by PaintL with SetBrush: the only brush is number 1 then, and 0
+    closes the gun. `read_program` reads it back within 0.001 mm.
+
+    Raises PlanError for speeds that no robot could run, and flows that a brush does not have.
+    """
+    speeds = {v: f'vPass{k}' for k, v in enumerate(sorted(set(map(_speed, moves))), start=1)}
+    for speed in speeds:
+        if not 0.0 < speed < 10.0:
+            raise PlanError(f'speed of {speed:g} m/s: give one above 0 and below 10 m/s')
+    poses = [_pose([*move.position_m, *move.quaternion_xyzw]) for move in moves]
+    levels = sorted({_flow(move) for move in moves if move.spraying})
+    flows = {v: f'flow{k}' for k, v in enumerate(levels, start=1)} if levels != [1.0] else {}
+    brushes = sorted({move.brush for move in moves if move.spraying} - {ONLY_BRUSH})
+    if paint_moves and flows:
+        raise PlanError(
+            'flows of single passes need brushes of their own; leave out --paint-moves'
+        )
+    run = [('', 'MoveJ', speeds[_speed(moves[0])], '', 'fine')]
+    for number, (before, move) in enumerate(pairwise(moves), start=2):
+        brush, instruction, trigger = '', 'MoveL', ''
+        switches = _gun(move) != _gun(before)
+        if paint_moves:
+            instruction = 'PaintL' if move.spraying else 'MoveL'
+            brush = f'SetBrush {(move.brush or 1) * move.spraying};' if switches else ''
+        elif switches:
+            instruction, trigger = 'TriggL', 'gunOff,'
+            if move.spraying:
+                also = [flows[_flow(move)]] if flows else []
+                also += [f'brush{move.brush}'] if move.brush else []
+                events = ''.join(f'\\T{k}:={name}' for k, name in enumerate(also, start=2))
+                trigger = f'gunOn{events},'
+        zone = 'fine' if number == len(moves) else 'z10'
+        run.append((brush, instruction, speeds[_speed(move)], trigger, zone))
+    outputs = {name: f'AOp:=aoFlow,{flow:.4f}' for flow, name in flows.items()}
+    outputs |= {f'brush{number}': f'GOp:=goBrush,{number}' for number in brushes}
+    at = _pose(part.values) if part else ''
+    return filled(
+        TEMPLATE, comments=comments, part=at, poses=poses, speeds=speeds, outputs=outputs,
+        moves=run, off='SetBrush 0' if paint_moves else 'SetDO doGun,0',
+        triggers=[] if paint_moves else ['gunOn', 'gunOff', *outputs],
+    )  # fmt: skip
+
+
+def _gun(move: Move) -> tuple[float, int] | None:
+    """Flow and brush, None where the gun is off."""
+    return (_flow(move), move.brush) if move.spraying else None
+
+
+def _speed(move: Move) -> float:
+    return round(float(move.speed_m_per_s), 6)
+
+
+def _flow(move: Move) -> float:
+    return round(float(move.flow), 4)
+
+
+def _pose(values: Sequence[float]) -> str:
+    """A pose as RAPID has it: millimetres, and the scalar of the quaternion first."""
+    x, y, z, w = values[3:]
+    position = ','.join(f'{value * 1e3 + 0.0:.3f}' for value in values[:3])
+    orientation = ','.join(f'{value + 0.0:.7f}' for value in (w, x, y, z))
+    return f'[[{position}],[{orientation}]]'

@@ -143,9 +143,12 @@ class Values:
         datum = self._find(name)
         if isinstance(datum, Datum):
             return self._part(self._settled(datum), self._keys(datum.type, parts), name)
-        value = _predefined(name)
+        if speed := re.fullmatch(r'v(\d+)', name):
+            return [float(speed[1]), 500.0, 5000.0, 1000.0]
+        if zone := re.fullmatch(r'z(\d+)', name):
+            return [False, max(float(zone[1]), 0.3), *5 * [0.0]]  # z0 is 0.3 mm
         undeclared = Unknown(name, f'{name} is not declared in the modules given')
-        return undeclared if value is None else value
+        return PREDEFINED.get(name, undeclared)
 
     def _aggregate(self, items: list) -> Any:
         return _one_unknown(values := [self.value(item) for item in items]) or values
@@ -246,11 +249,3 @@ class Values:
 
 def _one_unknown(values: list) -> Unknown | None:
     return next((value for value in values if isinstance(value, Unknown)), None)
-
-
-def _predefined(name: str) -> Any:
-    if speed := re.fullmatch(r'v(\d+)', name):
-        return [float(speed[1]), 500.0, 5000.0, 1000.0]
-    if zone := re.fullmatch(r'z(\d+)', name):
-        return [False, max(float(zone[1]), 0.3), *5 * [0.0]]  # z0 is 0.3 mm
-    return PREDEFINED.get(name)

@@ -7,13 +7,16 @@ as service events, does not make the others unreadable.
 import bz2
 import math
 import re
+import shutil
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, NamedTuple
+from tempfile import gettempdir
+from types import SimpleNamespace
+from typing import Any, BinaryIO, NamedTuple
 
 import lz4.frame
 import yaml
@@ -23,6 +26,7 @@ from rosbags.interfaces import Connection, MessageDefinitionFormat, Nodetype
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1 import reader as ros1_reader
 from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2 import reader as ros2_reader
 from rosbags.rosbag2 import storage_mcap
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
@@ -37,8 +41,8 @@ TRIGGER = 'trigger_topic'
 # The key under which a run says how many messages of a topic are of its part, if not all.
 KEPT = 'messages_of_the_part'
 ROS2_SUFFIXES = ('.mcap', '.db3')
-# Of a chunk, expanded; recorders make chunks of some megabytes.
-MOST_CHUNK_BYTES = 256 * 1024 * 1024
+# Of a chunk, expanded; recorders make chunks of some megabytes. Of a file compressed as a whole.
+MOST_CHUNK_BYTES, MOST_FILE_BYTES = 256 * 1024 * 1024, 20_000_000_000
 # Elements of the arrays of fixed length in a type, other than arrays of numbers.
 MOST_FIXED, TEXTS = 10_000, ('string', 'wstring')
 
@@ -194,7 +198,28 @@ def _small(compression: str, data: bytes, size: int = MOST_CHUNK_BYTES) -> bytes
     return content
 
 
-# rosbags expands chunks to any size.
+@contextmanager
+def _small_file(file: BinaryIO, mode: str) -> Iterator[Any]:
+    """A file that was compressed as a whole, expanded while it is read."""
+    left = most = min(MOST_FILE_BYTES, shutil.disk_usage(gettempdir()).free // 2)
+    stream = zstandard.ZstdDecompressor().stream_reader(file, read_across_frames=True)
+
+    def read(size: int) -> bytes:
+        nonlocal left
+        block = stream.read(size)
+        left -= len(block)
+        if left < 0:
+            raise RecordingError(
+                f'{file.name}: it holds over {most / 1e9:.3g} GB, more than there is room for in '
+                f'{gettempdir()} or than any run has; expand it where there is room (zstd -d)'
+            )
+        return block
+
+    yield SimpleNamespace(read=read)
+
+
+# rosbags expands chunks, messages and files to any size.
+vars(ros2_reader)['zstd'] = SimpleNamespace(open=_small_file, decompress=partial(_small, 'zstd'))
 storage_mcap.DECOMPRESSORS.update({c: partial(_small, c) for c in ('lz4', 'zstd')})
 ros1_reader.decompressors.update({c: partial(_small, c) for c in ('lz4', 'bz2')})
 

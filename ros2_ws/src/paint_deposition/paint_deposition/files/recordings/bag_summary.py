@@ -10,13 +10,13 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, open_bag
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, STATE_TYPE
-from paint_deposition.files.recordings.pose_topics import pose_topics, read_poses
-from paint_deposition.files.recordings.transforms import moving_transforms
+from paint_deposition.files.recordings.pose_topics import (
+    moving_transforms,
+    pose_topics,
+    read_poses,
+)
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
-
-# Joints of a robot that is not known do not turn further [rad].
-MOST_RAD = 4.0 * np.pi
 
 
 @dataclass(frozen=True)
@@ -99,7 +99,8 @@ def _of_joints(bag: Bag, topic: BagTopic, max_gap_s: float) -> PoseSource | None
     values = np.array(positions, dtype=float)
     logged = np.array(log_times, np.int64)
     quality = StreamQuality.of(np.array(stamps, np.int64), values, logged, max_gap_s)
-    unit = 'deg' if np.nanmax(np.abs(values), initial=0.0) > MOST_RAD else 'rad'
+    # Joints of a robot that is not known do not turn further [rad].
+    unit = 'deg' if np.nanmax(np.abs(values), initial=0.0) > 4.0 * np.pi else 'rad'
     options = f'--urdf ROBOT --pose-topic {topic.name}'
     options += ' --angle-unit deg' if unit == 'deg' else ''
     faults = tuple(quality.faults(topic.name))

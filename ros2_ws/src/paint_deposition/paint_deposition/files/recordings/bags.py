@@ -33,7 +33,6 @@ JOINT_TOPIC = '/joint_trajectory'
 # For a trigger without stamps the log times are used, if those of the poses show that recorder and
 # robot have the same clock.
 MAX_CLOCK_OFFSET_S = 1.0
-QUEUE_DEPTH = 500
 
 
 def trajectory_of(
@@ -97,7 +96,7 @@ def motion_of(
         read, log_times_ns, name = read_joint_poses(bag, robot, pose_topic)
     else:
         if tf:
-            from paint_deposition.files.recordings.transforms import read_tf_poses
+            from paint_deposition.files.recordings.pose_topics import read_tf_poses
 
             read, log_times_ns = read_tf_poses(bag, *tf)
             name = f'transforms to {tf[1]}'
@@ -188,7 +187,7 @@ def _joint_trajectory(types: Typestore, header: Any, drive: Drive) -> Any:
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
-    qos = [offered_qos(1 if latched else QUEUE_DEPTH, latched=latched)]
+    qos = [offered_qos(1 if latched else 500, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
 
 

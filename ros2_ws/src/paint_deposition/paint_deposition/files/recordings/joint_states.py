@@ -26,8 +26,6 @@ from paint_deposition.motion.trajectory import Trajectory
 DEFAULT_TIP = 'tool0'
 # The n-th joint in the columns of a robot's log, without marks.
 NUMBERED = re.compile(r'(?:j|joint|axis|a|rax|rj)(\d+)')
-# A joint without limits that turns further is recorded in degrees.
-MOST_TURNS_RAD = 1e3
 T = TypeVar('T')
 
 
@@ -175,7 +173,8 @@ class Robot:
                 raise RecordingError(f'{joint.joint_name} in {where} is in {unit}; give {wanted}')
             furthest = float(np.nanmax(np.abs(column), initial=0.0))
             own = max(map(abs, joint.limits))
-            limit = max(2.0 * np.pi, own if np.isfinite(own) else MOST_TURNS_RAD)
+            # A joint without limits that turns further is recorded in degrees.
+            limit = max(2.0 * np.pi, own if np.isfinite(own) else 1e3)
             if not slides and not unit and furthest > limit:
                 raise RecordingError(
                     f'{joint.joint_name} in {where} reaches {furthest:.4g} and is read in rad; '

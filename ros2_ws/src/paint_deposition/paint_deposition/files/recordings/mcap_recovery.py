@@ -29,7 +29,6 @@ from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expand
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.message_definitions import Definition
 
-HEAD_BYTES = 9  # opcode and length of a record
 # Exceptions of the readers on damaged data.
 DAMAGE = (
     McapError, struct.error, zstandard.ZstdError, ValueError, EOFError, RuntimeError,
@@ -178,7 +177,8 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
     if record[:1] != bytes([Opcode.CHUNK]):
         return
     try:
-        chunk = Chunk.read(ReadDataStream(BytesIO(record[HEAD_BYTES:])))
+        # Behind the opcode and the length of the record.
+        chunk = Chunk.read(ReadDataStream(BytesIO(record[9:])))
         data = expanded(chunk.compression, chunk.data) if chunk.compression else chunk.data
         reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
         yield from reader.records

@@ -25,13 +25,6 @@ from paint_deposition.files.recordings.bag_files import KEPT
 from paint_deposition.files.recordings.message_definitions import Definition
 
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
-# A killed process loses its open chunk, so chunks are closed by size and by age. At 250 Hz the
-# default megabyte of mcap would hold half a minute of poses.
-CHUNK_BYTES = 64 * 1024
-CHUNK_SECONDS = 0.5
-NO_TIME_NS = 2**63 - 1
-# With all indexes, mcap writes the offset of an empty attachment group, which is invalid.
-INDEXES = IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA
 
 FOREVER = QosTime(9223372036, 854775807)
 
@@ -86,7 +79,7 @@ class RunWriter:
         self._topics: dict[str, RunTopic] = {}
         self._channels: dict[str, int] = {}
         self._schemas: dict[str, int] = {}
-        self._first_ns = NO_TIME_NS
+        self._first_ns = 2**63 - 1
         self._last_ns = 0
         self._chunk_opened_s: float | None = None
         self._failure: str | None = None
@@ -99,8 +92,14 @@ class RunWriter:
         except OSError as error:
             raise RecordingError(f'cannot create {self.folder}: {error.strerror}') from None
         self._stream = BufferedWriter(self._raw)
+        # A killed process loses its open chunk, so chunks are closed by size and by age. At 250 Hz
+        # the default megabyte of mcap would hold half a minute of poses. With all indexes, mcap
+        # writes the offset of an empty attachment group, which is invalid.
         self._writer = Writer(
-            self._stream, CHUNK_BYTES, COMPRESSIONS[compression], index_types=INDEXES
+            self._stream,
+            64 * 1024,
+            COMPRESSIONS[compression],
+            index_types=IndexType.CHUNK | IndexType.MESSAGE | IndexType.METADATA,
         )
         with self._write_errors():
             self._writer.start(profile='ros2', library='paint_deposition')
@@ -147,7 +146,7 @@ class RunWriter:
     def close_old_chunk(self) -> None:
         """Hand the open chunk to the operating system if it is older than half a second."""
         opened = self._chunk_opened_s
-        if opened is not None and time.monotonic() - opened >= CHUNK_SECONDS:
+        if opened is not None and time.monotonic() - opened >= 0.5:
             with self._write_errors():
                 self._writer.flush()
             self._chunk_opened_s = None

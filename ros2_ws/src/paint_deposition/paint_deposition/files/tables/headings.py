@@ -1,8 +1,24 @@
-"""Headings of columns: their words and their units."""
+"""Headings of columns: their words, their units, and where in a file they stand."""
 
 import re
 import unicodedata
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from paint_deposition.errors import PaintError, some
+from paint_deposition.files.tables.sheets import (
+    Cell,
+    Sheet,
+    cell_at,
+    is_comment,
+    is_value,
+    read_sheets,
+    text_of,
+)
+
+# A heading further down than this is none.
+MOST_LINES_ABOVE = 200
 
 # The ways to write a unit, by its metres, seconds, radians, or metres a second.
 WAYS_TO_WRITE: dict[str, dict[float, str]] = {
@@ -36,7 +52,8 @@ UNIT_NAMES = {1.0: 'm', 1e-2: 'cm', 1e-3: 'mm', 1e-6: 'µm', 25.4e-6: 'mil', 25.
 # What a heading says of a coordinate beside its axis. A nominal one counts if there is no other.
 NOMINAL = {'nominal', 'nom', 'soll', 'cad', 'design'}
 BESIDE = {
-    'pos', 'position', 'coordinate', 'koordinate', 'act', 'actual', 'ist', 'measured', 'gemessen',
+    'pos', 'position', 'coordinate', 'coordinates', 'koordinate', 'koordinaten', 'lage', 'act',
+    'actual', 'ist', 'measured', 'gemessen',
 }  # fmt: skip
 BRACKETED = re.compile(r'[\[(]\s*([^\])]*?)\s*[\])]')
 
@@ -77,7 +94,8 @@ class Heading:
 
 def words_of(text: str) -> tuple[str, ...]:
     """The words of a text, small and without accents; '#' counts as one."""
-    return tuple(re.findall(r'[^\W_]+|#', _small(text)))
+    spaced = re.sub(r'(?<=[\u3040-\u9fff])(?=\d)', ' ', _small(text))  # 測定値1
+    return tuple(re.findall(r'[^\W_]+|#', spaced))
 
 
 def length_of(text: str) -> float | None:
@@ -94,3 +112,113 @@ def unit_of(text: str) -> str:
 def _small(text: str) -> str:
     text = unicodedata.normalize('NFKD', unicodedata.normalize('NFKC', text).casefold())
     return ''.join(letter for letter in text if not unicodedata.combining(letter))
+
+
+def find_table(
+    path: Path,
+    refusal: type[PaintError],
+    known: Callable[[list[Heading]], int],
+    sheet: str = '',
+    columns: int = 0,
+) -> tuple[Sheet, int | None]:
+    """The sheet with a table, and the row of its headings; None where none is found.
+
+    ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
+    ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
+    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
+    tables in several sheets.
+    """
+    sheets = read_sheets(path, refusal)
+    if sheet:
+        named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
+        if not named:
+            there = ', '.join(s.form for s in sheets)
+            raise refusal(f"{path}: there is no sheet '{sheet}' (there are: {there})")
+        sheets = named
+    found: list[tuple[Sheet, int]] = []
+    for one in sheets:
+        above = one.rows[:MOST_LINES_ABOVE]
+        ranked = [
+            (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
+        ]
+        ranked += [
+            (known(headings_in(two.rows[k])), True, two, k)
+            for k in range(min(len(above) - 1, 40))
+            if (two := _on_two_rows(one, k))
+        ]
+        if not ranked:
+            continue
+        count, _, best, row = max(ranked, key=lambda rank: rank[:2])
+        if count and _is_split_alike(best.rows, row):
+            found.append((best, row))
+    if len(found) > 1 and found[0][0].form.startswith('sheet'):
+        found_in = ' and '.join(one.form for one, _ in found)
+        raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
+    # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
+    wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
+    if found:
+        return (wide or found[-1:])[0]
+    wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
+    if columns and wide_enough:
+        return wide_enough[0], None
+    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
+    by_marks = [s for s in apart if not s.form.startswith('blanks')]
+    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
+
+
+def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
+    """The sheet with two rows as one of headings, None where they hold numbers.
+
+    A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
+    one above it.
+    """
+    upper, lower = sheet.rows[first], sheet.rows[first + 1]
+    if any(map(is_value, [*upper, *lower])) or len(lower) < 2:
+        return None
+    texts, last = list[Cell](), ''
+    for k in range(max(len(upper), len(lower))):
+        above, below = text_of(cell_at(upper, k)), text_of(cell_at(lower, k))
+        last = above or (last if below else '')
+        texts.append(f'{last} {below}'.strip())
+    rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
+    return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
+
+
+def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
+    """Whether numbers below headings of several cells stand in several cells, too.
+
+    Else the headings are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
+    """
+    below = rows[header + 1 : header + 1 + MOST_LINES_ABOVE]
+    counts = [len(row) > 1 for row in below if re.search(r'\d', ''.join(map(text_of, row)))]
+    return len(rows[header]) == 1 or 2 * sum(counts) >= len(counts)
+
+
+def widest(sheet: Sheet) -> list[Cell]:
+    """The cells of the first row of a sheet with the most of them that are not blank."""
+    above = ([cell for cell in row if cell != ''] for row in sheet.rows[:MOST_LINES_ABOVE])
+    return max(above, key=len, default=[])
+
+
+def headings_in(row: list[Cell]) -> list[Heading]:
+    """The cells of a row as headings."""
+    return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
+
+
+def rows_below(
+    sheet: Sheet, headings: list[Heading], first: int, units_too: bool = True
+) -> tuple[list[Heading], list[int]]:
+    """Rows from ``first`` on without comments; a row of units, if any, goes to the headings."""
+    rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
+    cells = sheet.rows[rows[0]] if rows and units_too else []
+    units = [unit_of(text_of(cell)) for cell in cells]
+    if not UNITS.keys() & {*units} or any(map(is_value, cells)):
+        return headings, rows
+    pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
+    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs], rows[1:]
+
+
+def shown(headings: Sequence[Heading]) -> str:
+    """The headings of a table in brackets, for a message."""
+    named = [repr(heading.text) for heading in headings if heading.text]
+    return f'(columns: {some(named, 20) or "none"})'

@@ -1,13 +1,13 @@
 """A table of poses as a trajectory: timed poses, or programmed passes with their speeds."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading
+from paint_deposition.files.tables.headings import LENGTHS, SPEEDS, Heading, find_table
 from paint_deposition.files.tables.pose_columns import (
     POSITION,
     QUATERNION,
@@ -15,10 +15,10 @@ from paint_deposition.files.tables.pose_columns import (
     ROTATION_VECTOR,
     PoseTable,
     column_name,
+    read_rotations,
     translated,
 )
-from paint_deposition.files.tables.rotations import read_rotations
-from paint_deposition.files.tables.table import SWITCHED, find_table
+from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.brush import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
@@ -37,20 +37,6 @@ BRUSH = ('brush', 'brushnumber', 'brushno')
 SPEED = ('speed', 'velocity', 'v', 'tcpspeed')
 
 
-@dataclass(frozen=True)
-class PoseLayout:
-    """What the user says of a table of poses; None is found or has its usual value.
-
-    ``trigger`` is the heading of the column that opens the gun, ``rotation`` one of
-    ROTATION_WORDS; the units are for headings without.
-    """
-
-    trigger: str | None = None
-    pose_unit: str | None = None
-    rotation: str | None = None
-    angle_unit: str | None = None
-
-
 def is_pose_table(path: Path) -> bool:
     """Whether a file is named as a table."""
     return path.suffix.lower() in SUFFIXES
@@ -66,24 +52,50 @@ def may_hold_poses(path: Path) -> bool:
     return find_table(path, RecordingError, known)[1] is not None
 
 
-def read_pose_table(path: Path, layout: PoseLayout, robot: 'Robot | None' = None) -> Trajectory:
+def read_pose_table(
+    path: Path,
+    robot: 'Robot | None' = None,
+    trigger: str | None = None,
+    pose_unit: str | None = None,
+    rotation: str | None = None,
+    angle_unit: str | None = None,
+) -> Trajectory:
     """The motion in a table, with what was understood as a note.
 
     A table with times holds poses as recorded, or with ``robot`` its joints; one with speeds,
-    passes as programmed, such as ``passes.csv``. Raises RecordingError naming the file, the column
-    and the remedy.
+    passes as programmed, such as ``passes.csv``.
+
+    Args:
+        trigger: heading of the column that opens the gun; None: found, as are the others.
+        rotation: one of ROTATION_WORDS.
+        pose_unit, angle_unit: for headings without.
+
+    Raises:
+        RecordingError: naming the file, the column and the remedy.
     """
     table = PoseTable.read(path, robot)
     try:
+        gun = _flows(table, trigger)
         if robot is not None:
-            return _joint_motion(table, layout, robot)
-        return replace(_trajectory(table, layout), frame_id=_frame_id(table))
+            return _joint_motion(table, gun, robot)
+        positions, unit = _positions_m(table, pose_unit)
+        quaternions, how = read_rotations(table, rotation, angle_unit)
+        poses = Trajectory(np.zeros(len(table), np.int64), positions, quaternions)
+        found = _trajectory(table, poses, gun, f'x y z in {unit}; {how}')
+        # The frame that a column names.
+        column = table.find('frame', 'frameid')
+        names = set() if column is None else {*table.texts(column)}
+        if len(names) > 1:
+            raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
+        return replace(found, frame_id=''.join(names).lstrip('/'))
     except RecordingError as error:
         reason = str(error).removeprefix(f'{path}: ')
         raise RecordingError(f'{path}: {reason}') from None
 
 
-def _joint_motion(table: PoseTable, layout: PoseLayout, robot: 'Robot') -> Trajectory:
+def _joint_motion(
+    table: PoseTable, gun: tuple[np.ndarray | None, str], robot: 'Robot'
+) -> Trajectory:
     """The motion of a robot's tip from the columns of its joints."""
     values, recorded = table.joints(robot)
     time = table.find(*TIME)
@@ -92,7 +104,7 @@ def _joint_motion(table: PoseTable, layout: PoseLayout, robot: 'Robot') -> Traje
             f'no time among the columns {table.written(())}; give a column time_s'
         )
     stamps, unit = table.stamps_ns(time)
-    flows, trigger = _flows(table, layout.trigger)
+    flows, trigger = gun
     tip = robot.trajectory(stamps, values, recorded, table.path.name)
     notes = (*tip.notes, f'{trigger}; {table.written([time])} in {unit}', table.log)
     return _timed(
@@ -116,19 +128,20 @@ def _timed(
     )  # fmt: skip
 
 
-def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
-    positions, unit = _positions_m(table, layout.pose_unit)
-    quaternions, orientation = read_rotations(table, layout.rotation, layout.angle_unit)
-    flows, trigger = _flows(table, layout.trigger)
+def _trajectory(
+    table: PoseTable, poses: Trajectory, gun: tuple[np.ndarray | None, str], how: str
+) -> Trajectory:
+    """The poses with their times or speeds, and with what switches the gun."""
+    flows, trigger = gun
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
-    note = f'{len(table)} poses: x y z in {unit}; {orientation}; {trigger}{by_brush}'
+    note = f'{len(table)} poses: {how}; {trigger}{by_brush}'
     time, speed = table.find(*TIME), table.find(*SPEED)
     if time is not None:
         stamps, time_unit = table.stamps_ns(time)
         notes = filter(None, (f'{note}; {table.written([time])} in {time_unit}', table.log))
-        poses = Trajectory(stamps, positions, quaternions, notes=tuple(notes))
+        poses = replace(poses, stamps_ns=stamps, notes=tuple(notes))
         return _timed(poses, table, flows, brushes)
     if speed is None:
         raise RecordingError(
@@ -144,7 +157,7 @@ def _trajectory(table: PoseTable, layout: PoseLayout) -> Trajectory:
     moves = [
         Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0, brush=brush)
         for position, quaternion, speed, flow, line, brush in zip(
-            positions, quaternions, *columns, strict=True
+            poses.positions_m, poses.quaternions_xyzw, *columns, strict=True
         )
     ]
     warnings = () if flows is not None else _could_be_trigger(table)
@@ -219,12 +232,3 @@ def _brushes(table: PoseTable) -> tuple[np.ndarray, str]:
             'number of a brush, 0 for the only one'
         )
     return values.astype(np.int64), f', brush by {written}'
-
-
-def _frame_id(table: PoseTable) -> str:
-    """The frame that a column names, '' if there is none; several are refused."""
-    column = table.find('frame', 'frameid')
-    names = set() if column is None else {*table.texts(column)}
-    if len(names) > 1:
-        raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
-    return ''.join(names).lstrip('/')

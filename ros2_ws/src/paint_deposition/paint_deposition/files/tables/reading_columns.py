@@ -3,74 +3,65 @@
 import re
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from typing import Any
 
 from paint_deposition.errors import did_you_mean
-from paint_deposition.files.tables.headings import BESIDE, NOMINAL, Heading
-from paint_deposition.files.tables.sheets import Sheet, text_of
-from paint_deposition.files.tables.table import Table, headings_in, is_value, shown, widest
+from paint_deposition.files.tables.gauge_formats import (
+    ALIASES,
+    FORMATS,
+    LAYERS,
+    NO_READING,
+    OTHER_DICKEN,
+    OWN,
+    WET,
+    GaugeFormat,
+)
+from paint_deposition.files.tables.headings import (
+    BESIDE,
+    NOMINAL,
+    Heading,
+    headings_in,
+    shown,
+    widest,
+)
+from paint_deposition.files.tables.sheets import Sheet, is_value, text_of
+from paint_deposition.files.tables.table import Table
 
-# Columns of our own; where those of a reading are all there, no other name is looked at.
-OWN = {
-    'x': 'x_m', 'y': 'y_m', 'z': 'z_m', 'thickness': 'thickness_um', 'point': 'point',
-    'group': 'group', 'session': 'session', 'sigma': 'sigma_um',
-    'layer': 'layer', 'nx': 'nx', 'ny': 'ny', 'nz': 'nz',
-}  # fmt: skip
 AXES = ('x', 'y', 'z')
 ON_FACE = ('from_left', 'height')
 NORMALS = ('nx', 'ny', 'nz')
 LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
-# Headings without their unit, numbers of repeats and accents. A word that ends in 'dicke' is a
-# thickness too, but for these.
-# A film before anything evaporates, as a comb shows it.
-WET = re.compile(r'(wet|wft|nass)')
-OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')
-# What makes a thickness another figure than a reading of it.
-NO_READING = {
-    *NOMINAL, 'ziel', 'target', 'min', 'max', 'minimum', 'maximum', 'std', 'sd', 'sigma',
-    'streuung', 'toleranz', 'tolerance', 'abweichung', 'deviation', 'differenz',
-    'difference', 'nass', 'wet', 'fehler', 'error',
-}  # fmt: skip
-ALIASES = {
-    'thickness': (
-        'thickness', 'film thickness', 'coating thickness', 'film build', 'film', 'dft',
-        'reading', 'value', 'messwert', 'epaisseur',
-    ),
-    'from_left': ('from left', 'left', 'von links', 'links'),
-    'height': ('height', 'from bottom', 'hohe', 'hohe von unten', 'hoehe', 'von unten'),
-    'point': (
-        'point', 'location', 'spot', 'label', 'position', 'name', 'punkt', 'messpunkt',
-        'messstelle', 'stelle', 'repere',
-    ),
-    'number': ('no', 'nr', '#', 'number', 'nummer', 'id', 'reading no', 'reading number'),
-    'row': ('row', 'zeile', 'reihe'),
-    'column': ('column', 'col', 'spalte'),
-    'group': ('group', 'gruppe'),
-    'layer': ('layer', 'coat', 'schicht', 'lackschicht', 'couche'),
-    'block': ('block', 'block no', 'block nr'),
-    'unit': ('unit', 'units', 'einheit'),
-}  # fmt: skip
 QUANTITIES = (*AXES, *NORMALS, *ALIASES)
 QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
+LAYER = {name: layer for layer, names in LAYERS.items() for name in names}
+FILM_WORDS = {'schichtdicke', 'lackschichtdicke', 'dicke', 'thickness', 'dft', 'film'}
 
 
 @dataclass(frozen=True)
 class Layout:
     """What the user says of a table; what is left out is found."""
 
-    # Heading, or number from 1, of a quantity's column.
-    columns: Mapping[Any, str | int] = field(default_factory=dict)
+    # Heading, or number from 1, of a quantity's column; of thickness also several, of 'layers' by
+    # the name of each; 'none' for a quantity that there is not.
+    columns: Mapping[Any, Any] = field(default_factory=dict)
     # Metres in the unit of 'position' and of 'thickness'.
     unit: Mapping[Any, float] = field(default_factory=dict)
     decimal: str = ''  # '.' or ','
     sheet: str = ''  # name of a workbook's sheet
     zero: str = ''  # 'missing' or 'film', what a reading of 0 is; '' where not known
 
+    def named(self, quantity: str) -> list[str | int]:
+        """What the user says of a quantity's columns; nothing where there is none."""
+        said = self.columns.get(quantity)
+        said = [*said.values()] if isinstance(said, Mapping) else said
+        said = said if isinstance(said, list) else [said]
+        return [name for name in said if str(name).casefold() != 'none']
+
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
     """The columns of each quantity under these headings; the user's, else those that are known."""
     texts = [heading.text for heading in headings]
-    small = [text.casefold() for text in texts]
     own = {q: [k for k, t in enumerate(texts) if t == n] for q, n in OWN.items() if n in texts}
     at: dict[str, list[int]] = {}
     if not {*AXES, 'thickness'} <= {*own}:
@@ -80,19 +71,68 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
                 at[quantity] = [k for k, one in enumerate(found) if one == quantity]
         if {*AXES} <= {*at}:
             at = {q: columns for q, columns in at.items() if q not in ON_FACE}
+        if gauge := format_of(headings):
+            words = [plain(heading) for heading in headings]
+            _assign(at, '', [k for k, word in enumerate(words) if word in gauge.unused])
+            for quantity, word in gauge.columns.items():
+                _assign(at, quantity, [k for k, its in enumerate(words) if its == word])
+        layers = [k for k, heading in enumerate(headings) if _layer(heading)]
+        if len(layers) > 1 and 'thickness' not in at:
+            _assign(at, 'thickness', layers)
         also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
         if also and 'thickness' not in at:
             at['thickness'] = also
     at |= own
-    for quantity, name in layout.columns.items():
-        wanted = name - 1 if isinstance(name, int) else -1
-        if isinstance(name, str) and name.strip().casefold() in small:
-            wanted = small.index(name.strip().casefold())
-        if not 0 <= wanted < len(headings):
-            return {}
-        at = {q: [k for k in columns if k != wanted] for q, columns in at.items()}
-        at = {q: columns for q, columns in at.items() if columns} | {quantity: [wanted]}
+    small = [text.casefold() for text in texts]
+    for quantity in layout.columns:
+        wanted = []
+        for name in layout.named(quantity):
+            if isinstance(name, int) and 1 <= name <= len(headings):
+                wanted.append(name - 1)
+            elif isinstance(name, str) and name.strip().casefold() in small:
+                wanted.append(small.index(name.strip().casefold()))
+            else:
+                return {}
+        _assign(at, 'thickness' if quantity == 'layers' else quantity, wanted)
     return at
+
+
+def layers_of(headings: list[Heading], layout: Layout, films: list[int]) -> list[str]:
+    """The layer that each column of the thickness holds; none where they are no layers."""
+    if layers := layout.columns.get('layers'):
+        return [name for name, column in layers.items() if str(column).casefold() != 'none']
+    names = [_layer(headings[k]) for k in films]
+    return names if len(films) > 1 and all(names) and 'thickness' not in layout.columns else []
+
+
+def format_of(headings: list[Heading]) -> GaugeFormat | None:
+    """The known layout that these headings are of."""
+    words = {plain(heading) for heading in headings}
+    return next((one for one in FORMATS if {*one.shown_by} <= words), None)
+
+
+def plain(heading: Heading) -> str:
+    """The words of a heading as ``FORMATS`` has them, '#' for a number."""
+    return ' '.join('#' if word.isdigit() else word for word in heading.words)
+
+
+def _assign(at: dict[str, list[int]], quantity: str, columns: list[int]) -> None:
+    """Let columns be those of one quantity alone, or of none ('')."""
+    for other in [q for q in at if {*at[q]} & {*columns} or q == quantity]:
+        at[other] = [k for k in at[other] if k not in columns and other != quantity]
+        if not at[other]:
+            del at[other]
+    if quantity and columns:
+        at[quantity] = columns
+
+
+def _layer(heading: Heading) -> str:
+    """The layer whose thickness a column holds by its heading, '' for none."""
+    if heading.unit and heading.unit_m not in FILM_UNITS:
+        return ''
+    words = [word for word in heading.words if word not in FILM_WORDS]
+    layer = LAYER.get(' '.join('#' if word.isdigit() else word for word in words), '')
+    return layer + ''.join(filter(str.isdigit, words)) if layer else ''
 
 
 def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
@@ -131,8 +171,8 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
         return 'there is nothing to read in it; give a table with a heading over each column'
     headings = headings or headings_in(widest(sheet))
     texts = [heading.text for heading in headings]
-    named = {q: name for q, name in layout.columns.items() if isinstance(name, str)}
-    for quantity, name in ((q, name) for q, name in named.items() if name not in texts):
+    named = [(q, n) for q in layout.columns for n in layout.named(q) if isinstance(n, str)]
+    for quantity, name in ((q, name) for q, name in named if name not in texts):
         remedy = did_you_mean(name, filter(None, texts), 'copy the heading')
         return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
     if films:
@@ -178,43 +218,41 @@ def headings_again(table: Table, header: int, known: Callable[[list[Heading]], i
     return again
 
 
-def refuse_rivals(table: Table, at: dict[str, list[int]]) -> None:
-    """Refuse several columns of one quantity; those of the thickness may differ in a number."""
+def refuse_misleading(
+    table: Table, at: dict[str, list[int]], layout: Layout, layers: list[str], bare: bool
+) -> None:
+    """Refuse columns that may not be what they are taken for, unless the user names them.
+
+    Two of one quantity, of which those of the thickness may differ in a number or be ``layers``;
+    a heading that is merged over several; in a ``bare`` file numbers that commas may have cut.
+    """
     every = [heading.text for heading in table.headings]
+    of_user = not {'thickness', 'layers'}.isdisjoint(layout.columns)
     for quantity, columns in at.items():
         texts = [every[k] for k in columns]
         if len({*texts}) < len(texts) or every.count(texts[0]) > 1:
             raise table.error(f"two columns are called '{texts[0]}'; keep one")
         stems = {re.sub(r'\d+', '', text) for text in texts}
-        if len(columns) > 1 and (quantity != 'thickness' or len(stems) > 1):
+        alike = quantity == 'thickness' and (of_user or layers or len(stems) == 1)
+        if len(columns) > 1 and not alike:
             named = ', '.join(map(repr, texts))
             raise table.error(
                 f'the {quantity} may be in {named}; name one, columns: {{{quantity}: ...}}'
             )
-
-
-def refuse_merged(table: Table, films: list[int]) -> None:
-    """Refuse numbers without a heading right of the thickness's: it is merged over them."""
-    for column in range(max(films, default=len(table.headings)) + 1, len(table.headings)):
-        if table.headings[column].text:
-            return
+    # Numbers without a heading right of that of the thickness.
+    films = [] if of_user else at.get('thickness', [])
+    beside = range(max(films, default=len(every)) + 1, len(every))
+    for column in takewhile(lambda k: not every[k], beside):
         for row, line in zip(table.rows, table.lines, strict=True):
             if column < len(row) and is_value(row[column]):
                 raise table.error(
-                    f"'{table.headings[films[-1]].text}' stands over several columns or is a "
-                    f"title: '{text_of(row[column])}' beside it in line {line} has no heading; "
+                    f"'{every[films[-1]]}' stands over several columns or is a title: "
+                    f"'{text_of(row[column])}' beside it in line {line} has no heading; "
                     'give each column one, or say columns: {thickness: ...} in the campaign'
                 )
-
-
-def refuse_cut_numbers(table: Table) -> None:
-    """Refuse lines without headings that may be two numbers, or one with a decimal comma."""
-    cells = [text_of(cell) for row in table.rows for cell in row]
-    if (
-        table.form.startswith('commas')
-        and len(cells) == 2 * len(table)
-        and all(map(str.isdigit, cells))
-    ):
+    cells = [text_of(cell) for row in table.rows for cell in row] if bare else []
+    in_doubt = layout.decimal != '.' and table.form.startswith('commas')
+    if cells and in_doubt and len(cells) == 2 * len(table) and all(map(str.isdigit, cells)):
         raise table.error(
             f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
             'decimal comma; say decimal: point if it is two, else put a heading over the column'

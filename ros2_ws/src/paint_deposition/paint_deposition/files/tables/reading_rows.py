@@ -1,32 +1,68 @@
 """Which rows of a table are readings or points, which lack one, and their order."""
 
-import re
 import statistics
 from bisect import bisect
 from collections.abc import Sequence
 
-from paint_deposition.files.tables.headings import words_of
-from paint_deposition.files.tables.reading_columns import AXES, ON_FACE
-from paint_deposition.files.tables.sheets import text_of
-from paint_deposition.files.tables.table import Table, is_nothing, is_value
-
-STATISTIC = re.compile(
-    r'(mean|average|avg|mittel\w*|mw|median|std|sd|stand\w+|min\w*|max\w*|range|spannweite|cv|'
-    r'lowest|highest|(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
-    r'anzahl|sum|total|moyenne|ecart|n|s|x)\b'
+from paint_deposition.files.tables.gauge_formats import STATISTIC
+from paint_deposition.files.tables.headings import (
+    words_of,
 )
-FEWEST_READINGS = 3
-MOST_FIGURES = 6
+from paint_deposition.files.tables.reading_columns import (
+    AXES,
+    ON_FACE,
+    format_of,
+    plain,
+)
+from paint_deposition.files.tables.sheets import is_nothing, is_value, text_of
+from paint_deposition.files.tables.table import Table
+
+
+def without_failed(table: Table, films: list[int]) -> tuple[Table, str]:
+    """The table without the readings that the gauge itself marks as none, and how many, in words.
+
+    Raises ReadingsError where what a layout calls a count of readings is none.
+    """
+    gauge = format_of(table.headings)
+    words = [plain(heading) for heading in table.headings]
+    if gauge is None:
+        return table, ''
+    if (count := gauge.columns.get('number')) and films != [words.index(count)]:
+        texts = table.texts(words.index(count))
+        if odd := next((text for text in texts if '.' in text or ',' in text), ''):
+            raise table.error(
+                f"'{table.headings[words.index(count)].text}' counts the readings of a "
+                f"{gauge.name}, and is '{odd}'; name the column of the film with columns: "
+                '{thickness: ...} in the campaign'
+            )
+    states = {k: good for k, word in enumerate(words) if (good := gauge.status.get(word))}
+    cells = {k: table.texts(k) for k in states}
+    failed = {
+        row: table.headings[k].text
+        for k, good in states.items()
+        for row, text in enumerate(cells[k])
+        if text.casefold() not in good
+    }
+    if not failed:
+        return table, ''
+    named = ', '.join(dict.fromkeys(failed.values()))
+    table = table.without(films, lambda row, _: row in failed)
+    return table, f', {len(failed)} of them failed by {named}'
 
 
 def rows_of_readings(
-    table: Table, at: dict[str, list[int]], films: bool, numeric: list[int], labels: set[str]
+    table: Table,
+    at: dict[str, list[int]],
+    films: bool,
+    numeric: list[int],
+    labels: set[str],
+    bare: bool,
 ) -> tuple[list[int], list[int], str]:
     """Rows that are readings or points, rows without a reading, and in words what else there is.
 
     A row with a place is one, whatever its label. One without a place, or in a table without
     places, is a statistic if it begins with the name of one and not with the label of a listed
-    point.
+    point. In a ``bare`` file, without headings, a row as wide as the others is one too.
     """
     kept: list[int] = []
     unread: list[int] = []
@@ -53,9 +89,8 @@ def rows_of_readings(
             count['of statistics'] += 1
         elif not placed and not any(map(is_value, values)):
             # A remark has no reading either, but not all other numbers and no n/a in its place.
-            missing &= any(values) or (
-                bool(numbered) and all(is_value(cells[c]) for c in numbered)
-            )
+            full = bool(numbered) and all(is_value(cells[c]) for c in numbered)
+            missing &= any(values) or full or (bare and len(row) == width)
             count['without a reading' if missing else 'of other text'] += 1
             unread += [k] * missing
         elif len(row) <= max(numeric) or any(cell != '' for cell in cells[width:]):
@@ -99,7 +134,7 @@ def figures_at_end(texts: Sequence[str]) -> str:
     """
     values = [float(text) for text in texts]
     decimals = [len(text.partition('.')[2]) for text in texts]
-    for count in range(min(MOST_FIGURES, len(values) - FEWEST_READINGS), 0, -1):
+    for count in range(min(6, len(values) - 3), 0, -1):
         before = values[:-count]
         least, most = min(before), max(before)
         if least == most:

@@ -7,25 +7,38 @@ from pathlib import Path
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.tables import reading_columns as known_columns
-from paint_deposition.files.tables import table as cells_of
-from paint_deposition.files.tables.headings import UNIT_NAMES, Heading, length_of, words_of
+from paint_deposition.files.tables.gauge_formats import ALIASES, FOLDERS
+from paint_deposition.files.tables.headings import (
+    UNIT_NAMES,
+    Heading,
+    find_table,
+    headings_in,
+    length_of,
+    rows_below,
+    words_of,
+)
 from paint_deposition.files.tables.reading_columns import (
     AXES,
+    FILM_UNITS,
+    LENGTH_UNITS,
     NORMALS,
     ON_FACE,
     Layout,
+    columns_of,
     headings_again,
-    refuse_cut_numbers,
-    refuse_merged,
-    refuse_rivals,
+    layers_of,
+    not_found,
+    refuse_misleading,
 )
-from paint_deposition.files.tables.reading_rows import figures_at_end, orders_of, rows_of_readings
+from paint_deposition.files.tables.reading_rows import (
+    figures_at_end,
+    orders_of,
+    rows_of_readings,
+    without_failed,
+)
 from paint_deposition.files.tables.sheets import Sheet, text_of
 from paint_deposition.files.tables.table import Table
 
-# Coordinates without a unit that go beyond this are millimetres: no part is so large in metres.
-LARGEST_PART_M = 20.0
 GUESSED = 'no unit is given'
 
 
@@ -42,6 +55,7 @@ class ReadingTable:
     orders: tuple[tuple[list[int], int], ...]
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None
+    layers: list[str]  # what each column of the thickness is a layer of; none where it is not
     left_out: str  # what was not taken for a row, for the user
 
     @staticmethod
@@ -53,48 +67,32 @@ class ReadingTable:
         A row with one of ``labels``, those of the listed points, is no statistic. Raises
         ReadingsError where there is no such table; its lines are complained of later, all at once.
         """
-        numbers = [n for n in layout.columns.values() if isinstance(n, int)]
-        numbered = 0 < len(numbers) == len(layout.columns)
-
-        known = _known(films, layout)
-        least = max(numbers) if numbered else 0
-        sheet, header = cells_of.find_table(path, ReadingsError, known, layout.sheet, least)
-        first = 0 if numbered or header is None else header + 1
-        headings = cells_of.headings_in(sheet.rows[header or 0]) if sheet.rows else []
-        if numbered:
-            headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
-        units_too = 'unit' not in known_columns.columns_of(headings, layout)
-        headings, rows = cells_of.rows_below(sheet, headings, first, units_too)
-        at = known_columns.columns_of(headings, layout)
-        if not known(headings) or (header is None and not numbered):
-            named = [] if header is None else headings
-            why = known_columns.not_found(sheet, named, films, layout)
-            raise ReadingsError(f'{path}: {why}')
-        table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
-        again = [] if header is None else headings_again(table, header, known)
-        table = table.select([row for row in rows if row not in again])
-        refuse_rivals(table, at)
-        refuse_merged(table, [] if 'thickness' in layout.columns else at.get('thickness', []))
-        if numbered and layout.decimal != '.':
-            refuse_cut_numbers(table)
+        # The sheet, its headings, and the columns of the quantities.
+        named = [name for quantity in layout.columns for name in layout.named(quantity)]
+        numbers = [name for name in named if isinstance(name, int)]
+        bare = 0 < len(numbers) == len(named)
+        sheet, header, table, at = _columns_in(path, films, layout, max(numbers) if bare else 0)
+        layers = layers_of(table.headings, layout, at['thickness']) if films else []
+        refuse_misleading(table, at, layout, layers, bare)
+        # The cells: one reading in each, its unit in the heading, and none that is no reading.
+        if films and not layers:
+            table = table.with_repeats_apart(at)
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in at.get(q, [])]
         numeric += at['thickness'] if films else []
-        table = table.without_units_in_cells(numeric)
-        table, doubt = table.with_decimal(numeric, layout.decimal)
-        if doubt:
-            raise table.error(doubt)
+        table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
+        table, failed = without_failed(table, at['thickness']) if films else (table, '')
         if films and layout.zero == 'missing':
-            table = table.without_zeros(at['thickness'])
-        kept, missing, left_out = rows_of_readings(table, at, films, numeric, {*labels})
+            table = table.without(at['thickness'], lambda _, cell: table.is_zero(cell))
+        # The rows that are readings or points, and their order.
+        kept, missing, left_out = rows_of_readings(table, at, films, numeric, {*labels}, bare)
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
-        begin = table.lines[0] if numbered else sheet.lines[header or 0] + 1
+        begin = table.lines[0] if bare else sheet.lines[header or 0] + 1
         orders = orders_of(table, kept, missing, begin)
         table = table.select(kept)
-        return ReadingTable(
-            table, at, layout, orders, _unit_beside(table, at, sheet, header or 0), left_out
-        )
+        unit_m = _unit_beside(table, at, sheet, header or 0)
+        return ReadingTable(table, at, layout, orders, unit_m, layers, left_out + failed)
 
     def __len__(self) -> int:
         return len(self.table)
@@ -124,7 +122,7 @@ class ReadingTable:
     @property
     def named_by(self) -> tuple[str, ...]:
         """The quantities that name a point."""
-        ways = (('point',), ('row', 'column'), ('number',))
+        ways = (('point',), ('row', 'column'), ('block', 'number'), ('number',))
         return next((way for way in ways if self.has(*way)), ())
 
     @property
@@ -145,7 +143,7 @@ class ReadingTable:
         headings = [self.table.headings[self.at[quantity][0]] for quantity in quantities]
         units = {given} if given else {heading.unit_m for heading in headings}
         unknown = {repr(h.unit) for h in headings if h.unit and not (given or h.unit_m)}
-        if unknown or len(units) > 1 or not units <= {None, *known_columns.LENGTH_UNITS}:
+        if unknown or len(units) > 1 or not units <= {None, *LENGTH_UNITS}:
             named = unknown or [UNIT_NAMES[unit] if unit else 'no unit' for unit in units]
             found = ' and '.join(named)
             raise self.table.error(
@@ -154,7 +152,8 @@ class ReadingTable:
         unit, how = units.pop(), ''
         if unit is None:
             largest = float(np.nanmax(np.abs(values), initial=0.0))
-            unit = 1e-3 if largest > LARGEST_PART_M else 1.0
+            # No part is so large in metres.
+            unit = 1e-3 if largest > 20.0 else 1.0
             how = f' ({GUESSED}; the largest is {largest:.4g})'
         # A division by 1000 comes nearer to the text than a product with 0.001.
         metric = unit in (1.0, 1e-2, 1e-3)
@@ -190,10 +189,10 @@ class ReadingTable:
                 )
         return tuple(found)
 
-    def films_um(self) -> tuple[np.ndarray, np.ndarray, str]:
-        """All readings (N,) [um], the row of each, and what they are in words.
+    def films_um(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
+        """All readings (N,) [um], the row and the layer of each, and what they are in words.
 
-        A row gives as many readings as it has columns of repeats that are not blank.
+        A row gives as many readings as it has columns of repeats or layers that are not blank.
         """
         films = self.at['thickness']
         values = np.column_stack([self.table.numbers(k, may_be_empty=True) for k in films])
@@ -210,12 +209,47 @@ class ReadingTable:
         how = '' if unit else f' ({GUESSED})'
         factor = round((unit or 1e-6) * 1e6, 9)
         words = f'thickness in {UNIT_NAMES[unit or 1e-6]}{how}{source}'
-        return values[row, which] * factor, row, words
+        layers = (
+            np.array(self.layers)[which] if self.layers else np.array(self.texts('layer'))[row]
+        )
+        return values[row, which] * factor, row, layers, words
+
+
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, a zip, Parquet, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() in ('.json', '.zip', '.parquet')
 
 
 def holds_readings(path: Path) -> bool:
     """Whether a file has a table in which a column is known as the thickness."""
-    return cells_of.find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
+    return find_table(path, ReadingsError, _known(True, Layout()))[1] is not None
+
+
+def _columns_in(
+    path: Path, films: bool, layout: Layout, wide: int
+) -> tuple[Sheet, int | None, Table, dict[str, list[int]]]:
+    """The sheet, the row of its headings, the rows below, and the columns of each quantity.
+
+    ``wide`` is the number of columns of a table without headings, 0 for one that has them.
+    """
+    known = _known(films, layout)
+    sheet, header = find_table(path, ReadingsError, known, layout.sheet, wide)
+    headings = headings_in(sheet.rows[header or 0]) if sheet.rows else []
+    if wide:
+        headings = [Heading(f'column {k + 1}', ()) for k in range(len(headings))]
+    first = 0 if wide or header is None else header + 1
+    units_too = 'unit' not in columns_of(headings, layout)
+    headings, rows = rows_below(sheet, headings, first, units_too)
+    if not known(headings) or (header is None and not wide):
+        why = not_found(sheet, [] if header is None else headings, films, layout)
+        raise ReadingsError(f'{path}: {why}')
+    table = Table(path, sheet.form, headings, sheet.rows, sheet.lines, ReadingsError)
+    again = [] if header is None else headings_again(table, header, known)
+    table = table.select([row for row in rows if row not in again])
+    return sheet, header, table, columns_of(headings, layout)
 
 
 def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
@@ -223,7 +257,7 @@ def _known(films: bool, layout: Layout) -> Callable[[list[Heading]], int]:
     needed = (('thickness',),) if films else (AXES, ON_FACE)
 
     def known(headings: list[Heading]) -> int:
-        at = known_columns.columns_of(headings, layout)
+        at = columns_of(headings, layout)
         return len(at) if any({*names} <= {*at} for names in needed) else 0
 
     return known
@@ -236,12 +270,12 @@ def _unit_beside(
     if 'unit' in at:
         texts = sorted({text for text in table.texts(at['unit'][0]) if text})
         units = {length_of(text) for text in texts}
-        if len(units) > 1 or not units <= {*known_columns.FILM_UNITS}:
+        if len(units) > 1 or not units <= {*FILM_UNITS}:
             found = ', '.join(map(repr, texts))
             raise table.error(f'the thickness is in {found}; give all of it in µm, mil or mm')
         return next(iter(units), None)
     for row in sheet.rows[:header]:
         cells = [part for cell in row for part in text_of(cell).split(':') if part]
-        if len(cells) > 1 and ' '.join(words_of(cells[0])) in known_columns.ALIASES['unit']:
+        if len(cells) > 1 and ' '.join(words_of(cells[0])) in ALIASES['unit']:
             return length_of(cells[1])
     return None

@@ -1,17 +1,18 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
+import json
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
 
-from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.parquet import MAGIC, require_pyarrow
+from paint_deposition.errors import PaintError, some
+from paint_deposition.files.atomic import MAGIC, read_file, require_pyarrow, require_small_package
+from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -23,10 +24,11 @@ ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': '
 MOST_CELLS = 10_000_000
 MOST_TABLE_MB = 500
 # The place of a cell, of a row, or of the end of the table.
-XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]{0,3})(\d{1,7})["\']')
+XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
+ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV, TXT or Parquet, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV, TXT, JSON or Parquet, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -54,21 +56,58 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     A file that is neither raises ``refusal``.
     """
     try:
-        content = read_file(path, refusal, MOST_TABLE_MB)
+        content = _content(path, refusal)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
+    except (zipfile.BadZipFile, RuntimeError, ValueError) as error:  # also encrypted ones
+        raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
         if content.startswith(MAGIC):
             require_pyarrow(str(path))
             return [_sheet_of_parquet(content)]
-        return _sheets_of_text(*_decoded(content))
+        texts = _decoded(content)
+        if content.lstrip()[:1] in (b'[', b'{') and (records := _records(texts[0][0])):
+            return [records]
+        return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
+
+
+def _content(path: Path, refusal: type[PaintError]) -> bytes:
+    """What a file holds, or the table in a folder or a zip of files.
+
+    That is its only file, or what ``FOLDERS`` has of it, one below the other.
+    """
+    if path.is_dir():
+        named = {file.name: file for file in path.iterdir() if file.is_file()}
+        wanted = _table_in(named, path, refusal)
+        return b'\n'.join(read_file(named[name], refusal, MOST_TABLE_MB) for name in wanted)
+    content = read_file(path, refusal, MOST_TABLE_MB)
+    if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
+        return content
+    with zipfile.ZipFile(BytesIO(content)) as package:
+        members = [name for name in package.namelist() if not name.endswith('/')]
+        if {'[Content_Types].xml', 'content.xml'} & {*members}:
+            return content  # a workbook
+        require_small_package(package)
+        names = {Path(name).name: name for name in members}
+        return b'\n'.join(package.read(names[name]) for name in _table_in(names, path, refusal))
+
+
+def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> Sequence[str]:
+    """The names of the files, of those in a folder, that are its one table."""
+    for wanted in FOLDERS.values():
+        if {*wanted} <= {*names}:
+            return wanted
+    visible = sorted(name for name in names if not name.startswith('.'))
+    if len(visible) != 1:
+        raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
+    return visible
 
 
 def text_of(cell: Cell) -> str:
@@ -76,18 +115,46 @@ def text_of(cell: Cell) -> str:
     return f'{cell:.15g}' if isinstance(cell, float) else cell
 
 
-def _decoded(content: bytes) -> tuple[str, str]:
-    """The text and the encoding's name: by its byte order mark, else UTF-8, else cp1252."""
+def _decoded(content: bytes) -> list[tuple[str, str]]:
+    """The text and the encoding's name: by its mark, else UTF-8, else what it may be."""
     marked = [codec for mark, codec in ENCODINGS.items() if content.startswith(mark)]
-    for codec in marked or ('utf-8', 'cp1252'):
+    found = []
+    for codec in marked or ('utf-8', 'cp1252', 'cp932'):
         try:
             text = content.decode(codec)
         except UnicodeDecodeError:
             continue
         if '\0' not in text:
             name = codec.removesuffix('-sig')
-            return text, name.upper() if name.startswith('utf') else name
-    raise ValueError('text')
+            found.append((text, name.upper() if name.startswith('utf') else name))
+        if codec.startswith('utf'):
+            break
+    if not found:
+        raise ValueError('text')
+    return found
+
+
+def _records(text: str) -> Sheet | None:
+    """The first list of records in JSON as a table, what stands beside it above; else None."""
+    try:
+        found = json.loads(text, parse_int=float)
+    except (ValueError, RecursionError):
+        return None
+    above = list[list[Cell]]()
+    while isinstance(found, dict):
+        above += [[_cell(key), _cell(v)] for key, v in found.items() if not _is_nested(v)]
+        found = next((value for value in found.values() if _is_nested(value)), None)
+    records = [one for one in found or () if isinstance(one, dict)]
+    if not records:
+        return None
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    cells = [[record.get(key) for key in keys] for record in records]
+    rows = [['' if v is None or _is_nested(v) else _cell(v) for v in row] for row in cells]
+    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
+
+
+def _is_nested(value: object) -> bool:
+    return isinstance(value, dict | list)
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
@@ -105,6 +172,12 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     by_blanks = enumerate((list[Cell](line.split()) for line in lines), 1)
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
     whole = Sheet.of(by_lines, f'one column, {encoding}')
+    for name, pattern in LINES.items():
+        found = [(number, pattern.fullmatch(line)) for number, line in enumerate(lines, 1)]
+        rows = [(n, [_cell(part or '') for part in one.groups()]) for n, one in found if one]
+        if 2 * len(rows) > len(whole.rows):
+            headings = (max(rows[0][0] - 1, 0), [*map(_cell, pattern.groupindex)])
+            sheets.append(Sheet.of([headings, *rows], f'{name}, {encoding}'))
     return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
 
 
@@ -124,18 +197,49 @@ def _sheets_of_workbook(content: bytes) -> list[Sheet]:
 
 
 def _refuse_far_cells(content: bytes) -> None:
-    """Refuse an .xlsx with a stray cell so far away that its sheet would fill the memory."""
+    """Refuse a workbook whose sheets would fill the memory: by a stray cell far away in an .xlsx,
+    by cells that are said to repeat in an .ods.
+    """
     if not zipfile.is_zipfile(BytesIO(content)):
         return
     with zipfile.ZipFile(BytesIO(content)) as package:
         require_small_package(package)
+        cells = 0
         for name in package.namelist():
-            if not (name.startswith('xl/') and name.endswith('.xml')):
-                continue
-            places = set(XLSX_CELL.findall(package.read(name)))
-            widths = [sum(26**k * (c & 31) for k, c in enumerate(a[::-1])) for a, _ in places]
-            if max(widths, default=0) * max((int(r) for _, r in places), default=0) > MOST_CELLS:
-                raise ValueError('a workbook (delete what lies far outside the table)')
+            if name.startswith('xl/') and name.endswith('.xml'):
+                places = set(XLSX_CELL.findall(package.read(name)))
+                # As many letters and digits as make any sheet too large.
+                names = (column[:7][::-1] for column, _ in places)
+                widths = (sum(26**k * (c & 31) for k, c in enumerate(name)) for name in names)
+                rows = (int(row) if len(row) < 10 else 10**9 for _, row in places)
+                cells = max(cells, max(widths, default=0) * max(rows, default=0))
+            if name == 'content.xml':
+                cells = max(cells, _cells_of_open_document(package.read(name)))
+    if cells > MOST_CELLS:
+        raise ValueError('a workbook (delete what lies far outside the table)')
+
+
+def _cells_of_open_document(content: bytes) -> int:
+    """The cells up to the last that holds something, those that are said to repeat in full."""
+    from lxml import etree
+
+    cells = width = height = 0
+    try:
+        rows = etree.iterparse(
+            BytesIO(content), tag=f'{ODS_TABLE}table-row', resolve_entities=False
+        )
+        for _, row in rows:
+            at = last = 0
+            for cell in row:
+                at += int(cell.get(f'{ODS_TABLE}number-columns-repeated', 1))
+                last = at if len(cell) or len(cell.attrib) > 1 else last
+            height += int(row.get(f'{ODS_TABLE}number-rows-repeated', 1))
+            width = max(width, last)
+            cells = max(cells, width * height * bool(last))
+            row.clear()
+    except etree.XMLSyntaxError as error:
+        raise ValueError(f'a workbook ({error})') from None
+    return cells
 
 
 def _sheet_of_parquet(content: bytes) -> Sheet:
@@ -164,3 +268,23 @@ def _cell(value: object) -> Cell:
         return float(value)
     text = ' '.join(str(value).strip().splitlines())
     return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
+
+
+def cell_at(row: list[Cell], column: int) -> Cell:
+    """The cell of a row in a column, '' where the row is shorter."""
+    return row[column] if column < len(row) else ''
+
+
+def is_comment(row: list[Cell]) -> bool:
+    """Whether a row is a comment; '#' alone heads a column of numbers."""
+    return text_of(row[0]).startswith('#') and (row[0] != '#' or len(row) == 1)
+
+
+def is_value(cell: Cell) -> bool:
+    """Whether a cell looks like a number, with or without a unit behind it."""
+    return isinstance(cell, float) or re.match(r'[+\-−<>]?\s*[.,]?\d', cell) is not None
+
+
+def is_nothing(cell: Cell) -> bool:
+    """Whether a cell is blank or says that there is no reading."""
+    return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None

@@ -8,21 +8,19 @@ from typing import TypeVar
 
 import numpy as np
 
-from paint_deposition.errors import PaintError, some
-from paint_deposition.files.tables.headings import UNITS, Heading, unit_of
-from paint_deposition.files.tables.sheets import Cell, Sheet, read_sheets, text_of
-
-# A heading further down than this is none.
-MOST_LINES_ABOVE = 200
-MOST_COMPLAINTS_SHOWN = 8
-NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
-# With one mark only, three digits behind it may be thousands.
-IN_DOUBT = re.compile(r'[+-]?[1-9]\d{0,2},\d{3}')
-UNIT_BEHIND = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
-# Cells with which a gauge says that it has no reading.
-NOTHING = re.compile(
-    r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
+from paint_deposition.errors import PaintError
+from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
+from paint_deposition.files.tables.sheets import (
+    Cell,
+    cell_at,
+    is_nothing,
+    is_value,
+    text_of,
 )
+
+MOST_COMPLAINTS_SHOWN, MOST_REPEATS = 8, 50
+NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
+NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 Kind = TypeVar('Kind', bound='Table')
 SWITCHED = {
     **dict.fromkeys(('true', 'on', 'yes', 'wahr', 'ein', 'an', 'ja'), 1.0),
@@ -52,7 +50,7 @@ class Table:
 
     def texts(self, column: int) -> list[str]:
         """A column as texts."""
-        return [text_of(_cell(row, column)) for row in self.rows]
+        return [text_of(cell_at(row, column)) for row in self.rows]
 
     def numbers(
         self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
@@ -65,7 +63,7 @@ class Table:
         values = np.full(len(self), np.nan)
         name = self.headings[column].text or f'column {column + 1}'
         for index, row in enumerate(self.rows):
-            cell = _cell(row, column)
+            cell = cell_at(row, column)
             value = self._number(cell)
             if may_be_empty and is_nothing(cell):
                 continue
@@ -127,13 +125,45 @@ class Table:
             self, rows=[self.rows[k] for k in rows], lines=[self.lines[k] for k in rows]
         )
 
-    def without_zeros(self: Kind, columns: Collection[int]) -> Kind:
-        """The table with a missing reading in place of each zero of these columns."""
+    def without(
+        self: Kind, columns: Collection[int], is_none: Callable[[int, Cell], bool]
+    ) -> Kind:
+        """The table with n/a in place of the cells of columns that are none, by row and cell."""
         rows = [
-            ['n/a' if k in columns and self._number(c) == 0.0 else c for k, c in enumerate(row)]
-            for row in self.rows
+            ['n/a' if k in columns and is_none(n, c) else c for k, c in enumerate(row)]
+            for n, row in enumerate(self.rows)
         ]
         return replace(self, rows=rows)
+
+    def is_zero(self, cell: Cell) -> bool:
+        """Whether a cell is the number 0."""
+        return self._number(cell) == 0.0
+
+    def with_repeats_apart(self: Kind, at: dict[str, list[int]]) -> Kind:
+        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.
+
+        ``at`` gets the new columns of the thickness.
+        """
+        width, extra = len(self.headings), list[int]()
+        cells = [
+            [text_of(cell_at(row, k)).split(';') for k in at['thickness']] for row in self.rows
+        ]
+        most = max((len(parts) for row in cells for parts in row), default=1)
+        if not 1 < most <= MOST_REPEATS or max(map(len, self.rows)) > width:
+            return self
+        headings, rows = [*self.headings], [[*r, *[''] * (width - len(r))] for r in self.rows]
+        for place, k in enumerate(at['thickness']):
+            for number in range(most):
+                column = k if number == 0 else len(headings)
+                if number:
+                    text = f'{self.headings[k].text} ({number + 1})'
+                    headings.append(replace(self.headings[k], text=text))
+                    extra.append(column)
+                for row, parts in zip(rows, cells, strict=True):
+                    part = parts[place][number].strip() if number < len(parts[place]) else ''
+                    row[column : column + 1] = [part]
+        at['thickness'] = [*at['thickness'], *extra]
+        return replace(self, headings=headings, rows=rows)
 
     def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
         """The table with the units behind all numbers of a column in its heading instead.
@@ -142,11 +172,11 @@ class Table:
         """
         headings, rows = [*self.headings], self.rows
         for k in columns:
-            if not any(_behind(_cell(row, k)) for row in rows[:MOST_LINES_ABOVE]):
+            if not any(_behind(cell_at(row, k)) for row in rows[:MOST_LINES_ABOVE]):
                 continue
-            split = [_behind(_cell(row, k)) for row in rows]
+            split = [_behind(cell_at(row, k)) for row in rows]
             bare = any(
-                not s and is_value(_cell(row, k)) for s, row in zip(split, rows, strict=True)
+                not s and is_value(cell_at(row, k)) for s, row in zip(split, rows, strict=True)
             )
             units = [unit_of(found[2]) for found in split if found]
             all_units = {*units, headings[k].unit or ('' if bare else units[0])}
@@ -160,19 +190,24 @@ class Table:
             ]
         return replace(self, headings=headings, rows=rows)
 
-    def with_decimal(self: Kind, columns: Iterable[int], given: str = '') -> tuple[Kind, str]:
-        """The table with the decimal mark of these columns, and what is in doubt ('' for nothing).
+    def with_decimal(
+        self: Kind, columns: Iterable[int], given: str = '', certain: bool = True
+    ) -> Kind:
+        """The table with the decimal mark of these columns, ``given`` where the user says it.
 
-        ``given`` is the mark where the user says it.
+        A mark that is in doubt is refused, unless it need not be ``certain``.
         """
         seen: dict[str, str] = {}
         only_in_doubt = True
         for row, line in zip(self.rows, self.lines, strict=True):
-            for cell in (_cell(row, column) for column in columns):
+            for cell in (cell_at(row, column) for column in columns):
                 if isinstance(cell, str) and re.fullmatch(r'[+−-]?[\d.,]+(e[+-]?\d+)?', cell):
                     for mark in {'.', ','} & {*cell}:
                         seen.setdefault(mark, f"'{cell}' in line {line}")
-                    only_in_doubt &= ',' not in cell or bool(IN_DOUBT.fullmatch(cell))
+                    # With one mark only, three digits behind it may be thousands.
+                    only_in_doubt &= ',' not in cell or bool(
+                        re.fullmatch(r'[+-]?[1-9]\d{0,2},\d{3}', cell)
+                    )
         mark, doubt = given or (',' if ',' in seen else '.'), ''
         if not given and len(seen) > 1:
             doubt = (
@@ -184,112 +219,12 @@ class Table:
                 f'{seen[","]} may have a decimal comma or a comma between thousands; say '
                 'decimal: comma, or leave the thousands unmarked'
             )
+        if doubt and certain:
+            raise self.error(doubt)
         form = self.form + (', decimal comma' if mark == ',' else '')
-        return replace(self, decimal=mark, form=form), doubt
-
-
-def find_table(
-    path: Path,
-    refusal: type[PaintError],
-    known: Callable[[list[Heading]], int],
-    sheet: str = '',
-    columns: int = 0,
-) -> tuple[Sheet, int | None]:
-    """The sheet with a table, and the row of its headings; None where none is found.
-
-    ``known`` counts the quantities that a row of headings names, 0 where a needed one is missing.
-    ``sheet`` names a workbook's sheet; ``columns`` is how many a table without headings has at
-    least, 0 where that is not known. Raises ``refusal`` for a file that cannot be read, or with
-    tables in several sheets.
-    """
-    sheets = read_sheets(path, refusal)
-    if sheet:
-        named = [s for s in sheets if s.form == f"sheet '{sheet}'"]
-        if not named:
-            there = ', '.join(s.form for s in sheets)
-            raise refusal(f"{path}: there is no sheet '{sheet}' (there are: {there})")
-        sheets = named
-    found: list[tuple[Sheet, int]] = []
-    for one in sheets:
-        above = one.rows[:MOST_LINES_ABOVE]
-        ranks = [(known(headings_in(row)), not is_comment(row)) for row in above]
-        best = max(ranks, default=(0, False))
-        if best[0] and _is_split_alike(one.rows, ranks.index(best)):
-            found.append((one, ranks.index(best)))
-    if len(found) > 1 and found[0][0].form.startswith('sheet'):
-        found_in = ' and '.join(one.form for one, _ in found)
-        raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
-    # A lone heading is a column of numbers, not of what their decimal commas would cut apart.
-    wide = [(one, row) for one, row in found if len(one.rows[row]) > 1]
-    if found:
-        return (wide or found[-1:])[0]
-    wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
-    if columns and wide_enough:
-        return wide_enough[0], None
-    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
-    by_marks = [s for s in apart if not s.form.startswith('blanks')]
-    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
-
-
-def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:
-    """Whether numbers below headings of several cells stand in several cells, too.
-
-    Else the headings are cut at a mark, or a blank, that is part of them: 'DFT [mil]'.
-    """
-    below = rows[header + 1 : header + 1 + MOST_LINES_ABOVE]
-    counts = [len(row) > 1 for row in below if re.search(r'\d', ''.join(map(text_of, row)))]
-    return len(rows[header]) == 1 or 2 * sum(counts) >= len(counts)
-
-
-def widest(sheet: Sheet) -> list[Cell]:
-    """The cells of the first row of a sheet with the most of them that are not blank."""
-    above = ([cell for cell in row if cell != ''] for row in sheet.rows[:MOST_LINES_ABOVE])
-    return max(above, key=len, default=[])
-
-
-def headings_in(row: list[Cell]) -> list[Heading]:
-    """The cells of a row as headings."""
-    return [Heading('#', ('#',)) if cell == '#' else Heading.of(text_of(cell)) for cell in row]
-
-
-def rows_below(
-    sheet: Sheet, headings: list[Heading], first: int, units_too: bool = True
-) -> tuple[list[Heading], list[int]]:
-    """Rows from ``first`` on without comments; a row of units, if any, goes to the headings."""
-    rows = [k for k in range(first, len(sheet.rows)) if not is_comment(sheet.rows[k])]
-    cells = sheet.rows[rows[0]] if rows and units_too else []
-    units = [unit_of(text_of(cell)) for cell in cells]
-    if not UNITS.keys() & {*units} or any(map(is_value, cells)):
-        return headings, rows
-    pairs = zip(headings, [*units, *[''] * len(headings)], strict=False)
-    return [replace(heading, unit=unit or heading.unit) for heading, unit in pairs], rows[1:]
-
-
-def shown(headings: Sequence[Heading]) -> str:
-    """The headings of a table in brackets, for a message."""
-    named = [repr(heading.text) for heading in headings if heading.text]
-    return f'(columns: {some(named, 20) or "none"})'
-
-
-def is_comment(row: list[Cell]) -> bool:
-    """Whether a row is a comment; '#' alone heads a column of numbers."""
-    return text_of(row[0]).startswith('#') and (row[0] != '#' or len(row) == 1)
-
-
-def is_value(cell: Cell) -> bool:
-    """Whether a cell looks like a number, with or without a unit behind it."""
-    return isinstance(cell, float) or re.match(r'[+\-−<>]?\s*[.,]?\d', cell) is not None
-
-
-def is_nothing(cell: Cell) -> bool:
-    """Whether a cell is blank or says that there is no reading."""
-    return not isinstance(cell, float) and NOTHING.fullmatch(cell) is not None
+        return replace(self, decimal=mark, form=form)
 
 
 def _behind(cell: Cell) -> re.Match | None:
     """A number and what stands behind it, such as its unit."""
-    return None if isinstance(cell, float) else UNIT_BEHIND.fullmatch(cell)
-
-
-def _cell(row: list[Cell], column: int) -> Cell:
-    return row[column] if column < len(row) else ''
+    return None if isinstance(cell, float) else NUMBER_AND_MORE.fullmatch(cell)

@@ -48,6 +48,7 @@ class Experiment:
     films: WetFilms = ONE_FILM  # what is read, as wet films that sub-steps of the path laid
     layer: str = TOTAL  # what is read, by the names of its coats
     zones: PointZones | None = None  # of the vertices of the surface, each with a target
+    target: tuple[float, float] | None = None  # its own target and tolerance [um]
 
     @staticmethod
     def of(
@@ -66,7 +67,7 @@ class Experiment:
             raise ReadingsError(
                 f'{readings.source}: readings of the layers {", ".join(map(repr, layers))}, and '
                 'nothing says which motion laid which; name the coats (coats: in a campaign, '
-                '--coat with simulate)'
+                '--coat with simulate), or the one column to read (columns: {thickness: ...})'
             )
         means = PointMeans.of(readings)
         normals = None if readings.normals is None else readings.normals[means.first]
@@ -91,7 +92,7 @@ class Experiment:
             self.name, self.surface, self.path, readings, self.files, self.settings,
             self.switched_off, self.frame_id, self.films,
         )  # fmt: skip
-        return replace(found, layer=self.layer, zones=self.zones)
+        return replace(found, layer=self.layer, zones=self.zones, target=self.target)
 
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The same part without some of the readings (N,) that were used.
@@ -210,7 +211,7 @@ class Campaign:
 
     def target_of(self, experiment: Experiment) -> tuple[float, float]:
         """Target and tolerance of the film read [um]; 0 is none, as for some of the coats."""
-        wanted = self.target_um or 0.0, self.tolerance_um or 0.0
+        wanted = experiment.target or (self.target_um or 0.0, self.tolerance_um or 0.0)
         return wanted if experiment.layer == TOTAL else (0.0, 0.0)
 
     @property

@@ -20,7 +20,7 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
-from paint_deposition.files.recordings.transforms import (
+from paint_deposition.files.recordings.pose_topics import (
     PART_POSE_TYPE,
     STATIC,
     part_pose_topics,

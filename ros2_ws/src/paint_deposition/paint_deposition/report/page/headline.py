@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.special import fdtrc
 
-from paint_deposition.files.templates import filled
+from paint_deposition.files.atomic import filled
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import percent

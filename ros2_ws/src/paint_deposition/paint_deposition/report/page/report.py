@@ -14,8 +14,7 @@ from matplotlib.figure import Figure
 
 from paint_deposition import __version__
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.files.atomic import write_text
-from paint_deposition.files.json_files import plain
+from paint_deposition.files.atomic import plain, write_text
 from paint_deposition.files.version import git_version
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.atomic import write_json
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import ModelFile
 from paint_deposition.files.provenance import origin
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide

@@ -10,9 +10,8 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
 from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
-from paint_deposition.files.atomic import write_text
+from paint_deposition.files.atomic import filled, write_text
 from paint_deposition.files.model_file import ModelFile, write_model
-from paint_deposition.files.templates import filled
 from paint_deposition.inference.diagnosis.closed_forms import (
     ClosedForm,
     Parameter,

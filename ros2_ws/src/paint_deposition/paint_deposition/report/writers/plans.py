@@ -12,13 +12,18 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import write_text
+from paint_deposition.files.atomic import write_json, write_text
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.json_files import write_json
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, MODEL_FILE, PLAN_FILE
-from paint_deposition.files.provenance import model_digest, origin
-from paint_deposition.files.rapid.writer import module_text
+from paint_deposition.files.provenance import (
+    DIGEST,
+    IMPROVEMENT_FILE,
+    MODEL_FILE,
+    PLAN_FILE,
+    model_digest,
+    origin,
+)
+from paint_deposition.files.rapid.program import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.files.tool_path import write_tool_path

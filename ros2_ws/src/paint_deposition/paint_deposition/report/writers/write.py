@@ -11,9 +11,8 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import replacing
+from paint_deposition.files.atomic import replacing, write_json
 from paint_deposition.files.gauge_readings import table_text, write_predictions
-from paint_deposition.files.json_files import write_json
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.provenance import origin
 from paint_deposition.film.colour_scales import film_scale
