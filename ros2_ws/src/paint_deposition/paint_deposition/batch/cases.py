@@ -171,8 +171,10 @@ def digest_of(*values: Any) -> str:
 @cache
 def code_digest() -> str:
     """The same for all sources of the package and the versions of what computes its films."""
+    from paint_deposition.kernel.compiler import KIND
+
     package = Path(paint_deposition.__file__).parent
-    digest = hashlib.sha256(paint_deposition.__version__.encode())
+    digest = hashlib.sha256(f'{paint_deposition.__version__} for {KIND}'.encode())
     for library in ('numba', 'numpy', 'scipy'):
         digest.update(version(library).encode())
     for file in sorted(package.rglob('*.py')):
@@ -239,7 +241,8 @@ def _run_case(
     if code != code_digest():  # films are the same only by the same code
         raise ManyError(
             f'a worker on {gethostname()} has another paint_deposition '
-            f'({paint_deposition.__version__}), Numba, NumPy or SciPy; install the same there'
+            f'({paint_deposition.__version__}), Numba, NumPy or SciPy, or kind of processor; '
+            'install the same there, and set NUMBA_CPU_NAME=x86-64-v3 everywhere'
         )
     return work(pickle.loads(parameters), *map(_deserialised, inputs))
 

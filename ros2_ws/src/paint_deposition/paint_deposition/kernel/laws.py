@@ -4,9 +4,11 @@ from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import NamedTuple
 
+from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
 from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import njit
 
 
 class Ray(NamedTuple):
@@ -37,7 +39,8 @@ def in_precision(law: Law, real: type) -> Law:
 
     A literal 1.0 is of double precision, and one is enough to carry a whole loop over single
     precision into double and halve its speed. So the numbers in the law's code, and those of its
-    module that it names, are replaced by ones of type ``real``.
+    module that it names, are replaced by ones of type ``real``. What a user compiled for the law to
+    call is compiled anew, for the kernel's kind of processor.
     """
     code = law.__code__
     constants = tuple(_as_real(value, real) for value in code.co_consts)
@@ -56,6 +59,8 @@ def in_precision(law: Law, real: type) -> Law:
 
 
 def _as_real(value: object, real: type) -> object:
+    if isinstance(value, Dispatcher):
+        return njit(**value.targetoptions)(value.py_func)
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return real(value) if is_number else value
 
