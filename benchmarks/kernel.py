@@ -211,7 +211,7 @@ def dense_on_one_thread() -> tuple[float, np.ndarray]:
 
 
 def measure_kinds(rounds: int) -> dict[str, float]:
-    """Print ns per pair of each kind of compiled kernel, in turns; the pairs per second of each."""
+    """Print ns per pair of each kind of kernel, in turns; the pairs per second of each."""
     processes = {}
     for kind in kinds_at_hand():
         # Each compiles in a process of its own, which starts with its first task.
@@ -227,12 +227,10 @@ def measure_kinds(rounds: int) -> dict[str, float]:
     pairs, (*_, oldest) = dense().pairs, processes
     best = {kind: min(turn[kind][0] for turn in turns) for kind in processes}
     film_um = {kind: film for kind, (_, film) in turns[0].items()}
-    print('\nkinds of compiled kernel, single precision, 1 thread:')
+    print('\nkinds of compiled kernel, single precision, 1 thread: ns/pair')
     for kind, seconds in best.items():
         apart = np.abs(film_um[kind] - film_um[oldest]).max() / film_um[oldest].max()
-        print(
-            f'{kind:32}{1e9 * seconds / pairs:9.2f} ns/pair; {apart:.1e} of the peak off {oldest}'
-        )
+        print(f'{kind:32}{1e9 * seconds / pairs:9.2f}{apart:12.1e} of the peak off {oldest}')
     return {kind: pairs / seconds for kind, seconds in best.items()}
 
 

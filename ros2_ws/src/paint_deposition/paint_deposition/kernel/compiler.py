@@ -17,9 +17,9 @@ from numba.core.cpu import CPUContext
 from numba.core.registry import CPUDispatcher, CPUTarget
 from numba.core.target_extension import CPU, dispatcher_registry, jit_registry, target_registry
 
-# Intel since Haswell (2013) and AMD since Excavator (2015); servers of Intel since 2017, of AMD since
-# 2022. Each with what it has that older ones lack, and what LLVM is told of it: by itself it uses
-# half of a vector of 512 bits, because the first of these processors slowed down.
+# Servers of Intel since 2017 and of AMD since 2022; Intel since Haswell (2013) and AMD since
+# Excavator (2015). Each with what it has that older ones lack, and what LLVM is told of it: by
+# itself it uses half of a vector of 512 bits, because the first such processors slowed down.
 KINDS = {
     'x86-64-v4': ('avx512f avx512bw avx512cd avx512dq avx512vl', '-prefer-256-bit'),
     'x86-64-v3': ('avx2 bmi2 f16c fma lzcnt movbe', ''),
