@@ -39,7 +39,7 @@ def in_precision(law: Law, real: type) -> Law:
 
     A literal 1.0 is of double precision, and one is enough to carry a whole loop over single
     precision into double and halve its speed. So the numbers in the law's code, and those of its
-    module that it names, are replaced by ones of type ``real``. What the author of the law compiled
+    module that it names, are replaced by ones of type ``real``. What the law's author compiled
     for it to call is compiled anew, for the kernel's kind of processor.
     """
     code = law.__code__
