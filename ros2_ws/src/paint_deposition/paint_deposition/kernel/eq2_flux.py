@@ -210,7 +210,9 @@ def compile_kernel(
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
     variant = counts, shadowed, real.__name__, apart
     block = named_for_its_code(_variant(paint_block, names), laws, *variant)
-    block = njit(fastmath=True, error_model='numpy')(block)
+    # Inlined by force: else the process that compiles it runs another copy than those that find
+    # it on disk, with another last bit.
+    block = njit(fastmath=True, error_model='numpy', forceinline=True)(block)
     whole = _variant(accumulate, names | {'paint_block': block})
     whole = named_for_its_code(whole, laws, *variant)
     return njit(cache=True, nogil=True, fastmath=True, error_model='numpy')(whole)

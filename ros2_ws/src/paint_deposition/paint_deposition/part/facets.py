@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from paint_deposition.part.edges import edges_of
+from paint_deposition.part.edges import BLOCK, next_half_edge
 
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
@@ -69,16 +69,23 @@ class CurvedEdges:
         )
 
     @staticmethod
-    def of(vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> 'CurvedEdges':
+    def of(
+        vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, half_edges: np.ndarray
+    ) -> 'CurvedEdges':
         """Find them on the triangles of a file, whose smooth patches have corners of their own.
+
+        Of each edge one of its half-edges is given, or both.
 
         Facets that meet at a crease, see ``creases.CREASE_RAD``, have corners and normals of their
         own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
         """
-        edges = edges_of(faces)[0]
-        error = _bends(vertices_m, normals, edges)[0]
-        matter = np.flatnonzero(error > LEAST_ERROR)
-        edges = edges[matter[np.argsort(-error[matter], kind='stable')[:MOST_EDGES]]]
+        bent = []
+        for some in np.array_split(half_edges, 1 + len(half_edges) // BLOCK):
+            edges = faces.ravel()[np.stack([some, next_half_edge(some)], axis=1)]
+            bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
+        edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
+        worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
+        edges = edges[worst_first[:MOST_EDGES]]
         _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
         start, end = edges.T
         along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]

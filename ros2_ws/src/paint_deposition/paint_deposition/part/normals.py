@@ -3,10 +3,10 @@
 import math
 
 import numpy as np
-from scipy.sparse import coo_array
 
 from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.threads import shared_among_threads
+from paint_deposition.part.edges import rows_by_number
 
 # Near vertices shape the parabola by far the most.
 NEARNESS = 12.0
@@ -28,7 +28,8 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """
     vertices = np.ascontiguousarray(vertices_m, dtype=np.float64)
     triangles = np.ascontiguousarray(faces, dtype=np.int64)
-    first, corner = _corners_at(triangles, len(vertices))
+    # Corners 3 f + k at the vertices: those of v are corner[first[v] : first[v + 1]].
+    corner, first = rows_by_number(triangles.ravel(), len(vertices))
     normals = np.empty((len(vertices), 3))
 
     def fill(start: int, stop: int) -> None:
@@ -36,14 +37,6 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
     shared_among_threads(len(vertices), fill)
     return normals
-
-
-def _corners_at(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]:
-    """Corners 3 f + k at the vertices, those of v are ``corner[first[v] : first[v + 1]]``."""
-    corners = np.arange(faces.size)
-    one = np.ones(faces.size, dtype=np.int8)
-    at = coo_array((one, (faces.ravel(), corners)), shape=(count, faces.size)).tocsr()
-    return at.indptr, at.indices
 
 
 @njit(cache=True, nogil=True, error_model='numpy')

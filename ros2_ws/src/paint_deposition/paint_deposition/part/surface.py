@@ -88,11 +88,16 @@ class Surface:
         edges = Edges.of(faces)
         folds = creases.folds_rad(vertices_m, faces, edges)
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
-        origin, patches = creases.split_at_creases(faces, edges, folds, rim)
+        smooth = (np.abs(folds) <= creases.CREASE_RAD) & ~rim
+        origin, patches = creases.split_at_creases(faces, edges, smooth)
         rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
         strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
-        del edges, folds  # large ones, before the next are made
-        corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
+        corners = vertices_m[origin]
+        read_normals = surface_normals(corners, patches)
+        unjoined = edges.paired[~smooth, 1], edges.clashing.ravel(), edges.single
+        half_edges = np.concatenate([edges.paired[:, 0], *unjoined])
+        curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
+        del edges, folds, half_edges  # large ones, before the next are made
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
         vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
@@ -109,7 +114,7 @@ class Surface:
             rim_m,
             notes,
             in_hem=creases.carried_over(strip, fine, len(vertices)),
-            curved_edges=CurvedEdges.of(corners, read_normals, patches),
+            curved_edges=curved_edges,
             neighbours=neighbours_together(vertices),
         )
 

@@ -13,8 +13,9 @@ from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.edges import edges_of
+from paint_deposition.part.edges import coarse_faces, edges_of
 from paint_deposition.part.orientation import downhill_axis
+from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.pictures.chart import PAGE_IN, TEXT_PT, new_figure
@@ -22,6 +23,8 @@ from paint_deposition.report.style import INK, MUTED
 
 # Passes beside the part are shown as far off as the part is large; farther ones leave the picture.
 MARGIN_IN_PARTS = 1.0
+# A part of more triangles is drawn with vertices this share of its size apart, two pixels.
+MOST_FACES, CELL = 200_000, 1 / 500
 # Whether a triangle is hidden is seen from a place so far above it [m].
 LIFT_M = 1e-3
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
@@ -98,8 +101,10 @@ class PartPicture:
         """The part from the gun's side, gravity down."""
         view = View.of_front(surface.outward, surface.down)
         flat = view.flat(surface.vertices_m)
-        first, second = (flat[surface.faces[:, k]] - flat[surface.faces[:, 0]] for k in (1, 2))
-        front = surface.faces[first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]]
+        front = face_normals(surface.vertices_m, surface.faces) @ view.toward > 0.0
+        front = surface.faces[front]
+        if len(front) > MOST_FACES:
+            front = coarse_faces(surface.vertices_m, front, CELL * np.ptp(flat, axis=0).max())
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
         above = surface.vertices_m[faces].mean(axis=1) + LIFT_M * view.toward
         seen = surface.first_faces(above, np.tile(view.toward, (len(above), 1))) < 0
