@@ -9,8 +9,7 @@ from paint_deposition.batch.sweep_file import SweepFile, read_sweep
 from paint_deposition.batch.variations import variations, varied_model, varied_motion
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ManyError
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 
 

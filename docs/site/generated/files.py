@@ -10,8 +10,7 @@ from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
 from paint_deposition.files.tables.reading_columns import ALIASES, OWN
 from paint_deposition.files.zones_file import ZoneEntry
-from paint_deposition.model.brush import SetPoints
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)

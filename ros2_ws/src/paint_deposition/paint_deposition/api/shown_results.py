@@ -9,8 +9,8 @@ import trimesh
 from pydantic import BaseModel, ValidationError
 
 from paint_deposition.api.inference import compare, compare_models
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import LONGEST_QUOTED, PaintError
 from paint_deposition.files.atomic import read_file, require_file
 from paint_deposition.files.campaign_file import read_campaign

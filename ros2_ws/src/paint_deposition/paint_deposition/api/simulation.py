@@ -8,8 +8,13 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, RecordingError
-from paint_deposition.film.coats import TOTAL, Coats
-from paint_deposition.film.common_film import CommonFilm, LayeredFilm, require_one_finish
+from paint_deposition.film.common_film import (
+    TOTAL,
+    Coats,
+    CommonFilm,
+    LayeredFilm,
+    require_one_finish,
+)
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 
 import paint_deposition
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.user_effects import effect_of
+from paint_deposition.effects.catalogue import effect_of
 from paint_deposition.errors import ManyError
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.parquet import write_parquet

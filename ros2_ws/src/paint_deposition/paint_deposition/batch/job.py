@@ -22,8 +22,8 @@ from paint_deposition.batch.variations import (
     varied_motion,
 )
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import ManyError, PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh

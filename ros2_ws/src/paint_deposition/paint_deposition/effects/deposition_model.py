@@ -9,11 +9,10 @@ from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import Brush, listed
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern, listed
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # Flux below this share of the peak is left out of the film.
 CUT_FLUX = 1e-6

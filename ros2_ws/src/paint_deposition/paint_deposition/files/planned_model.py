@@ -8,7 +8,7 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import read_file
 from paint_deposition.files.model_file import ModelFile, read_model_file

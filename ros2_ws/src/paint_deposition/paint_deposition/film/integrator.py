@@ -14,13 +14,14 @@ import numpy as np
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.layout import (
+    LinesOfSight,
+    Sight,
     compiled_laws,
     emission_points_m,
     model_constants,
     step_rows,
     term_constants,
 )
-from paint_deposition.film.lines_of_sight import LinesOfSight, Sight
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.kernel.threads import shared_among_threads

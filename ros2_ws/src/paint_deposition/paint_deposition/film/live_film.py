@@ -17,8 +17,7 @@ from paint_deposition.motion.pose_stream import (
     PoseBatch,
     TriggerChange,
 )
-from paint_deposition.motion.trajectory import PoseCounts
-from paint_deposition.motion.trigger import BEFORE_ALL_NS, ONLY_BRUSH
+from paint_deposition.motion.trajectory import BEFORE_ALL_NS, ONLY_BRUSH, PoseCounts
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 

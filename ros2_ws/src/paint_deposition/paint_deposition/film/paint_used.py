@@ -9,9 +9,9 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import exp2
 from paint_deposition.kernel.laws import Law, Ray, product
 

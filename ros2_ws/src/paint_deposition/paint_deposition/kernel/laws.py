@@ -7,8 +7,7 @@ from typing import NamedTuple
 from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 
 class Ray(NamedTuple):

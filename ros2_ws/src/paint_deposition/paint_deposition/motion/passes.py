@@ -27,8 +27,7 @@ import math
 
 import numpy as np
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.motion.strokes import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,

@@ -7,12 +7,17 @@ from numpy.typing import ArrayLike
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.passes import first_pass, follow_passes
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path import SprayPath, followed_poses, split_segments
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
-from paint_deposition.motion.sub_steps import followed_poses, split_segments
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH, FlowSchedule, first_trigger, follow_trigger
+from paint_deposition.motion.trajectory import (
+    ONLY_BRUSH,
+    FlowSchedule,
+    PoseCounts,
+    Trajectory,
+    first_trigger,
+    follow_trigger,
+)
 
 DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008

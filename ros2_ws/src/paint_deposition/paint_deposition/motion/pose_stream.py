@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.stream_figures import RepeatedSamples
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.stream_quality import RepeatedSamples
+from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
 
 # Two hours at 250 Hz, 64 bytes a pose.
 DEFAULT_POSE_MEMORY = 2_000_000

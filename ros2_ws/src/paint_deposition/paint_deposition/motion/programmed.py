@@ -9,8 +9,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import Trajectory, numbered
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 POSE_PERIOD_S = 0.02

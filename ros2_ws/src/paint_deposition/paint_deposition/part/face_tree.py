@@ -9,8 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paint_deposition.kernel.blocks import bounding_box_m
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 # Faces in a leaf of the tree.
 LEAF = 8

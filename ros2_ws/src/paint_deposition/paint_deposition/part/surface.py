@@ -9,11 +9,11 @@ import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
 from paint_deposition.part import creases, derivatives, locating
+from paint_deposition.part.derivatives import surface_normals
 from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
 from paint_deposition.part.locating import Location
-from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
 from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine

@@ -8,7 +8,7 @@ from paint_deposition.errors import PlanError
 from paint_deposition.files.templates import filled
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 TEMPLATE = Path(__file__).parent / 'templates' / 'passes.mod.j2'
 

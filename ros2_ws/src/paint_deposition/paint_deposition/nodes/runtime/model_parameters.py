@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.film.common_film import require_one_finish
