@@ -29,8 +29,7 @@ from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import require_paint
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import MeasureRequest
 from paint_deposition.request import takes

@@ -24,8 +24,7 @@ from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface

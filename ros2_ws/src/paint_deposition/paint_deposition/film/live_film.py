@@ -10,14 +10,19 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
+from paint_deposition.motion.path_builder import PathBuilder
 from paint_deposition.motion.pose_stream import (
     DEFAULT_POSE_MEMORY,
     MotionLog,
     PoseBatch,
     TriggerChange,
 )
-from paint_deposition.motion.trajectory import BEFORE_ALL_NS, ONLY_BRUSH, PoseCounts
+from paint_deposition.motion.trajectory import (
+    BEFORE_ALL_NS,
+    DEFAULT_MAX_POSE_GAP_S,
+    ONLY_BRUSH,
+    PoseCounts,
+)
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 

@@ -1,35 +1,24 @@
 """From a stream of poses to the spray path: the one integrator of live node and offline run."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paint_deposition.errors import RecordingError
 from paint_deposition.motion.passes import first_pass, follow_passes
 from paint_deposition.motion.path import SprayPath, followed_poses, split_segments
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
 from paint_deposition.motion.trajectory import (
+    DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
     FlowSchedule,
     PoseCounts,
     Trajectory,
     first_trigger,
     follow_trigger,
+    gap_ns,
 )
 
-DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
-# A century [ns]: no longer gap is told from it, and sums of stamps and gaps fit 64 bits.
-LONGEST_GAP_NS = 3_155_760_000_000_000_000
-
-
-def gap_ns(max_pose_gap_s: float) -> int:
-    """The longest interval between poses that is no gap [ns], from seconds above 0."""
-    if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
-        raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
-    return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
 
 
 class PathBuilder:

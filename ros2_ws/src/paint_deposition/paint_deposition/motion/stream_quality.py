@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, gap_ns
 
 # Intervals whose median is the stream's rhythm, and how much longer a long one is.
 REMEMBERED = 250
