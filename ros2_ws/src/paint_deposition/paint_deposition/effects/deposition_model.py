@@ -14,9 +14,6 @@ from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
-# Flux below this share of the peak is left out of the film.
-CUT_FLUX = 1e-6
-
 
 class DepositionModel(BaseModel):
     """Eq. (1) projected by eq. (2), with any number of effects in the order given.
@@ -160,7 +157,8 @@ class DepositionModel(BaseModel):
 
     def reach_of_m(self, planar: PlanarPattern) -> float:
         """The same for one of its patterns [m]."""
-        return planar.radius_of_flux_m(CUT_FLUX) * self.widening
+        # Flux below this share of the peak is left out of the film.
+        return planar.radius_of_flux_m(1e-6) * self.widening
 
     @property
     def shadow(self) -> float:

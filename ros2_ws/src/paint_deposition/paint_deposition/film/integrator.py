@@ -30,8 +30,6 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 Precision = Literal['single', 'double']
-# Reach of a pattern that may still become wider [m].
-ANY_REACH_M = 1e6
 # Sub-steps handed to the kernel at once, so that long work can report progress.
 BATCH = 2048
 # Fewer rays, points times sub-steps, are painted before other threads wake.
@@ -133,7 +131,8 @@ class FilmIntegrator:
 
     def steps(self, path: SprayPath) -> Steps:
         """A path prepared for this model, to be painted again and again."""
-        return self._steps(self.sprayed(path)[0], ANY_REACH_M)
+        # The pattern may still become wider: any reach.
+        return self._steps(self.sprayed(path)[0], 1e6)
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""

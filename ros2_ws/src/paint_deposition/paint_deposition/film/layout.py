@@ -21,8 +21,6 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 Laws = tuple[tuple[Law, int], ...]
-# Stands for a gain of nothing, which has no logarithm [um/s].
-NO_GAIN_UM_PER_S = 1e-30
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
@@ -36,7 +34,8 @@ def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
     centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
     c = np.empty(kernel.MODEL_CONSTANTS)
     c[kernel.OMEGA] = projection.model_plane_m
-    c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], NO_GAIN_UM_PER_S))
+    # Stands for a gain of nothing, which has no logarithm [um/s].
+    c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
     c[kernel.RADIUS] = planar.r_m
     c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
     c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2

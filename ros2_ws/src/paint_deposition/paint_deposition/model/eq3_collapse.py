@@ -17,7 +17,6 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Film below this share of the peak is left out of sums over passes.
 NEGLIGIBLE = 1e-9
-HALF_WIDTH_POINTS = 4001
 
 
 class Collapse(Protocol):
@@ -44,7 +43,7 @@ class Collapse(Protocol):
 
 def half_width_m(collapse: Collapse) -> float:
     """SB50: width of a profile between its outermost places at half its peak [m]."""
-    x = np.linspace(-collapse.reach_m, collapse.reach_m, HALF_WIDTH_POINTS)
+    x = np.linspace(-collapse.reach_m, collapse.reach_m, 4001)
     film = collapse.thickness_um(x)
     above = x[film >= 0.5 * film.max()]
     return float(above[-1] - above[0])

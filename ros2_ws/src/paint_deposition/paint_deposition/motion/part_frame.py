@@ -100,10 +100,6 @@ def moved(trajectory: Trajectory, transform: Rigid, frame_id: str) -> Trajectory
 
 
 FEWEST_POINTS = 3
-# Points nearer to a line than this share of their spread leave the turn about it open.
-LEAST_WIDTH = 0.03
-# A misfit above this is warned of [m].
-NOTABLE_M = 0.002
 
 
 @dataclass(frozen=True)
@@ -142,7 +138,8 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
     points = np.array([points_m[name] for name in names])
     for what, positions in (('touched', touched), ('listed', points)):
         spread = np.linalg.svd(positions - positions.mean(axis=0), compute_uv=False)
-        if not spread[1] > LEAST_WIDTH * spread[0]:
+        # Points nearer to a line than this share of their spread leave the turn about it open.
+        if not spread[1] > 0.03 * spread[0]:
             raise RecordingError(
                 f'the {what} points {" ".join(names)} lie on a line, so that the part may be '
                 'turned about it; add a point beside it'
@@ -153,7 +150,8 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
     apart = np.linalg.norm(turn.apply(points - about) + middle - touched, axis=1)
     rms = float(np.sqrt(np.mean(apart**2)))
     warnings: tuple[str, ...] = ()
-    if rms > NOTABLE_M:
+    # A misfit above this is warned of [m].
+    if rms > 0.002:
         worst = names[int(np.argmax(apart))]
         warnings = (
             f'the points do not fit, {worst} is off by {apart.max() * 1e3:.1f} mm: touch it '

@@ -19,13 +19,8 @@ from paint_deposition.kernel.compiler import njit
 LEVER_M = 0.3
 # A segment is not cut finer, however far a pose is off: that is 80 m in one go.
 MOST_SUB_STEPS = 10_000
-# Poses are passed over until the spray has travelled this share of the longest sub-step...
+# Poses are passed over until the spray has travelled this share of the longest sub-step.
 LEAST_SHARE = 0.5
-# ... or this long [ns], so that the film grows under a gun that stands still.
-LEAST_NS = 50_000_000
-# A pose by which the way is longer than past it, by more than this share of such a travel, is a
-# corner and followed.
-CORNER_SHARE = 0.1
 
 
 @njit(cache=True)
@@ -93,11 +88,14 @@ def followed_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     """
     rows = np.zeros(len(stamps_ns), np.int64)
     count, last = 1, 0
-    longest_ns, least_m = min(LEAST_NS, max_gap_ns), LEAST_SHARE * max_step_m
+    # 50 ms at the most, so that the film grows under a gun that stands still.
+    longest_ns, least_m = min(50_000_000, max_gap_ns), LEAST_SHARE * max_step_m
     for i in range(1, len(stamps_ns)):
         if last < i - 1:
             detour_m = _detour_m(positions[last], positions[i - 1], positions[i])
-            if detour_m > CORNER_SHARE * least_m or stamps_ns[i] - stamps_ns[last] > max_gap_ns:
+            # A pose by which the way is longer than past it, by a tenth of such a travel, is a
+            # corner and followed.
+            if detour_m > 0.1 * least_m or stamps_ns[i] - stamps_ns[last] > max_gap_ns:
                 last = i - 1
                 rows[count] = last
                 count += 1

@@ -12,16 +12,13 @@ from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, gap_ns
 # Intervals whose median is the stream's rhythm, and how much longer a long one is.
 REMEMBERED = 250
 LONG = 1.5
-# Painting robots move their TCP at 3 m/s at most; stamps that tremble make any step of a slow gun
-# look fast.
-IMPOSSIBLE_M_PER_S = 10.0
+# Stamps that tremble make any shorter step of a slow gun look fast [m].
 LEAST_STEP_M = 0.05
 # Single steps between poses carry the noise of the encoders and the jitter of the stamps.
 WINDOW_NS, MOST_IN_WINDOW = 200_000_000, 2000
 # Equal values over a longer time are a robot that stands still [ns].
 LONGEST_REPEAT_NS = 50_000_000
-# So many repeats, and such a share of the samples, are the driver's habit; fewer are chance.
-FEWEST_REPEATS = 20
+# Such a share of repeats is the habit of a driver; fewer are chance.
 LEAST_SHARE = 0.2
 
 
@@ -74,7 +71,9 @@ class Jumps:
         self._last_ns, self._last_m = stamps_ns[-1:], positions_m[-1:]
         step_s = np.diff(stamps_ns) * 1e-9
         step_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
-        far = (step_s > 0.0) & (step_m > np.fmax(LEAST_STEP_M, IMPOSSIBLE_M_PER_S * step_s))
+        # Painting robots move their TCP at 3 m/s at most; stamps that tremble make any step of a
+        # slow gun look fast.
+        far = (step_s > 0.0) & (step_m > np.fmax(LEAST_STEP_M, 10.0 * step_s))
         self.count += int(np.count_nonzero(far))
         fastest = step_m[far] / step_s[far]
         self.fastest_m_per_s = float(np.max(fastest, initial=self.fastest_m_per_s))
@@ -137,7 +136,9 @@ class RepeatedSamples:
                 self._waiting += 1
                 soon = stamp_ns - self._since_ns <= LONGEST_REPEAT_NS
                 share = LEAST_SHARE * (self._seen + self._moved)
-                is_habit = self._seen >= FEWEST_REPEATS and self._seen >= share
+                # So many repeats, and such a share of the samples, are the driver's habit; fewer
+                # are chance.
+                is_habit = self._seen >= 20 and self._seen >= share
                 new[row] = not (soon and is_habit)
             self._last_ns = stamp_ns
         self.count += int(np.count_nonzero(~new))

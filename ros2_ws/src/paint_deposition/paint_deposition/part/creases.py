@@ -23,7 +23,6 @@ RIM_FOLD_RAD = np.radians(60.0)
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
 # Folds that turn more slowly belong to a curved surface.
-LEAST_RATE_PER_M = 20.0
 WIDEST_STRIP_M = 0.02
 LEAST_FOLD_RAD = np.radians(4.0)
 PIECE_M = 0.005
@@ -109,7 +108,8 @@ def hem_folds(
     triangle.
     """
     hem = np.zeros(len(folds_rad), dtype=bool)
-    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > LEAST_RATE_PER_M * width_m)
+    # Folds that turn more slowly belong to a curved surface.
+    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > 20.0 * width_m)
     rows = np.flatnonzero(close)
     if not len(rows):
         return hem

@@ -11,12 +11,7 @@ from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals
 
-# Near vertices shape the parabola by far the most.
-NEARNESS = 12.0
-# A fit that turns the normal further than this has met something else than a curve.
-LARGEST_CORRECTION_COSINE = math.cos(math.radians(15.0))
 # Of the fit's equations, by the Frobenius norm.
-WORST_CONDITION = 1e8
 TERMS = 5
 
 
@@ -121,7 +116,8 @@ def _equations(vertices, v, normal, near, system):
         terms[0], terms[1] = x, y
         terms[2], terms[3], terms[4] = 0.5 * x * x, x * y, 0.5 * y * y
         terms[5] = n0 * o0 + n1 * o1 + n2 * o2
-        weight = math.exp(-NEARNESS * (o0 * o0 + o1 * o1 + o2 * o2))
+        # Near vertices shape the parabola by far the most.
+        weight = math.exp(-12.0 * (o0 * o0 + o1 * o1 + o2 * o2))
         for i in range(TERMS):
             share = weight * terms[i]
             for j in range(i, TERMS + 1):
@@ -179,17 +175,16 @@ def _fill(vertices, faces, first, corner, start, stop, normals):
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)
         cosine = 1.0 / math.sqrt(1.0 + along * along + across * across)
-        if condition < WORST_CONDITION and cosine > LARGEST_CORRECTION_COSINE:
+        # A fit whose equations are ill conditioned, by the Frobenius norm, or that turns the normal
+        # further has met something else than a curve.
+        if condition < 1e8 and cosine > math.cos(math.radians(15.0)):
             for axis in range(3):
                 slope = along * one[axis] + across * other[axis]
                 normal[axis] = (normal[axis] - slope) * cosine
 
 
 RADIUS_M = 0.03
-# Surface whose normal points further away than this is another side of the part.
-OTHER_SIDE_COSINE = -0.25
 # Surface that has turned so far away from the gun within the radius lies round a rim.
-RIM_COSINE = np.cos(RIM_FOLD_RAD)
 SAME_PLACE_M = 1e-6
 
 
@@ -230,7 +225,8 @@ def _same_side(normals: np.ndarray, others: np.ndarray, offset_m: np.ndarray) ->
     cosine = np.einsum('ij,ij->i', normals, others)
     # Copies of a vertex on both sides of a rim lie at one place, but for the last bits.
     convex = np.einsum('ij,ij->i', others - normals, offset_m) > -SAME_PLACE_M
-    return cosine > np.where(convex, RIM_COSINE, OTHER_SIDE_COSINE)
+    # Surface that has turned so far within the radius lies round a rim, or is another side.
+    return cosine > np.where(convex, np.cos(RIM_FOLD_RAD), -0.25)
 
 
 def tangents(normals: np.ndarray) -> np.ndarray:

@@ -19,8 +19,6 @@ CANDIDATES = 4
 # Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
 SEAM_M = 3e-4
 SEAM_COSINE = -0.9
-# Vertices closer than this are one [m].
-WELD_M = 1e-6
 
 
 @njit(cache=True, nogil=True)
@@ -234,7 +232,8 @@ def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     first, label = equal_rows(one_zero.view(f'u{vertices_m.dtype.itemsize}'))
     places = vertices_m[first].astype(np.float64)
     tree = scipy.spatial.cKDTree(places, balanced_tree=False, compact_nodes=False)
-    close = tree.query_pairs(WELD_M, output_type='ndarray')
+    # Vertices closer than this are one [m].
+    close = tree.query_pairs(1e-6, output_type='ndarray')
     if len(close):
         count, group = connected(close, len(first))
         kept = np.empty(count, dtype=np.int64)

@@ -25,10 +25,7 @@ from paint_deposition.part.edges import BLOCK, next_half_edge
 LEAST_ERROR = 5e-4
 GUN_M = 0.3
 # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
-LEAST_EDGE_M = 0.004
 MOST_EDGES = 5_000
-# A point within a triangle lies near the middles of its sides, and of few others.
-NEAR_EDGES = 8
 
 
 @dataclass(frozen=True)
@@ -59,7 +56,8 @@ class CurvedEdges:
         """
         if not len(self):
             return np.zeros_like(positions_m), np.zeros_like(positions_m)
-        near = min(NEAR_EDGES, len(self))
+        # A point within a triangle lies near the middles of its sides, and of few others.
+        near = min(8, len(self))
         away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
         fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
         off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
@@ -112,7 +110,8 @@ def _bends(
     at_start, at_end = (np.einsum('ij,ij->i', normals[v], along) for v in (start, end))
     lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
     cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
-    return np.where(length < LEAST_EDGE_M, 0.0, cost), length, lean, sagitta
+    # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
+    return np.where(length < 0.004, 0.0, cost), length, lean, sagitta
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

@@ -9,9 +9,6 @@ from paint_deposition.errors import MeshError
 from paint_deposition.kernel.compiler import njit
 from paint_deposition.part.edges import edges_of
 
-# How many times longer than its base a sliver's sides are.
-SLENDERNESS = 3.0
-
 
 @dataclass(frozen=True)
 class CutEdges:
@@ -46,7 +43,8 @@ class CutEdges:
 def find_slivers(lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
     """(N,) rows of (F, 3) triangle sides that are slivers with both long sides too long."""
     base, side, _ = np.sort(lengths_m, axis=1).T
-    return np.flatnonzero(side > np.maximum(SLENDERNESS * base, max_edge_length_m))
+    # A sliver's sides are three times longer than its base.
+    return np.flatnonzero(side > np.maximum(3.0 * base, max_edge_length_m))
 
 
 def cut_edges(

@@ -19,9 +19,6 @@ from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine
 from paint_deposition.part.visibility import Occluder
 
-# A gun whose mean direction is shorter has turned to more sides of the part than one.
-ONE_WAY = 0.9
-
 
 @dataclass(frozen=True)
 class Surface:
@@ -226,7 +223,8 @@ class Surface:
 
     @property
     def _only_side(self) -> np.ndarray | None:
-        if self.gun_side is None or np.linalg.norm(self.gun_side) < ONE_WAY:
+        # A gun whose mean direction is shorter has turned to more sides of the part than one.
+        if self.gun_side is None or np.linalg.norm(self.gun_side) < 0.9:
             return None
         return self.outward
 

@@ -131,8 +131,6 @@ LIFT_M = 1e-4
 AZIMUTHS, ELEVATIONS = 32, 8
 SKY_RAYS = AZIMUTHS * ELEVATIONS
 FAR_M = 1e3
-BLOCK_RAYS = 1_000_000
-_GOLDEN_RATIO = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Occluder:
@@ -214,7 +212,7 @@ class Occluder:
         sky, weights = _sky()
         horizon = self.horizon_sines(points_m, normals)
         open_share = np.empty(len(points_m))
-        rows = BLOCK_RAYS // SKY_RAYS
+        rows = 1_000_000 // SKY_RAYS
         for start in range(0, len(points_m), rows):
             part = slice(start, start + rows)
             up = normals[part]
@@ -246,7 +244,7 @@ def _sky() -> tuple[np.ndarray, np.ndarray]:
     together near the horizon, where they are needed. Strata are shifted from azimuth to azimuth.
     """
     azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
-    t = (stratum + (azimuth * _GOLDEN_RATIO) % 1.0) / ELEVATIONS
+    t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
     angle = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS
     across = np.sqrt(1.0 - t**2)
     return np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()

@@ -92,9 +92,6 @@ def applied(film_um: np.ndarray, h: np.ndarray, kind: str) -> np.ndarray:
     return film_um * np.maximum(1.0 + h, LEAST_FACTOR)
 
 
-# Parts whose boxes differ by less than this share are the same part.
-SAME_PART = 0.01
-
 Pair = tuple[float, float]
 
 
@@ -143,7 +140,8 @@ class PartGrid(BaseModel):
 
     def is_of(self, points: SurfacePoints) -> bool:
         """Whether the points lie on the part of this grid."""
-        return bool(np.allclose(points.extent_m, self.part_m, rtol=SAME_PART, atol=1e-4))
+        # Parts whose boxes differ by less than this share are the same part.
+        return bool(np.allclose(points.extent_m, self.part_m, rtol=0.01, atol=1e-4))
 
 
 class LearnedMap(LearnedLaw):
