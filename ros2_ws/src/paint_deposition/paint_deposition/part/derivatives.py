@@ -175,7 +175,7 @@ def _fill(vertices, faces, first, corner, start, stop, normals):
         one, other = _equations(vertices, v, normal, near[:count], system)
         along, across, condition = _solved(system, work)
         cosine = 1.0 / math.sqrt(1.0 + along * along + across * across)
-        # A fit whose equations are ill conditioned, by the Frobenius norm, or that turns the normal
+        # A fit with ill-conditioned equations, by the Frobenius norm, or one that turns the normal
         # further has met something else than a curve.
         if condition < 1e8 and cosine > math.cos(math.radians(15.0)):
             for axis in range(3):
