@@ -12,9 +12,9 @@ from scipy.spatial.transform import Rotation, Slerp
 from paint_deposition.motion.path import (
     LEVER_M,
     MOST_SUB_STEPS,
-    followed_poses,
     slerp,
     split_segments,
+    thin_poses,
 )
 
 GAP_NS = 250_000_000
@@ -122,7 +122,7 @@ def followed(times_s, x_m, y_m=0.0):
     x_m, y_m = np.broadcast_arrays(x_m, y_m, times_s)[:2]
     positions = np.column_stack([x_m, y_m, 0.0 * x_m])
     quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(stamps), 1))
-    return followed_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
+    return thin_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
 
 
 @pytest.mark.parametrize('rate_hz', [20, 125, 1000])

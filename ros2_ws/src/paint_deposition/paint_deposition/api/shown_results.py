@@ -41,14 +41,14 @@ class _MadeFrom(BaseModel):
 
 
 class _Figures(BaseModel):
-    """Of a comparison or a diagnosis, what is needed to paint its parts again."""
+    """What is needed to paint the parts of a comparison or a diagnosis again."""
 
     accepted: list[str] = []
     provenance: _MadeFrom
 
 
 class _Statistics(BaseModel, allow_inf_nan=False):
-    """Of a film, what is shown beside it."""
+    """What is shown beside a film."""
 
     mesh_file: str = ''
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)

@@ -13,7 +13,7 @@ from paint_deposition.film.common_film import (
     Coats,
     CommonFilm,
     LayeredFilm,
-    require_one_finish,
+    require_same_film_effects,
 )
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
@@ -100,7 +100,7 @@ def look_at_guns(
     *,
     max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
 ) -> list[GunOnPart]:
-    """The same for several guns on one part, each with its motion and its model.
+    """Set the motions of several guns beside a part, each with its model, without painting it.
 
     The first gun whose axis meets the part says which side of it is outward.
     """
@@ -189,8 +189,8 @@ def simulate(
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         named = list(zip(names, models, strict=True))
         for _, rows in laid.films_of(TOTAL):
-            require_one_finish(dict(named[rows]))
-        require_one_finish(dict(named), ['on_gauge'])
+            require_same_film_effects(dict(named[rows]))
+        require_same_film_effects(dict(named), ['on_gauge'])
     for pair in zip(motions, models, strict=True):
         require_brushes(*pair)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING, Any
 import paint_deposition
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import effect_of
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import BatchError
 from paint_deposition.files.json_files import json_text
 from paint_deposition.files.parquet import write_parquet
 
@@ -77,7 +77,7 @@ def compute(
         lacks are empty in its rows.
 
     Raises:
-        ManyError: another command uses the folder, a worker has other code, or the scheduler is
+        BatchError: another command uses the folder, a worker has other code, or the scheduler is
             lost. What is finished is kept.
     """
     import pyarrow as pa
@@ -92,10 +92,10 @@ def compute(
             try:
                 write_parquet(files[digest], pa.table(dict(future.result())))
             except CancelledError:
-                raise ManyError(
+                raise BatchError(
                     'the scheduler is lost; finished cases are kept, run the same command again'
                 ) from None
-            except ManyError:
+            except BatchError:
                 raise
             except Exception as error:
                 failure = f'not computed: {type(error).__name__}: {" ".join(str(error).split())}'
@@ -118,7 +118,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
         count: of processes on this machine; default: one a core that this process may use.
 
     Raises:
-        ManyError: no scheduler answers, or it has no worker.
+        BatchError: no scheduler answers, or it has no worker.
     """
     if find_spec('distributed') is None:
         with ThreadPoolExecutor(1) as pool:
@@ -148,7 +148,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
         try:
             client = Client(scheduler, timeout=CONNECT_S)
         except (OSError, TimeoutError, ValueError) as error:
-            raise ManyError(
+            raise BatchError(
                 f'no scheduler answers at {scheduler} ({type(error).__name__}); start one with '
                 '`dask scheduler`'
             ) from None
@@ -156,7 +156,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             try:
                 client.wait_for_workers(1, timeout=CONNECT_S)
             except TimeoutError:
-                raise ManyError(
+                raise BatchError(
                     f'the scheduler at {scheduler} has no worker; start one for each core with '
                     f'`dask worker {scheduler} --nthreads 1`'
                 ) from None
@@ -170,7 +170,7 @@ def digest_of(*values: Any) -> str:
 
 @cache
 def code_digest() -> str:
-    """The same for all sources of the package and the versions of what computes its films."""
+    """A digest of all sources of the package and the versions of what computes its films."""
     from paint_deposition.kernel.compiler import KIND
 
     package = Path(paint_deposition.__file__).parent
@@ -194,7 +194,7 @@ def _used_alone(folder: Path) -> Iterator[None]:
         try:
             flock(descriptor, LOCK_EX | LOCK_NB)
         except BlockingIOError:
-            raise ManyError(
+            raise BatchError(
                 f'{folder} is in use by another command; wait for it, or choose another --output'
             ) from None
         yield
@@ -239,7 +239,7 @@ def _run_case(
 ) -> Columns:
     """Compute a case in a worker, which may have joined at any time."""
     if code != code_digest():  # films are the same only by the same code
-        raise ManyError(
+        raise BatchError(
             f'a worker on {gethostname()} has another paint_deposition '
             f'({paint_deposition.__version__}), Numba, NumPy or SciPy, or kind of processor; '
             'install the same there, and set NUMBA_CPU_NAME=x86-64-v3 everywhere'

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Finite:
-    """Of a type of numbers those that are finite: `nan` and `inf` are numbers to Python."""
+    """A type of numbers that takes finite ones only: `nan` and `inf` are numbers to Python."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         number = super().convert(value, param, ctx)  # type: ignore[misc]
@@ -216,7 +216,7 @@ MOTION = (
 )  # fmt: skip
 
 
-def grouped(
+def option_group(
     options: Sequence[Callable], into: str, kind: Callable[..., Any] = dict
 ) -> Callable[[Callable], Callable]:
     """Give a command these options; it takes what was given as one argument, of a kind."""
@@ -235,14 +235,14 @@ def grouped(
     return with_group
 
 
-motion_options = grouped(MOTION, 'motion')
+motion_options = option_group(MOTION, 'motion')
 JOINT_ACCELERATION = click.option(
     '--joint-acceleration', type=POSITIVE,
     help='Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: full '
     'speed in a quarter of a second.',
 )  # fmt: skip
 # The robot that is to drive a plan: what `read_robot` takes beside the pose of the part.
-robot_options = grouped(
+robot_options = option_group(
     (
         click.option(
             '--urdf', type=FILE,
@@ -292,7 +292,7 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
             help='Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.',
         ),
     )  # fmt: skip
-    return grouped(options, 'part')
+    return option_group(options, 'part')
 
 
 def python(code: str, *words: str) -> list[str]:
@@ -351,7 +351,7 @@ def results_options(what: str, default: str | None = None) -> Callable[[Callable
                      show_default=True, help='Format of the pictures.'),
         JSON,
     )  # fmt: skip
-    return grouped(options, 'results', Results)
+    return option_group(options, 'results', Results)
 
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:

@@ -6,7 +6,7 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import replacing
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ MAGIC = b'PAR1'
 def require_pyarrow(what: str) -> None:
     """Refuse to begin what needs the library of the extra, where it is not installed."""
     if find_spec('pyarrow') is None:
-        raise ManyError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
+        raise BatchError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

@@ -142,7 +142,7 @@ class CommonFilm:
 
     The shares are added in the order of the guns: the film does not depend on whose poses came
     first. What acts on the finished film, sag say, acts on the sum, as the first gun's model has
-    it; see ``require_one_finish``.
+    it; see ``require_same_film_effects``.
     """
 
     guns: tuple[FilmIntegrator, ...]
@@ -245,7 +245,7 @@ class LiveFilms:
             gun.warm_up()
 
 
-def require_one_finish(
+def require_same_film_effects(
     models: Mapping[str, DepositionModel], places: Sequence[str] = ('on_film', 'on_gauge')
 ) -> None:
     """Refuse models, by the name of their gun, that let different things happen to one film.

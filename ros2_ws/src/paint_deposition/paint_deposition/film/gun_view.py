@@ -93,7 +93,7 @@ class GunView:
 
     @cached_property
     def landing_of_passes(self) -> list[float]:
-        """The same of each of the passes; 1 where one is too short to be seen."""
+        """Share of the rays of each pass that land on the part; 1 where it is too short."""
         number, seen = self.path.spray_pass, [one.spray_pass[0] for one in self.passes]
         return [float(self.landing[number == n].mean()) if n in number else 1.0 for n in seen]
 

@@ -50,7 +50,7 @@ class Steps:
         return len(self.rows)
 
     def of_brush(self, row: int) -> 'Steps':
-        """Those on which one of the patterns sprays."""
+        """The sub-steps on which one of the patterns sprays."""
         chosen = self.brush == row
         return Steps(self.rows[chosen], self.sight.select(chosen), self.brush[chosen])
 
@@ -175,7 +175,7 @@ class FilmIntegrator:
         return Steps(rows, sight, brush)
 
     def _run(
-        self, apart: bool, steps: Steps, constants: np.ndarray,
+        self, separate_terms: bool, steps: Steps, constants: np.ndarray,
         film: np.ndarray, recent: np.ndarray, terms: np.ndarray,
     ) -> None:  # fmt: skip
         blocks = self._blocks
@@ -184,7 +184,7 @@ class FilmIntegrator:
             blocks.spheres, blocks.bounds, steps.rows, steps.sight.first, steps.sight.tracing,
             steps.brush, constants.astype(self._real), self._parameters,
         )  # fmt: skip
-        kernel = compile_kernel(*self._variant, apart)
+        kernel = compile_kernel(*self._variant, separate_terms)
 
         def paint(first_block: int, last_block: int) -> None:
             kernel(first_block, last_block, *arguments)

@@ -237,7 +237,7 @@ def _rays_to_trace(
     bounds, p, n, positions, normals, horizon, traced, rows, begins, brush, constants, which,
     block, starts,
 ):  # fmt: skip
-    """Of each ray that is needed: place in ``seen``, tracing, and point."""
+    """Place in ``seen``, tracing and point of each ray that is needed."""
     count = 0
     for run in range(len(which)):
         count += bounds[block[run] + 1] - bounds[block[run]]

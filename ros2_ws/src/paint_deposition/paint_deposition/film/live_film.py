@@ -120,9 +120,9 @@ class LiveFilm:
 
     def reset(self) -> None:
         """Clear the film; the gun stays on or off if the motion continues."""
-        self.start_bare_after(self)
+        self.reset_keeping_trigger_of(self)
 
-    def start_bare_after(self, before: 'LiveFilm') -> None:
+    def reset_keeping_trigger_of(self, before: 'LiveFilm') -> None:
         """Clear the film and take over the state of the gun from another film.
 
         Raises:

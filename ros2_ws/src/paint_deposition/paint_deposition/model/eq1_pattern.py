@@ -18,7 +18,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One of them."""
+    """A coordinate of the pattern, with what is known of it before any reading."""
 
     name: str  # as in the posterior of a model file
     # Mean and standard deviation of a weak prior.

@@ -78,7 +78,7 @@ def _detour_m(p0, p1, p2):
 
 
 @njit(cache=True)
-def followed_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
+def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     """Rows (K,) of the poses that are followed, the first among them; those behind the last wait.
 
     Each pose is decided on by the last one followed, the one before it and itself: it does not
@@ -240,7 +240,7 @@ class SprayPath:
         return float(np.sum(self.dwell_s * self.flow))
 
     def with_flow_scaled(self, factor: float | np.ndarray) -> 'SprayPath':
-        """The same motion at another flow, times a factor or (M,) factors.
+        """The motion at another flow, times a factor or (M,) factors.
 
         The flow of the opening is scaled too: what still flows after a closing tails off from it.
         """

@@ -4,7 +4,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from paint_deposition.motion.passes import first_pass, follow_passes
-from paint_deposition.motion.path import SprayPath, followed_poses, split_segments
+from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
 from paint_deposition.motion.trajectory import (
@@ -143,7 +143,7 @@ class PathBuilder:
         if ready < 2:
             return
         come = poses.select(slice(0, ready))
-        rows = followed_poses(
+        rows = thin_poses(
             come.stamps_ns, come.positions_m, come.quaternions_xyzw, self.max_gap_ns,
             self.max_step_m,
         )  # fmt: skip
@@ -162,14 +162,16 @@ class PathBuilder:
             self._gap_before_next = False
             change = np.searchsorted(cuts, stamp, side='right')
             path = SprayPath.of(stamp, dwell, flows[change], position, rotation, velocity)
-            self._finished.append(self._followed(path.with_(brush=brushes[change]), after_gap))
+            self._finished.append(
+                self._with_strokes_and_passes(path.with_(brush=brushes[change]), after_gap)
+            )
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
         self._integrated_ns = int(now.stamps_ns[-1])
         self._waiting = [poses.select(slice(int(rows[-1]), None))]
 
-    def _followed(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
+    def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = 0.0 if self._flow else 1.0

@@ -181,7 +181,7 @@ class StreamQuality:
         log_times_ns: np.ndarray | None = None,
         max_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
     ) -> 'StreamQuality':
-        """Of samples (N,) int64 and (N, K) as recorded, and of when they arrived (N,) int64."""
+        """Judge samples (N,) int64 and (N, K) as recorded, and when they arrived (N,) int64."""
         repeats = RepeatedSamples()
         new_ns = np.diff(stamps_ns[repeats.are_new(stamps_ns, values)])
         steps_ns = np.diff(stamps_ns)

@@ -45,7 +45,7 @@ class CurvedEdges:
         return len(self.lengths_m)
 
     def turned(self) -> 'CurvedEdges':
-        """The same of the surface's other side."""
+        """The edges as seen from the surface's other side."""
         return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
 
     def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -102,7 +102,7 @@ class CurvedEdges:
 def _bends(
     vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of edges (E, 2): what they cost, lengths, leans and sagittas."""
+    """What edges (E, 2) cost, their lengths, leans and sagittas."""
     start, end = edges.T
     along = vertices_m[end] - vertices_m[start]
     length = np.linalg.norm(along, axis=1)

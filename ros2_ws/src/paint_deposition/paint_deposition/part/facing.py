@@ -39,7 +39,7 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
 
 
 def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
-    """The same for one gun."""
+    """Turn a part as ``toward_the_guns`` does, for one gun."""
     return toward_the_guns(surface, [(positions_m, z_axes)])
 
 

@@ -122,7 +122,7 @@ class Surface:
         return hashlib.sha256(content).hexdigest()[:16]
 
     def seen_from(self, gun_side: np.ndarray) -> 'Surface':
-        """The same part with the gun (3,) on that side; what rays and searches need is shared."""
+        """The part with the gun (3,) on that side; what rays and searches need is shared."""
         known = replace(self, gun_side=gun_side)
         made = vars(self).items()
         vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})

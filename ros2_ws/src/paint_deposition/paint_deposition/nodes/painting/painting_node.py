@@ -171,7 +171,7 @@ class PaintingNode(ManagedNode, ABC):
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
-            new.start_bare_after(old)
+            new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points
