@@ -26,13 +26,13 @@ from paint_deposition.api.planning import (
 from paint_deposition.api.planning import (
     recommend as recommend,
 )
-from paint_deposition.api.samples import sample_folder as sample_folder
 from paint_deposition.api.simulation import (
     GunOnPart as GunOnPart,
 )
 from paint_deposition.api.simulation import (
     look_at as look_at,
 )
+from paint_deposition.api.simulation import sample_folder as sample_folder
 from paint_deposition.api.simulation import (
     simulate as simulate,
 )

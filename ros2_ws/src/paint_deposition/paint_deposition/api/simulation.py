@@ -1,13 +1,14 @@
-"""The film that recorded motions leave on a part, and how the guns ran over it."""
+"""The film that recorded motions leave on a part, how the guns ran over it, and sample files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, RecordingError
+from paint_deposition.errors import ModelError, PaintError, RecordingError
 from paint_deposition.film.common_film import (
     TOTAL,
     Coats,
@@ -266,3 +267,18 @@ def _painted(
         integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))
+
+
+def sample_folder() -> Path:
+    """Folder of the samples, wherever pip or colcon put it.
+
+    Raises:
+        PaintError: the package was installed without its shared files.
+    """
+    package = Path(__file__).resolve().parents[1]
+    places = [package.parent / 'samples']
+    places += [folder / 'share' / package.name / 'samples' for folder in package.parents]
+    for place in places:
+        if (place / 'door.stl').is_file():
+            return place
+    raise PaintError(f'no samples belong to {package}; install the package with pip or colcon')

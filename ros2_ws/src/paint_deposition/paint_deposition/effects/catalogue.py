@@ -19,8 +19,7 @@ import numpy as np
 from paint_deposition.effects import library
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.footprint import LearnedFootprint
-from paint_deposition.effects.learned.law import LearnedLaw, LearnedMap
+from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.kernel.compiler import njit
 from paint_deposition.kernel.laws import Ray, in_precision

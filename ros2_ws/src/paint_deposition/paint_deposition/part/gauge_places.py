@@ -88,16 +88,15 @@ def grid_places(surface: Surface, usable: np.ndarray, count: int) -> np.ndarray:
     tree, size = cKDTree(surface.vertices_m), face.max(axis=0)
     pitch_m = 1.5 * np.sqrt(surface.vertex_areas_m2[rows].sum() / count)
     while True:
-        across, up = (_centred(length, pitch_m) for length in size)
+        # Places at a pitch along both sides, as far from both of their ends.
+        steps = [np.arange(int(length / pitch_m) + 1) for length in size]
+        across, up = (
+            0.5 * (length - step[-1] * pitch_m) + pitch_m * step
+            for length, step in zip(size, steps, strict=True)
+        )
         places, hit = on_face_m(surface, np.stack(np.meshgrid(across, up), -1).reshape(-1, 2))
         near = np.unique(tree.query(places[hit])[1])
         near = near[usable[near]]
         if len(near) >= count or pitch_m < LEAST_PITCH_M:
             return near[np.linspace(0, len(near) - 1, min(count, len(near))).round().astype(int)]
         pitch_m *= FINER
-
-
-def _centred(length_m: float, pitch_m: float) -> np.ndarray:
-    """Places at a pitch along a length, as far from both of its ends."""
-    count = int(length_m / pitch_m) + 1
-    return 0.5 * (length_m - (count - 1) * pitch_m) + pitch_m * np.arange(count)

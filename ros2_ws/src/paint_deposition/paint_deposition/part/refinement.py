@@ -40,13 +40,6 @@ class CutEdges:
         return np.concatenate(lower), np.concatenate(upper), np.concatenate(middle)
 
 
-def find_slivers(lengths_m: np.ndarray, max_edge_length_m: float) -> np.ndarray:
-    """(N,) rows of (F, 3) triangle sides that are slivers with both long sides too long."""
-    base, side, _ = np.sort(lengths_m, axis=1).T
-    # A sliver's sides are three times longer than its base.
-    return np.flatnonzero(side > np.maximum(3.0 * base, max_edge_length_m))
-
-
 def cut_edges(
     of_slivers: np.ndarray, lengths_m: np.ndarray, max_edge_length_m: float, next_vertex: int
 ) -> CutEdges:
@@ -184,7 +177,9 @@ def refine(
         in_step = known.max() < 0
         if in_step and not too_long.any():
             return mesh.vertices_m, mesh.normals, faces
-        thin = find_slivers(length_m[of_face], max_edge_length_m)
+        # Slivers, whose sides are three times longer than their base, with both sides too long.
+        base_m, side_m, _ = np.sort(length_m[of_face], axis=1).T
+        thin = np.flatnonzero(side_m > np.maximum(3.0 * base_m, max_edge_length_m))
         if in_step and len(thin):
             cut = cut_edges(of_face[thin], length_m, max_edge_length_m, len(mesh.vertices_m))
             pieces = cut_slivers(faces[thin], of_face[thin], length_m, cut)
