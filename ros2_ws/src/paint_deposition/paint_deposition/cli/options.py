@@ -22,32 +22,25 @@ if TYPE_CHECKING:
     from paint_deposition.part.zones import Zones
 
 
-class Finite:
-    """A type of numbers that takes finite ones only: `nan` and `inf` are numbers to Python."""
+class FiniteRange(click.FloatRange):
+    """A finite number, within bounds if there are any; else it says what is wanted."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        number = super().convert(value, param, ctx)  # type: ignore[misc]
-        if not math.isfinite(number):
-            raise click.BadParameter(f'{value} is not finite; give a number', ctx, param)
-        return number
-
-
-class FiniteNumber(Finite, click.types.FloatParamType):
-    """Any finite number."""
-
-
-class FiniteRange(Finite, click.FloatRange):
-    """A finite number within bounds; outside of them it says what is wanted."""
+    def __init__(self, *ends: Any, **bounds: Any) -> None:
+        super().__init__(*ends, **bounds)
+        self.name = 'float range' if ends or bounds else 'float'
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
-            return super().convert(value, param, ctx)
+            number = super().convert(value, param, ctx)
+            if not math.isfinite(number):  # `nan` and `inf` are numbers to Python
+                raise click.BadParameter(f'{value} is not finite; give a number', ctx, param)
         except click.BadParameter as error:
             if not isinstance(param, click.Option) or not param.help:
                 raise
             metres = ', in metres' if str(param.name).endswith('_m') else ''
             words = f'{error.message.rstrip(".")}{metres}; wanted: {param.help.rstrip(".")}'
             raise click.BadParameter(words, ctx, param) from None
+        return number
 
 
 class File(click.Path):
@@ -60,7 +53,7 @@ class File(click.Path):
         return super().convert(value, param, ctx)
 
 
-NUMBER = FiniteNumber()
+NUMBER = FiniteRange()
 POSITIVE = FiniteRange(min=0.0, min_open=True)
 NOT_NEGATIVE = FiniteRange(min=0.0)
 FILE = File(path_type=Path)

@@ -13,7 +13,7 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from paint_deposition.cli.options import FILE, FiniteNumber, FiniteRange
+from paint_deposition.cli.options import FILE, FiniteRange
 from paint_deposition.errors import PaintError
 
 
@@ -119,4 +119,4 @@ def _type(
             bounds |= {end: shown(getattr(one, key)), f'{end}_open': key in ('gt', 'lt')}
     if annotation is int:
         return {'type': click.IntRange(**bounds) if bounds else int}
-    return {'type': FiniteRange(**bounds) if bounds else FiniteNumber()}
+    return {'type': FiniteRange(**bounds)}
