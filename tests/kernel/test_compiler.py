@@ -52,9 +52,14 @@ def test_a_users_own_functions_are_compiled_for_the_processor_at_hand():
     assert kinds[0] not in KINDS
 
 
+@numba.njit
+def _doubled(x):
+    return 2.0 * x
+
+
 @numba.njit(fastmath=True)
 def _half(x):
-    return 0.5 * x
+    return 0.25 * _doubled(x)
 
 
 def test_a_law_may_call_what_its_author_compiled():

@@ -59,9 +59,29 @@ def in_precision(law: Law, real: type) -> Law:
 
 def _as_real(value: object, real: type) -> object:
     if isinstance(value, Dispatcher):
-        return njit(**value.targetoptions)(value.py_func)
+        return _compiled_anew(value)
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return real(value) if is_number else value
+
+
+def _compiled_anew(compiled: Dispatcher) -> Dispatcher:
+    """A compiled function, and those that it calls by name, for the kernel's kind of processor."""
+    function = compiled.py_func
+    known = function.__globals__
+    called = {name: known[name] for name in function.__code__.co_names if name in known}
+    others = {
+        name: _compiled_anew(other)
+        for name, other in called.items()
+        if isinstance(other, Dispatcher) and other is not compiled
+    }
+    anew = FunctionType(
+        function.__code__,
+        known | others,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    return njit(**compiled.targetoptions)(anew)
 
 
 def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:
