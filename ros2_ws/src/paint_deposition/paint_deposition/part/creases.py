@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.part.edges import (
     Edges,
     cut_segments,
@@ -80,6 +80,7 @@ def split_at_creases(
 
 
 @njit(cache=True, nogil=True)
+@named_for_its_code
 def _join_corners(corners, paired, smooth):
     """Make the corners at both ends of smooth edges hang together."""
     for e in range(len(paired)):
