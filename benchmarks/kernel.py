@@ -16,7 +16,9 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 from unittest.mock import patch
 
@@ -30,6 +32,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel import threads
+from paint_deposition.kernel.compiler import KIND, kinds_at_hand
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
@@ -198,6 +201,39 @@ def measure(case: Case, rounds: int) -> dict[str, float]:
     return {name: case.pairs / seconds for name, seconds in best.items()}
 
 
+def dense_on_one_thread() -> tuple[float, np.ndarray]:
+    """Seconds and film of the dense case, single precision."""
+    case = dense()
+    integrator = FilmIntegrator(case.points, MODEL, 'single')
+    begin = time.perf_counter()
+    film_um = single_threaded(lambda: kernel_um(case, integrator))
+    return time.perf_counter() - begin, film_um
+
+
+def measure_kinds(rounds: int) -> dict[str, float]:
+    """Print ns per pair of each kind of kernel, in turns; the pairs per second of each."""
+    processes = {}
+    for kind in kinds_at_hand():
+        # Each compiles in a process of its own, which starts with its first task.
+        with patch.dict(os.environ, NUMBA_CPU_NAME=kind):
+            processes[kind] = ProcessPoolExecutor(1, get_context('spawn'))
+            processes[kind].submit(dense_on_one_thread).result()
+    turns = [
+        {kind: process.submit(dense_on_one_thread).result() for kind, process in processes.items()}
+        for _ in range(rounds)
+    ]
+    for process in processes.values():
+        process.shutdown()
+    pairs, (*_, oldest) = dense().pairs, processes
+    best = {kind: min(turn[kind][0] for turn in turns) for kind in processes}
+    film_um = {kind: film for kind, (_, film) in turns[0].items()}
+    print('\nkinds of compiled kernel, single precision, 1 thread: ns/pair')
+    for kind, seconds in best.items():
+        apart = np.abs(film_um[kind] - film_um[oldest]).max() / film_um[oldest].max()
+        print(f'{kind:32}{1e9 * seconds / pairs:9.2f}{apart:12.1e} of the peak off {oldest}')
+    return {kind: pairs / seconds for kind, seconds in best.items()}
+
+
 START = """
 import time
 begin = time.perf_counter()
@@ -251,14 +287,15 @@ def main() -> None:
     given = parser.parse_args()
     load = os.getloadavg()[0]
     print(
-        f'{cpu_name()} ({numba.config.CPU_NAME or "host"}), {os.cpu_count()} cores, load '
+        f'{cpu_name()} ({KIND}), {os.cpu_count()} cores, load '
         f'{load:.1f}; Python {platform.python_version()}, NumPy {np.__version__}, Numba '
         f'{numba.__version__}; best of {given.rounds}'
     )
     rates = {case.name: measure(case, given.rounds) for case in (dense(), sample())}
+    kinds = measure_kinds(given.rounds)
     first_film = measure_start()
     if given.json:
-        record = {'pairs_per_s': rates, 'first_film_s': first_film}
+        record = {'pairs_per_s': rates, 'kinds': kinds, 'first_film_s': first_film}
         given.json.write_text(json.dumps(record, indent=1), encoding='utf-8')
 
 

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Build the wheel with compiled code in it, into dist/: for one Python, by default that of .venv, and
-# for the processors that kernel/compiler.py names. What is missing for others compiles on first use.
+# for both kinds of processor that kernel/compiler.py names, where this machine has AVX-512 (else for
+# x86-64-v3). What is missing compiles on first use.
 #   setup/wheel.sh [PYTHON]
 set -euo pipefail
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
@@ -23,8 +24,11 @@ done
 cd "$work"
 
 # What the first commands of a new user compile stays beside the modules.
-build/bin/paint doctor
-build/bin/paint demo -o demo
+kinds=$(build/bin/python -c 'from paint_deposition.kernel.compiler import kinds_at_hand as k; print(*k())')
+for kind in $kinds; do
+    NUMBA_CPU_NAME=$kind build/bin/paint doctor
+    NUMBA_CPU_NAME=$kind build/bin/paint demo -o "demo-$kind"
+done
 build/bin/wheel unpack --dest unpacked ./*.whl
 unpacked=$(echo "$work"/unpacked/*)
 (cd build/lib/python*/site-packages && find paint_deposition -name '*.nb[ic]' -exec cp --parents '{}' "$unpacked" \;)
@@ -37,7 +41,9 @@ wheel=$(build/bin/wheel tags --remove --python-tag "$tag" --abi-tag none \
 brought() { find new/lib -path '*/paint_deposition/*.nb[ic]' -exec sha256sum '{}' + | sort; }
 brought > brought
 samples=new/share/paint_deposition/samples
-new/bin/paint simulate --mesh $samples/door.stl --trajectory $samples/door_vertical -o film
+for kind in $kinds; do
+    NUMBA_CPU_NAME=$kind new/bin/paint simulate --mesh $samples/door.stl --trajectory $samples/door_vertical -o "film-$kind"
+done
 brought | diff brought - || { echo 'compiled again, though the wheel brings it: see above' >&2; exit 1; }
 
 mkdir -p "$dist"

@@ -3,8 +3,7 @@
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 
 # All of a narrow pattern lands within 0.3 m of the axis at the standoffs used in tests.
 NARROW = PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)

@@ -18,7 +18,7 @@ from cli.command import assert_refused, paint
 from paint_deposition.batch.cases import Case, compute, workers
 from paint_deposition.batch.job import Job, computed
 from paint_deposition.batch.sweep_file import SweepFile
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import BatchError
 
 pytestmark = pytest.mark.slow
 TOLD = {'mesh': 'panel.stl', 'trajectory': 'panel_577', 'max_edge_length_m': 0.1}
@@ -76,7 +76,7 @@ def test_films_are_those_of_this_process_though_worker_and_scheduler_die(address
         if share > 0.5:
             processes[0].kill()
 
-    with pytest.raises(ManyError, match='the scheduler is lost; finished cases are kept'):
+    with pytest.raises(BatchError, match='the scheduler is lost; finished cases are kept'):
         swept('far', workers(address), kill)
     finished = len([*(tmp_path / 'far').iterdir()])
     assert CASES / 2 < finished < CASES
@@ -127,7 +127,7 @@ def test_a_folder_is_of_one_command_at_a_time_and_without_dask_this_process_comp
     given = eval, [Case('good', FILM), Case('again', FILM), Case('good', FILM)], {}, tmp_path
 
     def second(what: str, share: float) -> None:
-        with pytest.raises(ManyError, match='is in use by another command'):
+        with pytest.raises(BatchError, match='is in use by another command'):
             compute(*given, workers(), silent)
 
     table, now = compute(*given, workers(), second)

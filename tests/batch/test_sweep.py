@@ -16,7 +16,7 @@ from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
 from paint_deposition.batch.sweep_file import SweepFile
 from paint_deposition.batch.variations import varied_motion
-from paint_deposition.effects.user_effects import effects_allowed
+from paint_deposition.effects.catalogue import effects_allowed
 
 DOOR = SAMPLES / 'measured_door'
 EDGE_M = 0.08

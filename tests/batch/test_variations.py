@@ -8,9 +8,8 @@ from booth import spot
 from paint_deposition.batch.sweep_file import SweepFile, read_sweep
 from paint_deposition.batch.variations import variations, varied_model, varied_motion
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ManyError
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.errors import BatchError
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 
 
@@ -51,7 +50,7 @@ def test_draws_repeat_with_their_seed_and_have_the_spread_asked_for():
     ],
 )
 def test_what_makes_no_sense_is_refused(told, words):
-    with pytest.raises(ManyError, match=words.replace('(', r'\(')):
+    with pytest.raises(BatchError, match=words.replace('(', r'\(')):
         swept(**told)
 
 
@@ -71,7 +70,7 @@ def test_what_makes_no_sense_is_refused(told, words):
 def test_a_sweep_file_is_refused_in_a_line(tmp_path, text, words):
     path = tmp_path / 'sweep.yaml'
     path.write_text(text)
-    with pytest.raises(ManyError) as refused:
+    with pytest.raises(BatchError) as refused:
         read_sweep(path)
     assert words in str(refused.value)
     assert str(path) in str(refused.value)
@@ -85,9 +84,9 @@ def test_a_model_is_varied_and_its_bounds_hold():
     assert varied.planar.K1_cm3_per_s == 2.5
     assert varied.effect('air_drift').shift_down_m == 0.02
     assert varied_model(varied, {'effects': []}).effects == ()
-    with pytest.raises(ManyError, match=r'K2 is 1\.5'):
+    with pytest.raises(BatchError, match=r'K2 is 1\.5'):
         varied_model(DepositionModel(), {'planar.K2': 1.5})
-    with pytest.raises(ManyError, match="the model has no effect 'sag'; it has: none"):
+    with pytest.raises(BatchError, match="the model has no effect 'sag'; it has: none"):
         varied_model(DepositionModel(), {'effects': ['sag']})
 
 
@@ -97,9 +96,9 @@ def test_a_pattern_of_brushes_is_varied_brush_by_brush():
     (values,) = variations(file, [model])
     first, other = varied_model(model, values).patterns
     assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
-    with pytest.raises(ManyError, match=r'vary brush_1\.K2 or brush_4\.K2'):
+    with pytest.raises(BatchError, match=r'vary brush_1\.K2 or brush_4\.K2'):
         varied_model(model, {'planar.K2': 0.2})
-    with pytest.raises(ManyError, match="no effect 'brush_4' is in"):
+    with pytest.raises(BatchError, match="no effect 'brush_4' is in"):
         variations(file)
 
 

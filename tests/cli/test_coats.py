@@ -18,7 +18,7 @@ from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from scenes import straight_pass
 
 PANEL = SAMPLES / 'panel.stl'

@@ -10,7 +10,7 @@ import yaml
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model_file
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 pytestmark = pytest.mark.slow
 

@@ -20,9 +20,8 @@ from booth import (
     spot,
 )
 from paint_deposition.effects.base import Effect, PathContext
-from paint_deposition.effects.catalogue import EFFECTS, FAMILIES
+from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, read_effect_file
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.user_effects import read_effect_file
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import Ray, in_precision
 from reference import reference_film_um

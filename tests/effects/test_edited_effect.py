@@ -33,11 +33,9 @@ class Scaled(Effect):
 RUN = """
 import sys
 
-from numba import njit
-
 from paint_deposition.effects.base import Ray
-from paint_deposition.effects.user_effects import load_effect_file
-from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.effects.catalogue import load_effect_file
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.laws import product
 
 law = load_effect_file(sys.argv[1]).flux_factor

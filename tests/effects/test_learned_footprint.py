@@ -5,7 +5,7 @@ import pytest
 from numba import float32, float64, njit
 
 from booth import MODEL, painted, panel, spot
-from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
+from paint_deposition.effects.learned.law import WAVES, LearnedFootprint
 from paint_deposition.kernel.laws import Ray, in_precision
 
 REACH_M = 0.2

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from booth import door, panel
-from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
+from paint_deposition.effects.learned.law import LearnedMap, PartGrid, places_m
 from paint_deposition.part.points import SurfacePoints
 
 PANEL = panel().points()

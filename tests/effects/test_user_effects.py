@@ -10,9 +10,8 @@ import pytest
 from numba import njit
 
 from booth import SAMPLES, painted, panel, path_of, serpentine
-from paint_deposition.effects.catalogue import EFFECTS, effect_class
+from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import TRIAL_RAY, load_effect_file
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.kernel.laws import Ray, in_precision

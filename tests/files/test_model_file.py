@@ -7,13 +7,10 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.footprint import LearnedFootprint
-from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.effects.learned.place import LearnedMap, PartGrid
+from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap, PartGrid
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
 from paint_deposition.model.eq1_pattern import PlanarPattern

@@ -11,7 +11,7 @@ from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 MODEL = DepositionModel(effects=(CornerSlowdown(gain=0.5, length_m=0.2),))
 NAMES = [*(c.name for c in PATTERN), 'corner_slowdown.gain', 'corner_slowdown.log_length_m']

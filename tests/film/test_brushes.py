@@ -15,7 +15,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.film.paint_used import seconds_by_pattern
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import Trajectory

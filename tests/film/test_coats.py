@@ -8,7 +8,7 @@ from booth import LOOKING_ALONG_Y, SAMPLES
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import ModelError, PaintError
-from paint_deposition.film.coats import Coats
+from paint_deposition.film.common_film import Coats
 from scenes import straight_pass
 
 TIMES_S = np.arange(0.0, 3.0, 0.02)

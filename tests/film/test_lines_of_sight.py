@@ -9,8 +9,7 @@ from booth import LOOKING_ALONG_Y
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.layout import emission_points_m
-from paint_deposition.film.lines_of_sight import SIGHT_STEP_M
+from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface

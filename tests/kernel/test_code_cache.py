@@ -12,7 +12,7 @@ import pytest
 from numba import njit
 
 import paint_deposition
-from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import named_for_its_code
 
 FACTOR = 2.0
 

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paint_deposition.motion.trigger import FlowSchedule
+from paint_deposition.motion.trajectory import FlowSchedule
 
 
 def schedule(changes):

@@ -5,8 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.part_frame import Rigid
-from paint_deposition.motion.part_location import locate
+from paint_deposition.motion.part_frame import Rigid, locate
 
 POSE = Rigid.of([2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat()])
 POINTS = {

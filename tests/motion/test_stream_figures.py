@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
+from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 
 PERIOD_NS = 4_000_000
 STAMPS_NS = 1_760_000_000_000_000_000 + PERIOD_NS * np.arange(500)

@@ -9,8 +9,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from paint_deposition.motion import sub_steps
-from paint_deposition.motion.sub_steps import LEVER_M, followed_poses, slerp, split_segments
+from paint_deposition.motion.path import (
+    LEVER_M,
+    MOST_SUB_STEPS,
+    slerp,
+    split_segments,
+    thin_poses,
+)
 
 GAP_NS = 250_000_000
 STEP_M = 0.008
@@ -107,7 +112,7 @@ def test_a_cut_splits_the_time_exactly(cut_ns):
 def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
     positions = np.array([[0, 0, 0], [away_m, 0, 0], [0.001, 0, 0]])
     stamp, dwell, *_ = split([0, 10, 20], positions, np.tile([0, 0, 0, 1.0], (3, 1)))
-    assert len(stamp) == 2 * sub_steps.MOST_SUB_STEPS
+    assert len(stamp) == 2 * MOST_SUB_STEPS
     assert dwell.sum() == pytest.approx(20e-9)
 
 
@@ -117,7 +122,7 @@ def followed(times_s, x_m, y_m=0.0):
     x_m, y_m = np.broadcast_arrays(x_m, y_m, times_s)[:2]
     positions = np.column_stack([x_m, y_m, 0.0 * x_m])
     quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(stamps), 1))
-    return followed_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
+    return thin_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
 
 
 @pytest.mark.parametrize('rate_hz', [20, 125, 1000])

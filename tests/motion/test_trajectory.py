@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.trigger import relative_flow
+from paint_deposition.motion.trajectory import Trajectory, relative_flow
 
 
 def test_shapes_must_match():

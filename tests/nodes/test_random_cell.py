@@ -44,7 +44,7 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import STATE_TOPIC
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.egm_source import EgmSource

@@ -8,8 +8,7 @@ import pytest
 
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
-from paint_deposition.effects.learned.place import LearnedMap, PartGrid
+from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study

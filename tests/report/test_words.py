@@ -2,10 +2,9 @@
 
 from booth import SAMPLES
 from paint_deposition.effects.base import Effect, parameter
-from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.learned.place import PartGrid
+from paint_deposition.effects.catalogue import LEARNED, load_effect_file
+from paint_deposition.effects.learned.law import PartGrid
 from paint_deposition.effects.library.flow_drift import FlowDrift
-from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.report.words import (
     effect_meaning,
     effect_name,

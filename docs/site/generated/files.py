@@ -22,8 +22,7 @@ from paint_deposition.files.tables.gauge_formats import (
     OWN,
 )
 from paint_deposition.files.zones_file import ZoneEntry
-from paint_deposition.model.brush import SetPoints
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)

@@ -15,7 +15,7 @@ from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from generated.markdown import definitions, prose, table
-from paint_deposition.api.samples import sample_folder
+from paint_deposition.api.simulation import sample_folder
 from paint_deposition.nodes import executables
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.parameters import NodeParameter

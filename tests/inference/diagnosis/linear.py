@@ -8,8 +8,7 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.footprint import LearnedFootprint
-from paint_deposition.effects.learned.law import hat_weights
+from paint_deposition.effects.learned.law import LearnedFootprint, hat_weights
 from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
 from paint_deposition.inference.diagnosis.gaussian import NullModel

@@ -25,7 +25,7 @@ from paint_deposition.inference.diagnosis.gaussian import (
 )
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 READINGS = 30
 

@@ -20,9 +20,7 @@ from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.model.brush import Brush
-from paint_deposition.model.coordinates import PATTERN
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 from paint_deposition.report.writers.write import write
 
 PHI_RAD = 0.1

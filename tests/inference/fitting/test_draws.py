@@ -9,7 +9,7 @@ from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 COUNT = 4000
 GAIN = 'corner_slowdown.gain'

@@ -9,8 +9,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.fitting.parameters import SHAPE_DEVIATIONS, FreeParameters
-from paint_deposition.model.coordinates import PATTERN
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
 
 PATTERNS = st.builds(
     PlanarPattern, K1_cm3_per_s=st.floats(0.05, 20.0), K2=st.floats(0.0, 1.0),

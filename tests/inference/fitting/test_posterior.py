@@ -19,7 +19,7 @@ from paint_deposition.inference.fitting.posterior import (
     usable,
 )
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
+from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
 WITH_EFFECT = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
 

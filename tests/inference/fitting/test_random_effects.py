@@ -18,7 +18,7 @@ from paint_deposition.inference.fitting.random_effects import (
 )
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 
 def grid_m() -> np.ndarray:

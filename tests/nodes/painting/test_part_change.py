@@ -22,7 +22,7 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics

@@ -9,7 +9,7 @@ from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 
 MODEL = two_brushes()
 PLAIN = two_passes()

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from paint_deposition.effects.catalogue import LEARNED
+from paint_deposition.effects.catalogue import LEARNED, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis import closed_forms

@@ -4,6 +4,7 @@ from paint_deposition.api.improvement import improve as improve
 from paint_deposition.api.inference import (
     calibrate as calibrate,
 )
+from paint_deposition.api.inference import choose_readings as choose_readings
 from paint_deposition.api.inference import (
     compare as compare,
 )
@@ -16,7 +17,6 @@ from paint_deposition.api.inference import (
 from paint_deposition.api.inference import (
     refit as refit,
 )
-from paint_deposition.api.measuring import choose_readings as choose_readings
 from paint_deposition.api.planning import (
     plan as plan,
 )
@@ -26,13 +26,13 @@ from paint_deposition.api.planning import (
 from paint_deposition.api.planning import (
     recommend as recommend,
 )
-from paint_deposition.api.samples import sample_folder as sample_folder
 from paint_deposition.api.simulation import (
     GunOnPart as GunOnPart,
 )
 from paint_deposition.api.simulation import (
     look_at as look_at,
 )
+from paint_deposition.api.simulation import sample_folder as sample_folder
 from paint_deposition.api.simulation import (
     simulate as simulate,
 )

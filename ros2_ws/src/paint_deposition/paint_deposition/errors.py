@@ -33,7 +33,7 @@ class PlanError(PaintError):
     """A request for passes or an index has no answer."""
 
 
-class ManyError(PaintError):
+class BatchError(PaintError):
     """A sweep over cases cannot be run."""
 
 

@@ -1,15 +1,13 @@
-"""What readings say of a model: calibrate it, compare it, find what it lacks.
-
-A campaign is painted parts with their readings; ``progress`` is called with a line for each step.
-"""
+"""What readings say of a model, and where to take them: calibrate, compare, diagnose, measure."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
+from typing import Any
 
+from paint_deposition.api.simulation import look_at, require_brushes
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS, effect_class
+from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.model_text import needs_file, source_of
@@ -18,7 +16,9 @@ from paint_deposition.inference.comparison.comparison import compare as compared
 from paint_deposition.inference.diagnosis.model_space import discrepancy_of
 from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
+from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose
 from paint_deposition.inference.diagnosis.refit import refit as refitted
+from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.calibration import Calibration
@@ -29,6 +29,10 @@ from paint_deposition.inference.fitting.posterior import of_brushes
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import require_paint
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
+from paint_deposition.part.surface import Surface
+from paint_deposition.planning.requests import MeasureRequest
+from paint_deposition.request import takes
 
 Progress = Callable[[str], None]
 MOST_MODELS = 6
@@ -195,3 +199,40 @@ def _model_of(campaign: Campaign) -> DepositionModel | None:
     if not campaign.model_file:
         return None
     return read_model(campaign.model_file, load_unnamed_effect_file)
+
+
+@takes(MeasureRequest)
+def choose_readings(
+    surface: Surface,
+    trajectory: Trajectory,
+    model: DepositionModel | None = None,
+    *,
+    posterior: Posterior | None = None,
+    own_effects: Iterable[type[Effect]] = (),
+    max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
+    progress: Callable[[str], None] = lambda line: None,
+    **wanted: Any,
+) -> ChosenReadings:
+    """Choose where to put the gauge on a part, so that missing effects are found soonest.
+
+    Args:
+        surface: the part; it is turned round, with a note, if the gun looks at its back.
+        trajectory: the motion that paints it, in the frame of the mesh.
+        model: what the gun sprays, as far as it is known; default: a 50 mm bell.
+        posterior: what earlier readings say of the model; default: little is known of it.
+        own_effects: to look for beside the catalogue's.
+        max_pose_gap_s: a longer time between two poses counts as gun off [s].
+        progress: called with a line for each step.
+        wanted: the fields of ``planning.requests.MeasureRequest``.
+
+    Raises:
+        RecordingError: the poses make no motion, or the gun never sprays.
+        ReadingsError: the part has no room for so many points.
+    """
+    request, model = MeasureRequest(**wanted), model or DepositionModel()
+    require_brushes(trajectory, model)
+    model = model.of_numbers(trajectory.brushes).single('a choice of points')
+    seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
+    library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}
+    part = UnmeasuredPart(seen.surface, seen.path, model, library, posterior)
+    return choose(part, request.points, request.repeats, request.foot_m, request.seed, progress)

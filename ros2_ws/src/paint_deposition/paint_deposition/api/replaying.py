@@ -17,9 +17,8 @@ from paint_deposition.film.statistics import (
     film_statistics,
     require_band,
 )
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.pose_stream import PoseBatch, events_of
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.live.scene import Scene
 

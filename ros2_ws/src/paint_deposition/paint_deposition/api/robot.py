@@ -8,8 +8,15 @@ import numpy as np
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.gauge_readings import read_points
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
-from paint_deposition.motion.part_location import PartPlace, locate
+from paint_deposition.motion.part_frame import (
+    POSE_FORMAT,
+    PartPlace,
+    Rigid,
+    at_part,
+    is_frame,
+    is_pose,
+    locate,
+)
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.part_place import PartPlaces, part_places

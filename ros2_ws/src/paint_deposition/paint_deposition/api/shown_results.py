@@ -9,8 +9,8 @@ import trimesh
 from pydantic import BaseModel, ValidationError
 
 from paint_deposition.api.inference import compare, compare_models
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import LONGEST_QUOTED, PaintError
 from paint_deposition.files.atomic import read_file, require_file
 from paint_deposition.files.campaign_file import read_campaign
@@ -41,14 +41,14 @@ class _MadeFrom(BaseModel):
 
 
 class _Figures(BaseModel):
-    """Of a comparison or a diagnosis, what is needed to paint its parts again."""
+    """What is needed to paint the parts of a comparison or a diagnosis again."""
 
     accepted: list[str] = []
     provenance: _MadeFrom
 
 
 class _Statistics(BaseModel, allow_inf_nan=False):
-    """Of a film, what is shown beside it."""
+    """What is shown beside a film."""
 
     mesh_file: str = ''
     down: tuple[float, float, float] = (0.0, 0.0, -1.0)

@@ -1,15 +1,21 @@
-"""The film that recorded motions leave on a part, and how the guns ran over it."""
+"""The film that recorded motions leave on a part, how the guns ran over it, and sample files."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ModelError, RecordingError
-from paint_deposition.film.coats import TOTAL, Coats
-from paint_deposition.film.common_film import CommonFilm, LayeredFilm, require_one_finish
+from paint_deposition.errors import ModelError, PaintError, RecordingError
+from paint_deposition.film.common_film import (
+    TOTAL,
+    Coats,
+    CommonFilm,
+    LayeredFilm,
+    require_same_film_effects,
+)
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
@@ -19,8 +25,7 @@ from paint_deposition.inference.readings.plausibility import readings_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
 from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -96,7 +101,7 @@ def look_at_guns(
     *,
     max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
 ) -> list[GunOnPart]:
-    """The same for several guns on one part, each with its motion and its model.
+    """Set the motions of several guns beside a part, each with its model, without painting it.
 
     The first gun whose axis meets the part says which side of it is outward.
     """
@@ -185,8 +190,8 @@ def simulate(
         names = list(names) or [f'gun {number}' for number in range(1, len(motions) + 1)]
         named = list(zip(names, models, strict=True))
         for _, rows in laid.films_of(TOTAL):
-            require_one_finish(dict(named[rows]))
-        require_one_finish(dict(named), ['on_gauge'])
+            require_same_film_effects(dict(named[rows]))
+        require_same_film_effects(dict(named), ['on_gauge'])
     for pair in zip(motions, models, strict=True):
         require_brushes(*pair)
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
@@ -262,3 +267,18 @@ def _painted(
         integrators[-1].add(gun.path, report)
         before += len(gun.path)
     return CommonFilm(tuple(integrators))
+
+
+def sample_folder() -> Path:
+    """Folder of the samples, wherever pip or colcon put it.
+
+    Raises:
+        PaintError: the package was installed without its shared files.
+    """
+    package = Path(__file__).resolve().parents[1]
+    places = [package.parent / 'samples']
+    places += [folder / 'share' / package.name / 'samples' for folder in package.parents]
+    for place in places:
+        if (place / 'door.stl').is_file():
+            return place
+    raise PaintError(f'no samples belong to {package}; install the package with pip or colcon')

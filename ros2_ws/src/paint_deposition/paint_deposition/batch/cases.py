@@ -25,8 +25,8 @@ from typing import TYPE_CHECKING, Any
 
 import paint_deposition
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.user_effects import effect_of
-from paint_deposition.errors import ManyError
+from paint_deposition.effects.catalogue import effect_of
+from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import json_text, write_parquet
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def compute(
         lacks are empty in its rows.
 
     Raises:
-        ManyError: another command uses the folder, a worker has other code, or the scheduler is
+        BatchError: another command uses the folder, a worker has other code, or the scheduler is
             lost. What is finished is kept.
     """
     import pyarrow as pa
@@ -91,10 +91,10 @@ def compute(
             try:
                 write_parquet(files[digest], pa.table(dict(future.result())))
             except CancelledError:
-                raise ManyError(
+                raise BatchError(
                     'the scheduler is lost; finished cases are kept, run the same command again'
                 ) from None
-            except ManyError:
+            except BatchError:
                 raise
             except Exception as error:
                 failure = f'not computed: {type(error).__name__}: {" ".join(str(error).split())}'
@@ -117,7 +117,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
         count: of processes on this machine; default: one a core that this process may use.
 
     Raises:
-        ManyError: no scheduler answers, or it has no worker.
+        BatchError: no scheduler answers, or it has no worker.
     """
     if find_spec('distributed') is None:
         with ThreadPoolExecutor(1) as pool:
@@ -147,7 +147,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
         try:
             client = Client(scheduler, timeout=CONNECT_S)
         except (OSError, TimeoutError, ValueError) as error:
-            raise ManyError(
+            raise BatchError(
                 f'no scheduler answers at {scheduler} ({type(error).__name__}); start one with '
                 '`dask scheduler`'
             ) from None
@@ -155,7 +155,7 @@ def workers(scheduler: str | None = None, count: int | None = None) -> Iterator[
             try:
                 client.wait_for_workers(1, timeout=CONNECT_S)
             except TimeoutError:
-                raise ManyError(
+                raise BatchError(
                     f'the scheduler at {scheduler} has no worker; start one for each core with '
                     f'`dask worker {scheduler} --nthreads 1`'
                 ) from None
@@ -169,9 +169,11 @@ def digest_of(*values: Any) -> str:
 
 @cache
 def code_digest() -> str:
-    """The same for all sources of the package and the versions of what computes its films."""
+    """A digest of all sources of the package and the versions of what computes its films."""
+    from paint_deposition.kernel.compiler import KIND
+
     package = Path(paint_deposition.__file__).parent
-    digest = hashlib.sha256(paint_deposition.__version__.encode())
+    digest = hashlib.sha256(f'{paint_deposition.__version__} for {KIND}'.encode())
     for library in ('numba', 'numpy', 'scipy'):
         digest.update(version(library).encode())
     for file in sorted(package.rglob('*.py')):
@@ -191,7 +193,7 @@ def _used_alone(folder: Path) -> Iterator[None]:
         try:
             flock(descriptor, LOCK_EX | LOCK_NB)
         except BlockingIOError:
-            raise ManyError(
+            raise BatchError(
                 f'{folder} is in use by another command; wait for it, or choose another --output'
             ) from None
         yield
@@ -236,9 +238,10 @@ def _run_case(
 ) -> Columns:
     """Compute a case in a worker, which may have joined at any time."""
     if code != code_digest():  # films are the same only by the same code
-        raise ManyError(
+        raise BatchError(
             f'a worker on {gethostname()} has another paint_deposition '
-            f'({paint_deposition.__version__}), Numba, NumPy or SciPy; install the same there'
+            f'({paint_deposition.__version__}), Numba, NumPy or SciPy, or kind of processor; '
+            'install the same there, and set NUMBA_CPU_NAME=x86-64-v3 everywhere'
         )
     return work(pickle.loads(parameters), *map(_deserialised, inputs))
 

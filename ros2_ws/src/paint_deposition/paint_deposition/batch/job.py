@@ -22,9 +22,9 @@ from paint_deposition.batch.variations import (
     varied_motion,
 )
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
-from paint_deposition.errors import ManyError, PaintError
+from paint_deposition.errors import BatchError, PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
@@ -112,7 +112,7 @@ class Job:
         path = self._named('model', values)
         if path is None:
             if DRAW in values:
-                raise ManyError('no model is given, and the parameters of one vary; give model')
+                raise BatchError('no model is given, and the parameters of one vary; give model')
             return varied_model(DepositionModel(), values, self.effects)
         file = self._model_file(path)
         model = self._draws(path, file)[values[DRAW]] if DRAW in values else file.model
@@ -122,7 +122,7 @@ class Job:
         sample, posterior = self.file.sample, file.posterior
         assert sample is not None
         if posterior is None:
-            raise ManyError(
+            raise BatchError(
                 f'{path}: has no posterior to draw from; take a model that calibrate, diagnose '
                 'or refit wrote'
             )
@@ -135,7 +135,7 @@ class Job:
         file, mesh = self.file, self._named('mesh', values)
         motion = self._named('trajectory', values)
         if mesh is None:
-            raise ManyError('no mesh is given; give mesh')
+            raise BatchError('no mesh is given; give mesh')
         how = (file.mesh_scale, file.max_edge_length_m, None, file.body)
         surface = self._input('mesh', mesh, how, lambda: read_mesh(mesh, *how))
         recorded = NOTHING if motion is None else self._motion(motion, values)
@@ -159,15 +159,15 @@ class Job:
         file = self.file
         for name in MOTION_KEYS if planned else PASS_KEYS:
             if name in values and planned:
-                raise ManyError(f'{name} varies a recorded motion; give a trajectory')
+                raise BatchError(f'{name} varies a recorded motion; give a trajectory')
             if name in values:
-                raise ManyError(
+                raise BatchError(
                     f'{name} varies planned passes; leave trajectory out, or vary '
                     f'{", ".join(MOTION_KEYS)}'
                 )
         passes = file.passes.model_dump() | {n: values[n] for n in PASS_KEYS if n in values}
         if planned and passes['speed_m_per_s'] is None and passes['target_um'] is None:
-            raise ManyError(
+            raise BatchError(
                 'passes are planned, but neither their speed nor a target is given; give passes: '
                 '{speed_m_per_s: ...}, passes: {target_um: ...}, or a trajectory'
             )

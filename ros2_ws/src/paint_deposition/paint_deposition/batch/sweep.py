@@ -17,7 +17,7 @@ from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.batch.variations import DRAW
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import BatchError
 from paint_deposition.files.atomic import require_pyarrow, write_json, write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
@@ -85,7 +85,7 @@ def sweep(
     found = Sweep(job, pa.table(columns), now)
     if len(found.errors) == len(job.cases):
         number, error = found.errors[0]
-        raise ManyError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
+        raise BatchError(f'none of {len(job.cases)} cases has a result; case {number}: {error}')
     return found
 
 

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
 
-from paint_deposition.errors import ManyError
+from paint_deposition.errors import BatchError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.request import validate
@@ -125,13 +125,13 @@ def read_sweep(path: str | Path) -> SweepFile:
     """Read a sweep file; its paths stay as written.
 
     Raises:
-        ManyError: naming the file, the key at fault and the remedy.
+        BatchError: naming the file, the key at fault and the remedy.
     """
     path = Path(path)
-    content = read_yaml(path, 'sweep', ManyError)
+    content = read_yaml(path, 'sweep', BatchError)
     if not isinstance(content, dict):
-        raise ManyError(f'{path}: is not a sweep; expected the keys mesh, trajectory and grid')
-    file = validate(SweepFile, f'{path}: sweep', content, ManyError)
+        raise BatchError(f'{path}: is not a sweep; expected the keys mesh, trajectory and grid')
+    file = validate(SweepFile, f'{path}: sweep', content, BatchError)
     if not (file.grid or file.cases or file.sample):
-        raise ManyError(f'{path}: nothing varies; give one of grid, cases, sample')
+        raise BatchError(f'{path}: nothing varies; give one of grid, cases, sample')
     return file

@@ -13,7 +13,7 @@ from paint_deposition.batch.sweep_file import MOST_CASES, SweepFile
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import ManyError, did_you_mean
+from paint_deposition.errors import BatchError, did_you_mean
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
@@ -65,7 +65,7 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
         models: that it names; the parameters of their effects may vary.
 
     Raises:
-        ManyError: an unknown name, a name in two blocks, or too many cases.
+        BatchError: an unknown name, a name in two blocks, or too many cases.
     """
     drawn = list(file.sample.vary) if file.sample else []
     names = [list(file.grid), sorted({n for case in file.cases for n in case}), drawn]
@@ -74,12 +74,12 @@ def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[
     for name in (name for block in names for name in block):
         _require_known(name, known)
         if name in seen:
-            raise ManyError(f'{name} varies twice, in two of grid, cases, sample; keep one')
+            raise BatchError(f'{name} varies twice, in two of grid, cases, sample; keep one')
         seen.add(name)
     draws = file.sample.count if file.sample else 1
     count = int(np.prod([len(v) for v in file.grid.values()])) * max(len(file.cases), 1) * draws
     if count > MOST_CASES:
-        raise ManyError(f'{count} cases are more than {MOST_CASES}; vary less at once')
+        raise BatchError(f'{count} cases are more than {MOST_CASES}; vary less at once')
     grid = [dict(zip(file.grid, values, strict=True)) for values in product(*file.grid.values())]
     blocks = product(grid, file.cases or [{}], _draws(file))
     found = [{**of_grid, **case, **draw} for of_grid, case, draw in blocks]
@@ -110,12 +110,12 @@ def _require_known(name: str, known: Sequence[str]) -> None:
         owner, dot, _ = name.partition('.')
         if dot and not any(other.startswith(f'{owner}.') for other in known):
             owners = dict.fromkeys(other.partition('.')[0] for other in known if '.' in other)
-            raise ManyError(
+            raise BatchError(
                 f'{name} cannot vary: no effect {owner!r} is in the library or in a model of the '
                 f'sweep; {did_you_mean(owner, owners)}'
             )
         remedy = f'did you mean {near[0]!r}?' if near else did_you_mean(name, known)
-        raise ManyError(f'nothing called {name!r} can vary; {remedy}')
+        raise BatchError(f'nothing called {name!r} can vary; {remedy}')
 
 
 def _require_kind(name: str, value: Any) -> None:
@@ -134,7 +134,7 @@ def _require_kind(name: str, value: Any) -> None:
     else:
         holds, expected = _is_number(value), 'a number'
     if not holds:
-        raise ManyError(f'{name} is {value!r}; expected {expected}')
+        raise BatchError(f'{name} is {value!r}; expected {expected}')
 
 
 def _is_number(value: Any) -> bool:
@@ -152,7 +152,7 @@ def varied_model(
         effects: that may be added, by id.
 
     Raises:
-        ManyError: a value that the parameter cannot have, or an effect that the model has not.
+        BatchError: a value that the parameter cannot have, or an effect that the model has not.
     """
     if 'effects' in values:
         model = _with_effects(model, values['effects'])
@@ -162,7 +162,7 @@ def varied_model(
             continue
         if owner == 'planar' and model.brushes:
             numbers = [f'{BRUSH}{brush.number}' for brush in model.brushes]
-            raise ManyError(
+            raise BatchError(
                 f'{name} varies, but the model has a pattern for each brush; vary '
                 f'{" or ".join(f"{number}.{field}" for number in numbers)}'
             )
@@ -186,7 +186,7 @@ def _with_effects(model: DepositionModel, wanted: Iterable[str]) -> DepositionMo
     there = [effect.id for effect in model.effects]
     for effect_id in wanted:
         if effect_id not in there:
-            raise ManyError(f'the model has no effect {effect_id!r}; it has: {there or "none"}')
+            raise BatchError(f'the model has no effect {effect_id!r}; it has: {there or "none"}')
     kept = tuple(effect for effect in model.effects if effect.id in wanted)
     return model.model_copy(update={'effects': kept})
 
@@ -196,7 +196,7 @@ def _changed(section: Any, field: str, value: float, name: str) -> Any:
     from paint_deposition.request import validate
 
     values = section.model_dump() | {field: float(value)}
-    return validate(type(section), name.partition('.')[0], values, ManyError)
+    return validate(type(section), name.partition('.')[0], values, BatchError)
 
 
 def varied_motion(
@@ -205,7 +205,7 @@ def varied_motion(
     standoff_change_m: float = 0.0,
     flow_factor: float = 1.0,
 ) -> Trajectory:
-    """The same motion, changed; as it is where nothing is asked for.
+    """The motion of a case: changed, or as it is where nothing is asked for.
 
     Args:
         trajectory: as recorded.

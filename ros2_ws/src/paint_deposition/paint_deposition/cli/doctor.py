@@ -119,18 +119,18 @@ def _processor() -> Iterator[Finding]:
     import llvmlite.binding as llvm
     import numba
 
+    from paint_deposition.kernel.compiler import KIND
     from paint_deposition.part.face_tree import box_distance
 
     has = llvm.get_host_cpu_features()
     features = ' '.join(name for name in PROCESSOR_FEATURES if has.get(name))
     threads = f'{numba.get_num_threads()} threads on {os.cpu_count()} processors'
     yield Finding('processor', f'{llvm.get_host_cpu_name()}, {features}; {threads}')
-    kind = numba.config.CPU_NAME or 'this processor'
     folder = Path(box_distance.stats.cache_path)
     folder = Path(pd.__file__).parent if folder.name == '__pycache__' else folder.parent
     sizes = [file.stat().st_size for file in folder.rglob('*.nb[ic]')]
     yield Finding(
-        'compiled code', f'for {kind}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
+        'compiled code', f'for {KIND}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
     )
 
 

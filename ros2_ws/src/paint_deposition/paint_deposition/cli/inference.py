@@ -12,7 +12,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import model_words
-from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import Progress
 from paint_deposition.errors import PaintError
 
 RESULTS = options.results_options('the results')
@@ -47,7 +47,7 @@ def _run(
         begins_with: what of the model's file the verb takes.
         fitted: what happens to the model, for the line on it; words: that line, if it is another.
     """
-    from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
+    from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
     def remark(kind: str, experiment: str, line: str) -> None:
@@ -205,7 +205,7 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     Writes diagnosis.json, model.yaml with what was accepted, model_before.yaml without it,
     residuals.csv, comparison.png and report.html.
     """
-    from paint_deposition.effects.user_effects import load_effect_file
+    from paint_deposition.effects.catalogue import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
 
@@ -236,8 +236,7 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
     Writes model.yaml with its history, report.html and the other files that diagnose writes. To go
     on from there, give that model.yaml as --model.
     """
-    from paint_deposition.effects.catalogue import effect_class
-    from paint_deposition.effects.user_effects import load_effect_file
+    from paint_deposition.effects.catalogue import effect_class, load_effect_file
 
     added = None
     if effect != 'none':

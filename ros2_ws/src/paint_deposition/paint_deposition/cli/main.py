@@ -28,7 +28,7 @@ COMMANDS = {
     'compare': ('inference', 'Compare the model with gauge readings.'),
     'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
     'refit': ('inference', 'Add an effect of your choice and refit.'),
-    'sweep': ('batch', 'Compute many variations of one job, on all cores or a cluster.'),
+    'sweep': ('simulate', 'Compute many variations of one job, on all cores or a cluster.'),
     'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
     'locate': ('place', 'Find the pose of the part from touched points.'),
     'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),

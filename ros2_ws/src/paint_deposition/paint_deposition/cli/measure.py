@@ -12,7 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import chosen_model, model_for
 from paint_deposition.cli.options_of import options_of
-from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import Progress
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 
 # Below this probability an effect is named as one that the part hardly shows.

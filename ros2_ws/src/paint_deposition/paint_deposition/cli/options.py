@@ -22,32 +22,25 @@ if TYPE_CHECKING:
     from paint_deposition.part.zones import Zones
 
 
-class Finite:
-    """Of a type of numbers those that are finite: `nan` and `inf` are numbers to Python."""
+class FiniteRange(click.FloatRange):
+    """A finite number, within bounds if there are any; else it says what is wanted."""
 
-    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        number = super().convert(value, param, ctx)  # type: ignore[misc]
-        if not math.isfinite(number):
-            raise click.BadParameter(f'{value} is not finite; give a number', ctx, param)
-        return number
-
-
-class FiniteNumber(Finite, click.types.FloatParamType):
-    """Any finite number."""
-
-
-class FiniteRange(Finite, click.FloatRange):
-    """A finite number within bounds; outside of them it says what is wanted."""
+    def __init__(self, *ends: Any, **bounds: Any) -> None:
+        super().__init__(*ends, **bounds)
+        self.name = 'float range' if ends or bounds else 'float'
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
-            return super().convert(value, param, ctx)
+            number = super().convert(value, param, ctx)
+            if not math.isfinite(number):  # `nan` and `inf` are numbers to Python
+                raise click.BadParameter(f'{value} is not finite; give a number', ctx, param)
         except click.BadParameter as error:
             if not isinstance(param, click.Option) or not param.help:
                 raise
             metres = ', in metres' if str(param.name).endswith('_m') else ''
             words = f'{error.message.rstrip(".")}{metres}; wanted: {param.help.rstrip(".")}'
             raise click.BadParameter(words, ctx, param) from None
+        return number
 
 
 class File(click.Path):
@@ -60,7 +53,7 @@ class File(click.Path):
         return super().convert(value, param, ctx)
 
 
-NUMBER = FiniteNumber()
+NUMBER = FiniteRange()
 POSITIVE = FiniteRange(min=0.0, min_open=True)
 NOT_NEGATIVE = FiniteRange(min=0.0)
 FILE = File(path_type=Path)
@@ -145,7 +138,7 @@ def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> li
 
 def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> None:
     if given:
-        from paint_deposition.effects.user_effects import effects_allowed
+        from paint_deposition.effects.catalogue import effects_allowed
 
         token = effects_allowed.set(True)
         ctx.call_on_close(lambda: effects_allowed.reset(token))
@@ -218,7 +211,7 @@ MOTION = (
 )  # fmt: skip
 
 
-def grouped(
+def option_group(
     options: Sequence[Callable], into: str, kind: Callable[..., Any] = dict
 ) -> Callable[[Callable], Callable]:
     """Give a command these options; it takes what was given as one argument, of a kind."""
@@ -237,14 +230,14 @@ def grouped(
     return with_group
 
 
-motion_options = grouped(MOTION, 'motion')
+motion_options = option_group(MOTION, 'motion')
 JOINT_ACCELERATION = click.option(
     '--joint-acceleration', type=POSITIVE,
     help='Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: full '
     'speed in a quarter of a second.',
 )  # fmt: skip
 # The robot that is to drive a plan: what `read_robot` takes beside the pose of the part.
-robot_options = grouped(
+robot_options = option_group(
     (
         click.option(
             '--urdf', type=FILE,
@@ -294,7 +287,7 @@ def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
             help='Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.',
         ),
     )  # fmt: skip
-    return grouped(options, 'part')
+    return option_group(options, 'part')
 
 
 def python(code: str, *words: str) -> list[str]:
@@ -353,7 +346,7 @@ def results_options(what: str, default: str | None = None) -> Callable[[Callable
                      show_default=True, help='Format of the pictures.'),
         JSON,
     )  # fmt: skip
-    return grouped(options, 'results', Results)
+    return option_group(options, 'results', Results)
 
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:

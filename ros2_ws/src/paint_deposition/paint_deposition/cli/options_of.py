@@ -13,7 +13,7 @@ from annotated_types import Ge, Gt, Le, Lt, MaxLen
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
-from paint_deposition.cli.options import FILE, FiniteNumber, FiniteRange
+from paint_deposition.cli.options import FILE, FiniteRange
 from paint_deposition.errors import PaintError
 
 
@@ -29,7 +29,7 @@ def options_of(kind: type[BaseModel], into: str = 'request') -> Callable[[Callab
         into: name of the argument of the command that takes the request.
     """
     names = list(kind.model_fields)
-    called = {name: _called(name, kind.model_fields[name]) for name in names}
+    called = {name: _option_name(name, kind.model_fields[name]) for name in names}
 
     def with_options(command: Callable) -> Callable:
         @wraps(command)
@@ -60,7 +60,7 @@ def _extra(field: FieldInfo) -> dict[str, Any]:
     return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
 
 
-def _called(name: str, field: FieldInfo) -> str:
+def _option_name(name: str, field: FieldInfo) -> str:
     """The option of a field."""
     usual = f'--{name.removesuffix("_rad")}-deg' if _is_angle(name) else f'--{name}'
     return str(_extra(field).get('option', usual.replace('_', '-')))
@@ -80,7 +80,7 @@ def _option(name: str, field: FieldInfo) -> Callable:
         settings |= _type(annotation, metadata, shown) | {'show_default': known is not None}
     if 'metavar' in extra:
         settings['metavar'] = extra['metavar']
-    return click.option(_called(name, field), name, **settings)
+    return click.option(_option_name(name, field), name, **settings)
 
 
 def _bare(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
@@ -119,4 +119,4 @@ def _type(
             bounds |= {end: shown(getattr(one, key)), f'{end}_open': key in ('gt', 'lt')}
     if annotation is int:
         return {'type': click.IntRange(**bounds) if bounds else int}
-    return {'type': FiniteRange(**bounds) if bounds else FiniteNumber()}
+    return {'type': FiniteRange(**bounds)}

@@ -10,7 +10,7 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import Progress
 
 if TYPE_CHECKING:
     from paint_deposition.planning.part_place import PartPlaces

@@ -12,7 +12,7 @@ import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.inspected import mesh_in, readings_in
 from paint_deposition.cli.model_choice import model_for
-from paint_deposition.cli.progress import SHOW_PROGRESS_AFTER_S, Progress
+from paint_deposition.cli.results_folder import SHOW_PROGRESS_AFTER_S, Progress
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 

@@ -16,7 +16,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.model_choice import models_for
-from paint_deposition.cli.progress import Progress
+from paint_deposition.cli.results_folder import Progress
 from paint_deposition.errors import PaintError
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 

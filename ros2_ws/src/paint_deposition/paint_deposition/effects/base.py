@@ -155,7 +155,7 @@ class Effect(BaseModel):
 
     @property
     def absent(self) -> 'Effect':
-        """The same with all amplitudes neutral."""
+        """The effect with all its amplitudes neutral."""
         return self.model_copy(update=self._neutral())
 
     @classmethod

@@ -9,14 +9,10 @@ from pydantic import BaseModel, ConfigDict, SerializeAsAny, model_validator
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.errors import ModelError
-from paint_deposition.model.brush import Brush, listed
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import Brush, PlanarPattern, listed
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import DEFAULT_MAX_STEP_M
-from paint_deposition.motion.trigger import ONLY_BRUSH
-
-# Flux below this share of the peak is left out of the film.
-CUT_FLUX = 1e-6
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
 class DepositionModel(BaseModel):
@@ -56,7 +52,7 @@ class DepositionModel(BaseModel):
 
     @property
     def patterns(self) -> tuple[PlanarPattern, ...]:
-        """Of the brushes in the order of their numbers, or the only one."""
+        """The patterns of the brushes in the order of their numbers, or the only one."""
         return tuple(brush.planar for brush in self.brushes) or (self.planar,)
 
     def with_patterns(self, patterns: Iterable[PlanarPattern]) -> 'DepositionModel':
@@ -77,7 +73,7 @@ class DepositionModel(BaseModel):
         return self.painting_with(number)
 
     def painting_with(self, number: int) -> 'DepositionModel':
-        """The same for what a motion calls its brush: without ``brushes`` any number will do."""
+        """The pattern of what a motion calls its brush: without ``brushes`` any number will do."""
         row = int(self.pattern_rows(np.array([number]))[0])
         brushes = self.brushes[row : row + 1]
         return self.model_copy(update={'planar': self.patterns[row], 'brushes': brushes})
@@ -160,8 +156,9 @@ class DepositionModel(BaseModel):
         return max(map(self.reach_of_m, self.patterns))
 
     def reach_of_m(self, planar: PlanarPattern) -> float:
-        """The same for one of its patterns [m]."""
-        return planar.radius_of_flux_m(CUT_FLUX) * self.widening
+        """How far one of the patterns reaches on the model plane [m]."""
+        # Flux below this share of the peak is left out of the film.
+        return planar.radius_of_flux_m(1e-6) * self.widening
 
     @property
     def shadow(self) -> float:

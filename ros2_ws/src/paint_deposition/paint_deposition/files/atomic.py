@@ -17,7 +17,7 @@ from uuid import uuid4
 
 from pydantic_core import to_json, to_jsonable_python
 
-from paint_deposition.errors import ManyError, PaintError
+from paint_deposition.errors import BatchError, PaintError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -118,7 +118,7 @@ MAGIC = b'PAR1'
 def require_pyarrow(what: str) -> None:
     """Refuse to begin what needs the library of the extra, where it is not installed."""
     if find_spec('pyarrow') is None:
-        raise ManyError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
+        raise BatchError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

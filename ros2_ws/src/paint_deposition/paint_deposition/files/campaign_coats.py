@@ -10,11 +10,11 @@ from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
-from paint_deposition.film.coats import TOTAL, Coats, WetFilms
+from paint_deposition.film.common_film import TOTAL, Coats, WetFilms
 from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.model.brush import MOST, listed
+from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.request import validate
 
 # Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.

@@ -8,10 +8,13 @@ from typing import Any
 from pydantic import BaseModel, Field
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.effects.catalogue import (
+    effect_class,
+    load_effect_file,
+    load_unnamed_effect_file,
+)
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
-from paint_deposition.effects.user_effects import load_effect_file, load_unnamed_effect_file
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_text import (
@@ -23,8 +26,7 @@ from paint_deposition.files.model_text import (
 )
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.brush import MOST, Brush, SetPoints
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.request import validate
 

@@ -14,13 +14,12 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.catalogue import EFFECTS, effect_of
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
-from paint_deposition.effects.user_effects import effect_of
 from paint_deposition.errors import ModelError
 from paint_deposition.files.atomic import plain
-from paint_deposition.model.brush import Brush, SetPoints
+from paint_deposition.model.eq1_pattern import Brush, SetPoints
 
 COMMENT_COLUMN = 33
 # What stands for all learned laws; the covariate says which.

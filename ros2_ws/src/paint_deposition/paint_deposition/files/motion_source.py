@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, Field
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.tables.pose_columns import ROTATION_WORDS, is_rotation
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S
 
 Text = Annotated[str, Field(min_length=1)]
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]

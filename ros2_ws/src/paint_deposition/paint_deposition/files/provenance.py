@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition import __version__
+from paint_deposition.effects.catalogue import load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_unnamed_effect_file
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.atomic import (
     BLOCK_BYTES,

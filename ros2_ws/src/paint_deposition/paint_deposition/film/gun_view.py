@@ -13,14 +13,8 @@ from paint_deposition.part.surface import Surface
 
 # Poses that stand for the whole path, and rays that stand for the spray of each.
 POSES, RAYS = 240, 160
-# The gun is over the part where the nearest surface looks at it within 25 degrees: beside the
-# part its edge is nearest.
-OVER_COSINE = math.cos(math.radians(25.0))
-# With fewer poses over the part, distance and lean say nothing.
-LEAST_OVER = 0.05
 # What is shorter is the end of another pass.
 SHORTEST_PASS_M = 0.05
-GOLDEN_ANGLE = math.pi * (3.0 - math.sqrt(5.0))
 
 
 class GunView:
@@ -54,8 +48,11 @@ class GunView:
     @cached_property
     def over(self) -> np.ndarray:
         """(N,) bool, whether the gun is over the part, on whichever side; none if on few poses."""
-        over = np.abs(self._incidence) > OVER_COSINE
-        return over if over.mean() >= LEAST_OVER else np.zeros_like(over)
+        # The gun is over the part where the nearest surface looks at it within 25 degrees: beside
+        # the part its edge is nearest.
+        over = np.abs(self._incidence) > math.cos(math.radians(25.0))
+        # With fewer poses over the part, distance and lean say nothing.
+        return over if over.mean() >= 0.05 else np.zeros_like(over)
 
     @property
     def is_behind(self) -> bool:
@@ -96,7 +93,7 @@ class GunView:
 
     @cached_property
     def landing_of_passes(self) -> list[float]:
-        """The same of each of the passes; 1 where one is too short to be seen."""
+        """Share of the rays of each pass that land on the part; 1 where it is too short."""
         number, seen = self.path.spray_pass, [one.spray_pass[0] for one in self.passes]
         return [float(self.landing[number == n].mean()) if n in number else 1.0 for n in seen]
 
@@ -114,7 +111,7 @@ def pattern_rays(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray, np.ndar
     radii = np.linspace(0.0, planar.radius_of_flux_m(1e-4), 500)
     shares = (np.arange(RAYS) + 0.5) / RAYS
     radius = np.interp(shares, planar.enclosed_fraction(radii), radii)
-    azimuth = GOLDEN_ANGLE * np.arange(RAYS)
+    azimuth = math.pi * (3.0 - math.sqrt(5.0)) * np.arange(RAYS)
     x, y = radius * np.cos(azimuth), radius * np.sin(azimuth)
     even = planar.model_copy(update={'K3': 0.0})
     weights = planar.flux_um_per_s(x, y) / even.flux_um_per_s(x, y)

@@ -14,13 +14,14 @@ import numpy as np
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.layout import (
+    LinesOfSight,
+    Sight,
     compiled_laws,
     emission_points_m,
     model_constants,
     step_rows,
     term_constants,
 )
-from paint_deposition.film.lines_of_sight import LinesOfSight, Sight
 from paint_deposition.film.paint_used import PaintUsed
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.kernel.threads import shared_among_threads
@@ -29,8 +30,6 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 Precision = Literal['single', 'double']
-# Reach of a pattern that may still become wider [m].
-ANY_REACH_M = 1e6
 # Sub-steps handed to the kernel at once, so that long work can report progress.
 BATCH = 2048
 # Fewer rays, points times sub-steps, are painted before other threads wake.
@@ -51,7 +50,7 @@ class Steps:
         return len(self.rows)
 
     def of_brush(self, row: int) -> 'Steps':
-        """Those on which one of the patterns sprays."""
+        """The sub-steps on which one of the patterns sprays."""
         chosen = self.brush == row
         return Steps(self.rows[chosen], self.sight.select(chosen), self.brush[chosen])
 
@@ -132,7 +131,8 @@ class FilmIntegrator:
 
     def steps(self, path: SprayPath) -> Steps:
         """A path prepared for this model, to be painted again and again."""
-        return self._steps(self.sprayed(path)[0], ANY_REACH_M)
+        # The pattern may still become wider: any reach.
+        return self._steps(self.sprayed(path)[0], 1e6)
 
     def paint(self, steps: Steps) -> None:
         """Paint along a path that was prepared for the effects and projection of the model."""
@@ -175,7 +175,7 @@ class FilmIntegrator:
         return Steps(rows, sight, brush)
 
     def _run(
-        self, apart: bool, steps: Steps, constants: np.ndarray,
+        self, separate_terms: bool, steps: Steps, constants: np.ndarray,
         film: np.ndarray, recent: np.ndarray, terms: np.ndarray,
     ) -> None:  # fmt: skip
         blocks = self._blocks
@@ -184,7 +184,7 @@ class FilmIntegrator:
             blocks.spheres, blocks.bounds, steps.rows, steps.sight.first, steps.sight.tracing,
             steps.brush, constants.astype(self._real), self._parameters,
         )  # fmt: skip
-        kernel = compile_kernel(*self._variant, apart)
+        kernel = compile_kernel(*self._variant, separate_terms)
 
         def paint(first_block: int, last_block: int) -> None:
             kernel(first_block, last_block, *arguments)

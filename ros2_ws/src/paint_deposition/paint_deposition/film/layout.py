@@ -1,20 +1,26 @@
-"""What the kernel reads: a row of numbers for each sub-step, and the constants of the model."""
+"""What the kernel reads: sub-steps, constants of the model, and which points the gun sees."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
 
 import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import eq2_flux as kernel
+from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
+from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.kernel.laws import Law
+from paint_deposition.kernel.threads import THREADS
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.visibility import Occluder
 
 Laws = tuple[tuple[Law, int], ...]
-# Stands for a gain of nothing, which has no logarithm [um/s].
-NO_GAIN_UM_PER_S = 1e-30
 
 
 def model_constants(model: DepositionModel) -> np.ndarray:
@@ -28,7 +34,8 @@ def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
     centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
     c = np.empty(kernel.MODEL_CONSTANTS)
     c[kernel.OMEGA] = projection.model_plane_m
-    c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], NO_GAIN_UM_PER_S))
+    # Stands for a gain of nothing, which has no logarithm [um/s].
+    c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
     c[kernel.RADIUS] = planar.r_m
     c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
     c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2
@@ -112,3 +119,148 @@ def step_rows(model: DepositionModel, path: SprayPath, origin_m: np.ndarray) -> 
     rows[:, kernel.WEIGHT] = path.dwell_s * path.flow * omega**2
     rows[:, kernel.SPEED] = path.speed_m_per_s
     return rows
+
+
+# Lines of sight are traced anew after this travel of the emission point [m].
+SIGHT_STEP_M = 0.01
+# Rays traced at once, which bounds the memory.
+RAYS_AT_ONCE = 200_000
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What is seen on the sub-steps of a path."""
+
+    # (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
+    seen: np.ndarray
+    first: np.ndarray  # (S, B) where in ``seen`` the run of a tracing and a block begins
+    tracing: np.ndarray  # (M,) row of ``first`` that holds on each sub-step
+
+    def select(self, steps: np.ndarray) -> 'Sight':
+        """On some of the sub-steps."""
+        return Sight(self.seen, self.first, self.tracing[steps])
+
+    @staticmethod
+    def free(steps: int, blocks: int) -> 'Sight':
+        """Everything is seen on all sub-steps."""
+        run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
+        return Sight(run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64))
+
+
+class LinesOfSight:
+    """Traces rays from the gun to those points, also given as the kernel's blocks, that it paints.
+
+    A point whose normal looks away needs no ray, nor does one over which the gun stands higher
+    than all of the part, nor any of a block that lies out of the pattern's reach.
+    """
+
+    def __init__(self, obstacle: Occluder, points: SurfacePoints, blocks: Blocks) -> None:
+        self._obstacle, self._blocks = obstacle, blocks
+        self._positions_m = points.positions_m[blocks.order]
+        self._normals = points.normals[blocks.order]
+        self._horizon = obstacle.horizon_sines(self._positions_m, self._normals)
+
+    def along(
+        self,
+        origins_m: np.ndarray,
+        rows: np.ndarray,
+        brush: np.ndarray,
+        constants: np.ndarray,
+        last_m: np.ndarray | None,
+    ) -> tuple[Sight, np.ndarray | None]:
+        """Trace from the first origin and then after every SIGHT_STEP_M of travel.
+
+        Of the sub-steps their emission points (M, 3), their ``rows`` (M, 16) as the kernel reads
+        them, and the row (M,) of each in the brushes' constants (B, 11). ``last_m`` is the origin
+        of the tracing that held on the sub-step before. Returned are what is seen, and the origin
+        of the last tracing.
+        """
+        traced, tracing = _tracings(origins_m, last_m)
+        blocks = self._blocks
+        lit = _within_reach(blocks.spheres, rows, tracing, brush, constants, len(traced))
+        which, block = np.nonzero(lit)
+        sizes = np.diff(blocks.bounds)[block]
+        # The first run is that of whatever lies out of reach.
+        starts = LARGEST_BLOCK + np.cumsum(sizes) - sizes
+        first = np.zeros(lit.shape, dtype=np.int64)
+        first[which, block] = starts
+        seen = np.ones(LARGEST_BLOCK + sizes.sum(), dtype=np.uint8)
+        begins = np.searchsorted(tracing, np.arange(len(traced) + 1))
+
+        def trace(part: slice) -> None:
+            places, tracings, points = _rays_to_trace(
+                blocks.bounds, blocks.points, blocks.normals, self._positions_m, self._normals,
+                self._horizon, traced, rows, begins, brush, constants,
+                which[part], block[part], starts[part],
+            )  # fmt: skip
+            seen[places] = self._obstacle.sees(traced[tracings], self._positions_m[points])
+
+        with ThreadPoolExecutor(THREADS) as threads:
+            list(threads.map(trace, _parts(sizes)))
+        return Sight(seen, first, tracing), traced[-1] if len(traced) else last_m
+
+
+def _tracings(origins_m: np.ndarray, last_m: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
+    """(S, 3) origins from which to trace [m], and (M,) the row of them that holds."""
+    traced = [] if last_m is None else [last_m]
+    tracing = np.empty(len(origins_m), dtype=np.int64)
+    for step, origin in enumerate(origins_m):
+        if not traced or np.linalg.norm(origin - traced[-1]) > SIGHT_STEP_M:
+            traced.append(origin)
+        tracing[step] = len(traced) - 1
+    return np.reshape(traced, (-1, 3)), tracing
+
+
+def _parts(sizes: np.ndarray) -> Iterator[slice]:
+    """Cut runs of these sizes into parts of RAYS_AT_ONCE or a little more."""
+    parts = np.cumsum(sizes) // RAYS_AT_ONCE
+    cuts = np.flatnonzero(np.diff(parts, prepend=-1))
+    for start, stop in zip(cuts, [*cuts[1:], len(sizes)], strict=True):
+        yield slice(start, stop)
+
+
+@njit(cache=True, nogil=True)
+@named_for_its_code
+def _within_reach(spheres, rows, tracing, brush, constants, tracings):
+    """(S, B) bool, whether any sub-step of a tracing reaches a block."""
+    lit = np.zeros((tracings, len(spheres)), dtype=np.bool_)
+    for m in range(len(rows)):
+        for block in range(len(spheres)):
+            if within_reach(spheres[block], rows[m], constants[brush[m]]):
+                lit[tracing[m], block] = True
+    return lit
+
+
+@njit(cache=True, nogil=True)
+@named_for_its_code
+def _rays_to_trace(
+    bounds, p, n, positions, normals, horizon, traced, rows, begins, brush, constants, which,
+    block, starts,
+):  # fmt: skip
+    """Place in ``seen``, tracing and point of each ray that is needed."""
+    count = 0
+    for run in range(len(which)):
+        count += bounds[block[run] + 1] - bounds[block[run]]
+    places = np.empty(count, dtype=np.int64)
+    tracings, points = np.empty_like(places), np.empty_like(places)
+    count = 0
+    for run in range(len(which)):
+        eye = traced[which[run]]
+        first = bounds[block[run]]
+        for i in range(first, bounds[block[run] + 1]):
+            x, y, z = eye[0] - positions[i, 0], eye[1] - positions[i, 1], eye[2] - positions[i, 2]
+            height = x * normals[i, 0] + y * normals[i, 1] + z * normals[i, 2]
+            if height > horizon[i] * np.sqrt(x * x + y * y + z * z):
+                continue
+            for m in range(begins[which[run]], begins[which[run] + 1]):
+                step = rows[m]
+                dx, dy = p[0, i] - step[ORIGIN], p[1, i] - step[ORIGIN + 1]
+                dz = p[2, i] - step[ORIGIN + 2]
+                along = dx * step[AXIS_Z] + dy * step[AXIS_Z + 1] + dz * step[AXIS_Z + 2]
+                facing = -(dx * n[0, i] + dy * n[1, i] + dz * n[2, i])
+                if facing > 0.0 and along > constants[brush[m], NEAREST]:
+                    places[count] = starts[run] + i - first
+                    tracings[count], points[count] = which[run], i
+                    count += 1
+                    break
+    return places[:count], tracings[:count], points[:count]

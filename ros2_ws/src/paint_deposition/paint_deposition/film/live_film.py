@@ -10,15 +10,19 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, PathBuilder
+from paint_deposition.motion.path_builder import PathBuilder
 from paint_deposition.motion.pose_stream import (
     DEFAULT_POSE_MEMORY,
     MotionLog,
     PoseBatch,
     TriggerChange,
 )
-from paint_deposition.motion.trajectory import PoseCounts
-from paint_deposition.motion.trigger import BEFORE_ALL_NS, ONLY_BRUSH
+from paint_deposition.motion.trajectory import (
+    BEFORE_ALL_NS,
+    DEFAULT_MAX_POSE_GAP_S,
+    ONLY_BRUSH,
+    PoseCounts,
+)
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
@@ -116,9 +120,9 @@ class LiveFilm:
 
     def reset(self) -> None:
         """Clear the film; the gun stays on or off if the motion continues."""
-        self.start_bare_after(self)
+        self.reset_keeping_trigger_of(self)
 
-    def start_bare_after(self, before: 'LiveFilm') -> None:
+    def reset_keeping_trigger_of(self, before: 'LiveFilm') -> None:
         """Clear the film and take over the state of the gun from another film.
 
         Raises:

@@ -9,9 +9,9 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.statistics import FilmStatistics
-from paint_deposition.model.brush import Brush
+from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class PaintUsed:
         numbers = [brush.number for brush in model.brushes] or [ONLY_BRUSH]
 
         def total(rate: Callable[[Brush], float]) -> float:
-            """Of a rate [1/s] over the time sprayed."""
+            """A rate [1/s] summed over the time sprayed."""
             if not model.brushes:
                 return 0.0 if not sum(seconds) else math.nan
             sprayed = zip(model.brushes, seconds, strict=True)
@@ -104,7 +104,7 @@ def paint_figures(result: Painted) -> dict[str, Any] | None:
 
 
 def paint_sentence(result: Painted) -> str:
-    """The same in a line, '' where nothing of it is known."""
+    """The paint used in a line, '' where nothing of it is known."""
     paint, film = result.paint, result.statistics
     said = []
     if not math.isnan(paint.wet_cm3):

@@ -18,8 +18,6 @@ from paint_deposition.part.surface import Surface
 FAR_M = 1.0
 # Part and path that differ so much in size are in different units.
 OTHER_UNIT = 100.0
-# No robot paints a part along a shorter path; one that only stands does so before the model plane.
-SHORTEST_M = 0.01
 # Painters lean the gun, but less than this; an axis within 37 degrees of a direction points there.
 LEANING_DEG, REVERSED_DEG, ALONG_COSINE = 35.0, 135.0, 0.8
 # Standoffs further from the model plane than this share of its distance are odd.
@@ -67,7 +65,9 @@ def _other_unit(view: GunView) -> str:
     )
     nominal = view.model.projection.nominal_standoff_m
     off_plane = abs(float(np.median(view.distance_m)) - nominal) > OFF_PLANE * nominal
-    if 0.0 < way < SHORTEST_M and part > OTHER_UNIT * way and off_plane:
+    # No robot paints a part along a shorter path; one that only stands does so before the model
+    # plane.
+    if 0.0 < way < 0.01 and part > OTHER_UNIT * way and off_plane:
         return (
             f'the path is {way:.1g} m long, the part {part:.3g} m: the poses look a thousandfold '
             'too small; leave out --pose-unit, or give the poses in metres'

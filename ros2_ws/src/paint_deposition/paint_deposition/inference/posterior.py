@@ -9,7 +9,7 @@ from pydantic import BaseModel, Field, model_validator
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, did_you_mean
-from paint_deposition.model.coordinates import PATTERN
+from paint_deposition.model.eq1_pattern import PATTERN
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 # Largest relative difference between two entries that should be the same.
@@ -22,7 +22,7 @@ REMEDY = 'copy the whole section from the file that was written, or take it out'
 class Posterior(BaseModel, frozen=True, extra='forbid'):
     """A normal distribution of a model's parameters, and what it rests on.
 
-    The pattern is in the coordinates of ``model/coordinates.py``; effects are in their own units,
+    The pattern is in the coordinates of ``model/eq1_pattern.py``; effects are in their own units,
     their shapes as logarithms.
     """
 

@@ -18,8 +18,7 @@ import numpy as np
 from numba.np.unsafe.ndarray import to_fixed_tuple
 
 from paint_deposition.kernel.blocks import LARGEST_BLOCK
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.fast_math import exp2
 from paint_deposition.kernel.laws import Law, Ray, product
 
@@ -64,7 +63,7 @@ def within_reach(sphere, step, c):
 # What a variant is compiled with; ``compile_kernel`` puts the variant's own in their place.
 real: type = np.float32
 factor = scale = product([], real)
-moves_pattern = shadowed = apart = False
+moves_pattern = shadowed = separate_terms = False
 parameter_count = 0
 
 
@@ -77,7 +76,7 @@ def paint_block(
     px, py, pz = p[0, part], p[1, part], p[2, part]
     nx, ny, nz = n[0, part], n[1, part], n[2, part]
     settled, newest = film[part], recent[part]
-    sums = np.zeros(TERMS * LARGEST_BLOCK if apart else 0)
+    sums = np.zeros(TERMS * LARGEST_BLOCK if separate_terms else 0)
     one, zero, tiny = real(1.0), real(0.0), real(1e-30)
     for m in range(len(steps)):
         if (done + m) & (FLUSH - 1) == 0:
@@ -121,7 +120,7 @@ def paint_block(
             g_near, g_far = exp2(ring - narrow1 * near**2), exp2(ring - narrow1 * far**2)
             g1 = g_near + g_far
             g2 = exp2(centre - narrow2 * rho2)
-            if apart:
+            if separate_terms:
                 share = weight * magnification * factor(ray, law)
                 if shadowed:
                     share *= one - shadow * (one - not_hidden[i])
@@ -139,7 +138,7 @@ def paint_block(
                 if shadowed:
                     flux *= one - shadow * (one - not_hidden[i])
                 newest[i] += flux if lit else zero
-    if apart:
+    if separate_terms:
         for k in range(TERMS):
             for i in range(len(px)):
                 terms[k, bounds[block] + i] = sums[k * LARGEST_BLOCK + i]
@@ -185,7 +184,7 @@ def compile_kernel(
     pattern_scales: tuple[tuple[Law, int], ...],
     shadowed: bool,
     real: type,
-    apart: bool = False,
+    separate_terms: bool = False,
 ) -> Callable[..., None]:
     """The kernel with these laws inlined.
 
@@ -194,7 +193,7 @@ def compile_kernel(
             passed in one row for each brush, those of the flux factors first.
         shadowed: whether lines of sight count.
         real: precision of the points, np.float32 or np.float64.
-        apart: whether the film's terms are kept apart instead of summed.
+        separate_terms: whether the film's terms are kept apart instead of summed.
     """
     first_scale = sum(count for _, count in flux_factors)
     names = {
@@ -203,14 +202,16 @@ def compile_kernel(
         'scale': product(pattern_scales, real, first_scale),
         'moves_pattern': bool(pattern_scales),
         'shadowed': shadowed,
-        'apart': apart,
+        'separate_terms': separate_terms,
         'parameter_count': first_scale + sum(count for _, count in pattern_scales),
     }
     laws = [law for law, _ in (*flux_factors, *pattern_scales)]
     counts = [[count for _, count in group] for group in (flux_factors, pattern_scales)]
-    variant = counts, shadowed, real.__name__, apart
+    variant = counts, shadowed, real.__name__, separate_terms
     block = named_for_its_code(_variant(paint_block, names), laws, *variant)
-    block = njit(fastmath=True, error_model='numpy')(block)
+    # Inlined by force: else the process that compiles it runs another copy than those that find
+    # it on disk, with another last bit.
+    block = njit(fastmath=True, error_model='numpy', forceinline=True)(block)
     whole = _variant(accumulate, names | {'paint_block': block})
     whole = named_for_its_code(whole, laws, *variant)
     return njit(cache=True, nogil=True, fastmath=True, error_model='numpy')(whole)

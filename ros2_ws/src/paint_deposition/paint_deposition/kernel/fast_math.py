@@ -12,7 +12,7 @@ import numpy as np
 from numba import types
 from numba.extending import overload, register_jitable
 
-from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import named_for_its_code
 
 # Fused multiply-add only: the rest of fast-math would cancel the rounding to an integer.
 WITHOUT_REORDERING = {'fastmath': {'contract'}}

@@ -4,9 +4,10 @@ from collections.abc import Callable, Sequence
 from types import FunctionType
 from typing import NamedTuple
 
+from numba.core.dispatcher import Dispatcher
 from numba.extending import register_jitable
 
-from paint_deposition.kernel.code_cache import named_for_its_code
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 
 class Ray(NamedTuple):
@@ -37,7 +38,8 @@ def in_precision(law: Law, real: type) -> Law:
 
     A literal 1.0 is of double precision, and one is enough to carry a whole loop over single
     precision into double and halve its speed. So the numbers in the law's code, and those of its
-    module that it names, are replaced by ones of type ``real``.
+    module that it names, are replaced by ones of type ``real``. What the law's author compiled
+    for it to call is compiled anew, for the kernel's kind of processor.
     """
     code = law.__code__
     constants = tuple(_as_real(value, real) for value in code.co_consts)
@@ -56,8 +58,30 @@ def in_precision(law: Law, real: type) -> Law:
 
 
 def _as_real(value: object, real: type) -> object:
+    if isinstance(value, Dispatcher):
+        return _compiled_anew(value)
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     return real(value) if is_number else value
+
+
+def _compiled_anew(compiled: Dispatcher) -> Dispatcher:
+    """A compiled function, and those that it calls by name, for the kernel's kind of processor."""
+    function = compiled.py_func
+    known = function.__globals__
+    called = {name: known[name] for name in function.__code__.co_names if name in known}
+    others = {
+        name: _compiled_anew(other)
+        for name, other in called.items()
+        if isinstance(other, Dispatcher) and other is not compiled
+    }
+    anew = FunctionType(
+        function.__code__,
+        known | others,
+        function.__name__,
+        function.__defaults__,
+        function.__closure__,
+    )
+    return njit(**compiled.targetoptions)(anew)
 
 
 def product(laws: Sequence[tuple[Law, int]], real: type, offset: int = 0) -> Law:

@@ -7,7 +7,6 @@ along a line of the model plane is here, too; with eq. (2) and effects see ``fil
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
@@ -17,37 +16,6 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Film below this share of the peak is left out of sums over passes.
 NEGLIGIBLE = 1e-9
-HALF_WIDTH_POINTS = 4001
-
-
-class Collapse(Protocol):
-    """A film profile across the direction of travel."""
-
-    def thickness_um(self, x_m: np.ndarray) -> np.ndarray:
-        """Film [um] at distances x (...) [m] from the line that the gun followed."""
-
-    @property
-    def area_um_m(self) -> float:
-        """Integral of the film over x [um m]."""
-
-    @property
-    def reach_m(self) -> float:
-        """Distance beyond which the film is negligible [m]."""
-
-    @property
-    def finest_m(self) -> float:
-        """Scale on which the film changes; quadrature needs a few points in it [m]."""
-
-    def scaled(self, factor: float) -> 'Collapse':
-        """All thicknesses times a factor."""
-
-
-def half_width_m(collapse: Collapse) -> float:
-    """SB50: width of a profile between its outermost places at half its peak [m]."""
-    x = np.linspace(-collapse.reach_m, collapse.reach_m, HALF_WIDTH_POINTS)
-    film = collapse.thickness_um(x)
-    above = x[film >= 0.5 * film.max()]
-    return float(above[-1] - above[0])
 
 
 class ThreeGaussianCollapse(BaseModel):
@@ -145,6 +113,18 @@ class SampledCollapse:
     def scaled(self, factor: float) -> 'SampledCollapse':
         """All thicknesses times a factor."""
         return SampledCollapse(self.x_m, factor * self.film_um, self.finest_m)
+
+
+# A film profile across the direction of travel.
+Collapse = ThreeGaussianCollapse | SampledCollapse
+
+
+def half_width_m(collapse: Collapse) -> float:
+    """SB50: width of a profile between its outermost places at half its peak [m]."""
+    x = np.linspace(-collapse.reach_m, collapse.reach_m, 4001)
+    film = collapse.thickness_um(x)
+    above = x[film >= 0.5 * film.max()]
+    return float(above[-1] - above[0])
 
 
 # Nodes of the line integral in the narrower standard deviation: trapezoids of a Gaussian with

@@ -13,14 +13,8 @@ from paint_deposition.motion.part_frame import Rigid
 # Where a frame was between two transforms that are further apart is not known. A live pose waits
 # as long for its transform, so that a recording has the same poses as the nodes had.
 LONGEST_GAP_NS = 2_000_000_000
-# A live transform that is older than the newest by more is from a restarted stream [ns].
-RESTART_NS = 1_000_000_000
-# Stamps from here on, of the year 2001, are of a clock and not of a simulation that began at 0.
-CLOCK_NS = 1_000_000_000_000_000_000
 # Frames and poses of a frame that are remembered, more than any cell has.
 MOST_FRAMES, MOST_POSES = 1000, 100_000
-# As in tf2 [ns].
-REMEMBERED_NS = 10_000_000_000
 
 
 class NoTransform(Exception):
@@ -130,9 +124,12 @@ class FrameTree:
         if not self._has_room(child):
             return False
         newest_ns = self.newest_ns(child)
-        restarted = self._live and stamp_ns < newest_ns - RESTART_NS
+        # A live transform that is older than the newest by more is from a restarted stream [ns].
+        restarted = self._live and stamp_ns < newest_ns - 1_000_000_000
         # One without a stamp among those of a clock begins nothing.
-        restarted &= stamp_ns > 0 or newest_ns < CLOCK_NS
+        # Stamps from here on, of the year 2001, are of a clock and not of a simulation that began
+        # at 0.
+        restarted &= stamp_ns > 0 or newest_ns < 1_000_000_000_000_000_000
         if restarted:
             self._moving.clear()
         if _name(child) not in self._moving:
@@ -140,7 +137,8 @@ class FrameTree:
         motion = self._moving.setdefault(_name(child), _Motion())
         motion.add(stamp_ns, _name(parent), np.array(pose, dtype=float))
         if self._live:
-            motion.forget(motion.stamps_ns[-1] - REMEMBERED_NS)
+            # As in tf2 [ns].
+            motion.forget(motion.stamps_ns[-1] - 10_000_000_000)
         return restarted
 
     def _has_room(self, child: str) -> bool:

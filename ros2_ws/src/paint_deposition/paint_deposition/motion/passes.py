@@ -27,8 +27,7 @@ import math
 
 import numpy as np
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.motion.strokes import (
     HEADING_STEP_M,
     LATEST_NOTICE_M,
@@ -39,11 +38,6 @@ from paint_deposition.motion.strokes import (
     leaves,
     take_in,
 )
-
-# A pass lies within 45 degrees of the heading of the last one, either way; others are links.
-COS_PASS = math.sqrt(0.5)
-# A gun that opens more than 30 degrees off the line on which it closed is on another track.
-COS_TRACK = math.sqrt(0.75)
 
 AWAITED, RUNS, ENDED = 0, 1, 2
 _VECTORS = ('position', 'normal', 'mean', 'carried', 'closed_at')
@@ -91,7 +85,8 @@ def _spray(state, heading):
         state.number = max(state.number, 0)
         return
     along = max(abs(cosine(heading, state.mean)), abs(cosine(heading, state.carried)))
-    if state.state == AWAITED or along > COS_PASS:
+    # A pass lies within 45 degrees of the heading of the last one, either way; others are links.
+    if state.state == AWAITED or along > math.sqrt(0.5):
         state.number = 0 if state.state == AWAITED else state.number + 1
         state.state = RUNS
         state.length_m = 0.0
@@ -106,7 +101,8 @@ def _on_another_track(state):
     between = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
     if dot(between, between) < HEADING_STEP_M**2:
         return False
-    return cosine(between, state.carried) < COS_TRACK
+    # A gun that opens more than 30 degrees off the line on which it closed is on another track.
+    return cosine(between, state.carried) < math.sqrt(0.75)
 
 
 @njit(cache=True)

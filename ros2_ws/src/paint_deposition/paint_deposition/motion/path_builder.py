@@ -1,30 +1,24 @@
 """From a stream of poses to the spray path: the one integrator of live node and offline run."""
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paint_deposition.errors import RecordingError
 from paint_deposition.motion.passes import first_pass, follow_passes
-from paint_deposition.motion.path import SprayPath
+from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
 from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
-from paint_deposition.motion.sub_steps import followed_poses, split_segments
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH, FlowSchedule, first_trigger, follow_trigger
+from paint_deposition.motion.trajectory import (
+    DEFAULT_MAX_POSE_GAP_S,
+    ONLY_BRUSH,
+    FlowSchedule,
+    PoseCounts,
+    Trajectory,
+    first_trigger,
+    follow_trigger,
+    gap_ns,
+)
 
-DEFAULT_MAX_POSE_GAP_S = 0.25
 DEFAULT_MAX_STEP_M = 0.008
-# A century [ns]: no longer gap is told from it, and sums of stamps and gaps fit 64 bits.
-LONGEST_GAP_NS = 3_155_760_000_000_000_000
-
-
-def gap_ns(max_pose_gap_s: float) -> int:
-    """The longest interval between poses that is no gap [ns], from seconds above 0."""
-    if not (math.isfinite(max_pose_gap_s) and max_pose_gap_s > 0.0):
-        raise RecordingError(f'max_pose_gap_s is {max_pose_gap_s}; give seconds above 0, 0.25 say')
-    return round(min(max_pose_gap_s * 1e9, LONGEST_GAP_NS))
 
 
 class PathBuilder:
@@ -149,7 +143,7 @@ class PathBuilder:
         if ready < 2:
             return
         come = poses.select(slice(0, ready))
-        rows = followed_poses(
+        rows = thin_poses(
             come.stamps_ns, come.positions_m, come.quaternions_xyzw, self.max_gap_ns,
             self.max_step_m,
         )  # fmt: skip
@@ -168,14 +162,16 @@ class PathBuilder:
             self._gap_before_next = False
             change = np.searchsorted(cuts, stamp, side='right')
             path = SprayPath.of(stamp, dwell, flows[change], position, rotation, velocity)
-            self._finished.append(self._followed(path.with_(brush=brushes[change]), after_gap))
+            self._finished.append(
+                self._with_strokes_and_passes(path.with_(brush=brushes[change]), after_gap)
+            )
         # A gap at the end of this batch must be seen by the next one.
         last_step_ns = now.stamps_ns[-1] - now.stamps_ns[-2]
         self._gap_before_next = bool(last_step_ns > self.max_gap_ns)
         self._integrated_ns = int(now.stamps_ns[-1])
         self._waiting = [poses.select(slice(int(rows[-1]), None))]
 
-    def _followed(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
+    def _with_strokes_and_passes(self, path: SprayPath, after_gap: np.ndarray) -> SprayPath:
         """The path with its strokes and passes, and what lies behind each sub-step."""
         if self._states is None:
             flow_before = 0.0 if self._flow else 1.0

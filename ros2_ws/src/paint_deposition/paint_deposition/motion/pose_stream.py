@@ -5,9 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.stream_figures import RepeatedSamples
-from paint_deposition.motion.trajectory import PoseCounts, Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.stream_quality import RepeatedSamples
+from paint_deposition.motion.trajectory import ONLY_BRUSH, PoseCounts, Trajectory
 
 # Two hours at 250 Hz, 64 bytes a pose.
 DEFAULT_POSE_MEMORY = 2_000_000
@@ -163,8 +162,6 @@ def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
 QUATERNION_TOLERANCE = 0.01
 # A number beyond this is damage too, and its square must be one in single precision [m].
 FARTHEST_M = 1e6
-# So many poses in order, over more than a gap, are no stragglers: the stream was restarted.
-FEWEST_OF_A_RESTART = 3
 # So many within a gap are no stream.
 MOST_BEHIND = 10_000
 
@@ -208,7 +205,9 @@ class PoseScreen:
             else:
                 behind.append(row)
                 lasting = stamp - stamps[behind[0]] > self.max_gap_ns
-                if lasting and len(behind) >= FEWEST_OF_A_RESTART:
+                # So many poses in order, over more than a gap, are no stragglers: the stream was
+                # restarted.
+                if lasting and len(behind) >= 3:
                     self.counts.restarts += 1
                     self.newest_ns = None
                     for waited in behind:

@@ -9,15 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.trajectory import Trajectory, numbered
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
 POSE_PERIOD_S = 0.02
-# No move of a paint cell takes longer; one that does has a wrong number in it.
-LONGEST_MOVE_S = 3600.0
-# What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
-REORIENTATION_RAD_PER_S = math.radians(500.0)
 
 
 @dataclass(frozen=True)
@@ -68,10 +63,12 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
         turn = Rotation.from_quat([before.quaternion_xyzw, move.quaternion_xyzw])
         length_m, place_at = _track(before.position_m, move)
         angle_rad = (turn[0].inv() * turn[1]).magnitude()
+        # What ABB's predefined speeds allow the tool to turn, for moves that only turn it.
         duration_s = max(
-            length_m / move.speed_m_per_s, angle_rad / REORIENTATION_RAD_PER_S, move.wait_s
+            length_m / move.speed_m_per_s, angle_rad / math.radians(500.0), move.wait_s
         )
-        if duration_s > LONGEST_MOVE_S:
+        # No move of a paint cell takes longer; one that does has a wrong number in it.
+        if duration_s > 3600.0:
             raise RecordingError(
                 f'line {move.line}: a move of {length_m:g} m at {move.speed_m_per_s:g} m/s takes '
                 f'{duration_s / 3600.0:.3g} h; check its target and speed'

@@ -1,12 +1,149 @@
-"""Whether a recorded stream of samples will do: its rate, gaps, repeats, lag and unit."""
+"""Whether a recorded stream of samples will do: rate, gaps, repeats, lag, unit and speed."""
 
+import math
+from collections import deque
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns
-from paint_deposition.motion.stream_figures import RepeatedSamples
+from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, gap_ns
+
+# Intervals whose median is the stream's rhythm, and how much longer a long one is.
+REMEMBERED = 250
+LONG = 1.5
+# Stamps that tremble make any shorter step of a slow gun look fast [m].
+LEAST_STEP_M = 0.05
+# Single steps between poses carry the noise of the encoders and the jitter of the stamps.
+WINDOW_NS, MOST_IN_WINDOW = 200_000_000, 2000
+# Equal values over a longer time are a robot that stands still [ns].
+LONGEST_REPEAT_NS = 50_000_000
+# Such a share of repeats is the habit of a driver; fewer are chance.
+LEAST_SHARE = 0.2
+
+
+class Intervals:
+    """Intervals between the stamps of poses received in order, the longest, and how many are long.
+
+    Long are more than 1.5 times the median of those before: with a steady stream, lost poses.
+    """
+
+    def __init__(self) -> None:
+        self.longest_ns = 0
+        self.long = 0
+        self._last_ns: int | None = None
+        self._recent: deque[int] = deque(maxlen=REMEMBERED)
+
+    @property
+    def typical_ns(self) -> float:
+        """Median of the last intervals; 0 before there are any."""
+        return float(np.median(self._recent)) if self._recent else 0.0
+
+    def add(self, stamps_ns: np.ndarray) -> None:
+        """Take stamps (N,) int64; a stamp that does not move forward begins anew."""
+        typical_ns = self.typical_ns
+        for stamp_ns in stamps_ns.tolist():
+            step_ns = 0 if self._last_ns is None else stamp_ns - self._last_ns
+            self._last_ns = stamp_ns
+            if step_ns > 0:
+                self.longest_ns = max(self.longest_ns, step_ns)
+                typical_ns = typical_ns or step_ns
+                self.long += step_ns > LONG * typical_ns
+                self._recent.append(step_ns)
+
+
+class Jumps:
+    """Steps that no robot makes: two guns on one topic, or stamps of two clocks.
+
+    Their count, and the speed that the worst of them would take, 0 where there is none.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.fastest_m_per_s = 0.0
+        self._last_ns: np.ndarray = np.empty(0, dtype=np.int64)
+        self._last_m: np.ndarray = np.empty((0, 3))
+
+    def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
+        """Take stamps (N,) int64 and positions (N, 3) [m]; a stamp that goes back begins anew."""
+        stamps_ns = np.concatenate([self._last_ns, stamps_ns])
+        positions_m = np.concatenate([self._last_m, positions_m])
+        self._last_ns, self._last_m = stamps_ns[-1:], positions_m[-1:]
+        step_s = np.diff(stamps_ns) * 1e-9
+        step_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
+        # Painting robots move their TCP at 3 m/s at most; stamps that tremble make any step of a
+        # slow gun look fast.
+        far = (step_s > 0.0) & (step_m > np.fmax(LEAST_STEP_M, 10.0 * step_s))
+        self.count += int(np.count_nonzero(far))
+        fastest = step_m[far] / step_s[far]
+        self.fastest_m_per_s = float(np.max(fastest, initial=self.fastest_m_per_s))
+
+
+class SpeedNow:
+    """The speed over the last 0.2 s of a stream of poses."""
+
+    def __init__(self) -> None:
+        self._stamps_ns: np.ndarray = np.empty(0, dtype=np.int64)
+        self._positions_m: np.ndarray = np.empty((0, 3))
+
+    def add(self, stamps_ns: np.ndarray, positions_m: np.ndarray) -> None:
+        """Take stamps (N,) int64 and positions (N, 3) [m]; stamps that go back begin anew."""
+        if not len(self._stamps_ns) or stamps_ns[0] > self._stamps_ns[-1]:
+            stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
+            positions_m = np.concatenate([self._positions_m, positions_m])
+        recent = np.flatnonzero(stamps_ns >= stamps_ns[-1] - WINDOW_NS)[-MOST_IN_WINDOW:]
+        self._stamps_ns, self._positions_m = stamps_ns[recent], positions_m[recent]
+
+    @property
+    def m_per_s(self) -> float:
+        """Way over time [m/s]; NaN while there are no two times."""
+        if len(self._stamps_ns) < 2 or self._stamps_ns[-1] <= self._stamps_ns[0]:
+            return math.nan
+        way_m = np.linalg.norm(np.diff(self._positions_m, axis=0), axis=1).sum()
+        return float(way_m / (1e-9 * (self._stamps_ns[-1] - self._stamps_ns[0])))
+
+
+class RepeatedSamples:
+    """Finds the samples of a stream that repeat the one before them under a later stamp.
+
+    A loop that is faster than the robot sends each sample two or three times: speeds of zero and
+    of thrice. Equal samples between two that differ are repeats if they last no longer than
+    ``LONGEST_REPEAT_NS``. They are found as soon as they are known as a habit, from what came
+    before alone, so that a live stream and its recording lose the same ones.
+
+    Attributes:
+        count: repeats that were found.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self._last: list[float] = []
+        self._last_ns = self._since_ns = 0
+        self._waiting = self._seen = self._moved = 0
+
+    def are_new(self, stamps_ns: np.ndarray, values: np.ndarray) -> np.ndarray:
+        """Whether the samples, (N,) int64 and (N, K), are no repeats: (N,) of bool."""
+        new = np.ones(len(values), dtype=bool)
+        for row, (stamp_ns, value) in enumerate(
+            zip(stamps_ns.tolist(), values.tolist(), strict=True)
+        ):
+            if value != self._last:
+                stood = self._last_ns - self._since_ns > LONGEST_REPEAT_NS
+                self._seen += 0 if stood else self._waiting
+                self._moved += 1
+                self._last, self._since_ns, self._waiting = value, stamp_ns, 0
+            elif stamp_ns > self._last_ns:
+                self._waiting += 1
+                soon = stamp_ns - self._since_ns <= LONGEST_REPEAT_NS
+                share = LEAST_SHARE * (self._seen + self._moved)
+                # So many repeats, and such a share of the samples, are the driver's habit; fewer
+                # are chance.
+                is_habit = self._seen >= 20 and self._seen >= share
+                new[row] = not (soon and is_habit)
+            self._last_ns = stamp_ns
+        self.count += int(np.count_nonzero(~new))
+        return new
+
 
 # Fewer samples a second blur the speed of the gun and cut its corners.
 LEAST_HZ = 10.0
@@ -44,7 +181,7 @@ class StreamQuality:
         log_times_ns: np.ndarray | None = None,
         max_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
     ) -> 'StreamQuality':
-        """Of samples (N,) int64 and (N, K) as recorded, and of when they arrived (N,) int64."""
+        """Judge samples (N,) int64 and (N, K) as recorded, and when they arrived (N,) int64."""
         repeats = RepeatedSamples()
         new_ns = np.diff(stamps_ns[repeats.are_new(stamps_ns, values)])
         steps_ns = np.diff(stamps_ns)

@@ -21,8 +21,6 @@ from paint_deposition.kernel.compiler import njit
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01
-# A mean reaches back over this travel; curves of half of it as their radius still turn [m].
-MEMORY_M = 1.0
 # The path leaves a mean heading where it is more than 60 degrees off.
 COS_TURN = 0.5
 # A sharp turn is noticed at most so far behind it, after two heading steps [m].
@@ -73,7 +71,8 @@ def leaves(heading, mean, carried):
 @njit
 def take_in(heading, step_m, length_m, mean, carried):
     """Update a mean over a length, this step included, in place."""
-    gain = min(step_m / min(length_m, MEMORY_M), 1.0)
+    # A mean reaches back over this travel; curves of half of it as their radius still turn [m].
+    gain = min(step_m / min(length_m, 1.0), 1.0)
     for k in range(3):
         mean[k] += gain * (heading[k] - mean[k])
         carried[k] += gain * (heading[k] - carried[k])

@@ -2,13 +2,15 @@
 
 import numpy as np
 
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.part.edges import (
     Edges,
-    connected,
     cut_segments,
     half_edges_m,
+    join,
     near_pairs,
-    next_half_edge,
+    numbered,
+    patch_of_vertex,
     without_seams,
 )
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals
@@ -21,7 +23,6 @@ RIM_FOLD_RAD = np.radians(60.0)
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
 # Folds that turn more slowly belong to a curved surface.
-LEAST_RATE_PER_M = 20.0
 WIDEST_STRIP_M = 0.02
 LEAST_FOLD_RAD = np.radians(4.0)
 PIECE_M = 0.005
@@ -30,13 +31,22 @@ PARALLEL_COSINE = 0.8
 
 def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
     """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
-    normals = face_normals(vertices_m, faces)
-    one, other = normals[edges.paired // 3].transpose(1, 0, 2)
-    across = np.cross(one, other)
-    ends = half_edges_m(vertices_m, faces, edges.paired[:, 0])
-    angle = np.arctan2(np.linalg.norm(across, axis=1), np.einsum('ei,ei->e', one, other))
-    convex = np.einsum('ei,ei->e', across, ends[:, 1] - ends[:, 0]) >= 0.0
-    return np.where(convex, angle, -angle)
+    return _folds_rad(vertices_m, faces, face_normals(vertices_m, faces), edges.paired)
+
+
+@njit(cache=True, nogil=True)
+def _folds_rad(vertices, faces, normals, paired):
+    folds = np.empty(len(paired))
+    for e in range(len(paired)):
+        f, k = paired[e, 0] // 3, paired[e, 0] % 3
+        a, b, c = normals[f]
+        u, v, w = normals[paired[e, 1] // 3]
+        x, y, z = b * w - c * v, c * u - a * w, a * v - b * u
+        angle = np.arctan2(np.sqrt(x * x + y * y + z * z), a * u + b * v + c * w)
+        start, end = vertices[faces[f, k]], vertices[faces[f, (k + 1) % 3]]
+        along = x * (end[0] - start[0]) + y * (end[1] - start[1]) + z * (end[2] - start[2])
+        folds[e] = angle if along >= 0.0 else -angle
+    return folds
 
 
 def rim_folds(
@@ -54,20 +64,30 @@ def rim_folds(
 
 
 def split_at_creases(
-    faces: np.ndarray, edges: Edges, folds: np.ndarray, rim: np.ndarray
+    faces: np.ndarray, edges: Edges, smooth: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give each smooth patch its own vertices along creases and (E,) ``rim_folds``.
+    """Give each patch whose paired edges are all ``smooth`` (E,) its own vertices.
 
     Returned are (W,) the vertex each new vertex is a copy of, and (F, 3) faces on the new
     vertices.
     """
-    smooth = (np.abs(folds) <= CREASE_RAD) & ~rim
-    one, other = edges.paired[smooth].T
-    joined = np.stack([one, next_half_edge(other)]), np.stack([next_half_edge(one), other])
-    count, label = connected(np.concatenate(joined, axis=1).T, faces.size)
+    corners = np.arange(faces.size, dtype=np.int32)
+    _join_corners(corners, edges.paired, smooth)
+    count, label = numbered(corners)
     origin = np.empty(count, dtype=np.int64)
     origin[label] = faces.ravel()
-    return origin, label.reshape(-1, 3).astype(np.int64)
+    return origin, label.reshape(-1, 3)
+
+
+@njit(cache=True, nogil=True)
+@named_for_its_code
+def _join_corners(corners, paired, smooth):
+    """Make the corners at both ends of smooth edges hang together."""
+    for e in range(len(paired)):
+        if smooth[e]:
+            one, other = paired[e]
+            join(corners, one, other // 3 * 3 + (other + 1) % 3)
+            join(corners, one // 3 * 3 + (one + 1) % 3, other)
 
 
 def rim_segments_m(
@@ -89,7 +109,8 @@ def hem_folds(
     triangle.
     """
     hem = np.zeros(len(folds_rad), dtype=bool)
-    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > LEAST_RATE_PER_M * width_m)
+    # Folds that turn more slowly belong to a curved surface.
+    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > 20.0 * width_m)
     rows = np.flatnonzero(close)
     if not len(rows):
         return hem
@@ -124,7 +145,7 @@ def strip_vertices(
     """
     if not len(hem_half_edges):
         return np.zeros(len(vertices_m), dtype=bool)
-    patch = _patch_of_vertex(patches, len(vertices_m))
+    patch = patch_of_vertex(patches, len(vertices_m))
     length_m = edge_lengths_m(vertices_m, patches).ravel()[hem_half_edges]
     of_face = patch[patches[:, 0]]
     border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
@@ -137,9 +158,5 @@ def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarra
     """(count,) bool: the flag of patches' first vertices, for all vertices of the refined ones."""
     if not flagged.any():
         return np.zeros(count, dtype=bool)
-    patch = _patch_of_vertex(fine, count)
+    patch = patch_of_vertex(fine, count)
     return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
-
-
-def _patch_of_vertex(faces: np.ndarray, count: int) -> np.ndarray:
-    return connected(np.concatenate([faces[:, :2], faces[:, 1:]]), count)[1]

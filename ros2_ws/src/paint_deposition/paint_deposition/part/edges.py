@@ -9,7 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-# Points whose neighbours are looked for at once.
+from paint_deposition.kernel.compiler import njit
+
+# Points whose neighbours are looked for at once, edges that are looked at.
 BLOCK = 4096
 # Pieces of edges so short that the nearest has one of the nearest middles [m].
 PIECE_M = 0.002
@@ -17,24 +19,43 @@ CANDIDATES = 4
 # Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
 SEAM_M = 3e-4
 SEAM_COSINE = -0.9
-# Vertices closer than this are one [m].
-WELD_M = 1e-6
 
 
-def half_edges_by_edge(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+@njit(cache=True, nogil=True)
+def rows_by_number(numbers, count):
+    """(N,) rows by their numbers below ``count``, and (count + 1,) where each number's begin."""
+    first = np.zeros(count + 1, dtype=np.int32)
+    for number in numbers:
+        first[number + 1] += 1
+    first = np.cumsum(first).astype(np.int32)
+    rows, free = np.empty(len(numbers), dtype=np.int32), first.copy()
+    for row in range(len(numbers)):
+        rows[free[numbers[row]]] = row
+        free[numbers[row]] += 1
+    return rows, first
+
+
+@njit(cache=True, nogil=True)
+def half_edges_by_edge(faces):
     """(3 F,) half-edges by lower vertex, higher vertex and number: an edge's follow each other.
 
     And (E + 1,) where among them those of each edge begin.
     """
-    start, end = faces.ravel(), faces[:, [1, 2, 0]].ravel()
-    key = np.minimum(start, end)
-    key *= int(start.max(initial=0)) + 1
-    key += np.maximum(start, end)
-    order = np.argsort(key, kind='stable')
-    key = key[order]
-    begins = np.ones(len(key), dtype=bool)
-    begins[1:] = key[1:] != key[:-1]
-    return order, np.append(np.flatnonzero(begins), len(key))
+    lower, higher = np.empty(faces.size, dtype=np.int32), np.empty(faces.size, dtype=np.int32)
+    for h in range(faces.size):
+        start, end = faces[h // 3, h % 3], faces[h // 3, (h + 1) % 3]
+        lower[h], higher[h] = min(start, end), max(start, end)
+    count = higher.max() + 1 if len(higher) else 0
+    order = rows_by_number(higher, count)[0]
+    order = order[rows_by_number(lower[order], count)[0]]
+    first, edges = np.zeros(len(order) + 1, dtype=np.int32), 0
+    for row in range(len(order)):
+        one, other = order[row - 1], order[row]
+        if row == 0 or lower[one] != lower[other] or higher[one] != higher[other]:
+            first[edges] = row
+            edges += 1
+    first[edges] = len(order)
+    return order, first[: edges + 1].copy()
 
 
 def edges_of(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -86,9 +107,48 @@ def connected(pairs: np.ndarray, count: int) -> tuple[int, np.ndarray]:
 
     Groups are numbered in the order of their first members.
     """
-    links = np.ones(len(pairs), dtype=np.int8), (pairs[:, 0], pairs[:, 1])
-    graph = scipy.sparse.coo_array(links, shape=(count, count))
-    return scipy.sparse.csgraph.connected_components(graph, directed=False)
+    parents = np.arange(count, dtype=np.int32)
+    _join_pairs(parents, np.ascontiguousarray(pairs, dtype=np.int64))
+    return numbered(parents)
+
+
+@njit(cache=True, nogil=True)
+def join(parents, one, other):
+    """Make two members hang from the first of all that they are joined to."""
+    while parents[one] != one:
+        parents[one] = parents[parents[one]]
+        one = parents[one]
+    while parents[other] != other:
+        parents[other] = parents[parents[other]]
+        other = parents[other]
+    parents[max(one, other)] = min(one, other)
+
+
+@njit(cache=True, nogil=True)
+def numbered(parents):
+    """How many groups there are of what was joined, and the number of each member's."""
+    count, group = 0, np.empty(len(parents), dtype=np.int64)
+    for member in range(len(parents)):
+        # A parent comes before its children.
+        group[member] = count if parents[member] == member else group[parents[member]]
+        count += parents[member] == member
+    return count, group
+
+
+@njit(cache=True, nogil=True)
+def _join_pairs(parents, pairs):
+    for row in range(len(pairs)):
+        join(parents, pairs[row, 0], pairs[row, 1])
+
+
+@njit(cache=True, nogil=True)
+def patch_of_vertex(faces, count):
+    """(count,) number of the connected patch of triangles (F, 3) that each vertex is of."""
+    vertices = np.arange(count, dtype=np.int32)
+    for f in range(len(faces)):
+        join(vertices, faces[f, 0], faces[f, 1])
+        join(vertices, faces[f, 0], faces[f, 2])
+    return numbered(vertices)[1]
 
 
 def near_pairs(
@@ -168,19 +228,54 @@ def weld(vertices_m: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndar
     Vertices may be in the file's single precision; returned in double, in the order in which they
     first appear, with the faces (F, 3) on them.
     """
-    order = np.lexsort(vertices_m.T)
-    in_order = vertices_m[order]
-    new = np.append(True, (in_order[1:] != in_order[:-1]).any(axis=1))
-    # The sort is stable: the first of equal vertices is that which appears first.
-    first = order[new]
-    rank = np.empty(len(first), dtype=np.int64)
-    rank[first.argsort()] = np.arange(len(first))
-    label = np.empty(len(order), dtype=np.int64)
-    label[order] = rank[np.cumsum(new) - 1]
-    first.sort()
+    one_zero = np.ascontiguousarray(vertices_m) + vertices_m.dtype.type(0.0)  # no -0.0
+    first, label = equal_rows(one_zero.view(f'u{vertices_m.dtype.itemsize}'))
     places = vertices_m[first].astype(np.float64)
-    close = scipy.spatial.cKDTree(places).query_pairs(WELD_M, output_type='ndarray')
-    count, group = connected(close, len(first))
-    kept = np.empty(count, dtype=np.int64)
-    kept[group[::-1]] = np.arange(len(first))[::-1]
-    return places[kept], group[label][faces].astype(np.int64)
+    tree = scipy.spatial.cKDTree(places, balanced_tree=False, compact_nodes=False)
+    # Vertices closer than this are one [m].
+    close = tree.query_pairs(1e-6, output_type='ndarray')
+    if len(close):
+        count, group = connected(close, len(first))
+        kept = np.empty(count, dtype=np.int64)
+        kept[group[::-1]] = np.arange(len(first))[::-1]
+        places, label = places[kept], group[label]
+    return places, label[faces]
+
+
+@njit(cache=True, nogil=True)
+def equal_rows(bits):
+    """The first row of each kind among (N, 3) integers, and (N,) which kind each row is of."""
+    size = 4
+    while size < 2 * len(bits):
+        size *= 2
+    table = np.full(size, -1, dtype=np.int32)
+    first, label = np.empty(len(bits), dtype=np.int64), np.empty(len(bits), dtype=np.int64)
+    count = 0
+    for row in range(len(bits)):
+        mixed = np.uint64(0)
+        for k in range(3):
+            mixed = (mixed ^ np.uint64(bits[row, k])) * np.uint64(0x9E3779B97F4A7C15)
+            mixed ^= mixed >> np.uint64(29)
+        slot = np.int64(mixed & np.uint64(size - 1))
+        while table[slot] >= 0:
+            other = first[table[slot]]
+            same = bits[other, 0] == bits[row, 0] and bits[other, 1] == bits[row, 1]
+            if same and bits[other, 2] == bits[row, 2]:
+                break
+            slot = (slot + 1) & (size - 1)
+        if table[slot] < 0:
+            first[count], table[slot] = row, count
+            count += 1
+        label[row] = table[slot]
+    return first[:count].copy(), label
+
+
+def coarse_faces(vertices_m: np.ndarray, faces: np.ndarray, cell_m: float) -> np.ndarray:
+    """(C, 3) triangles of a picture: of each patch one vertex (V, 3) a cell [m] stands for all."""
+    patch = patch_of_vertex(faces, len(vertices_m))
+    cells = ((vertices_m - vertices_m.min(axis=0)) / cell_m).astype(np.int64)
+    cells[:, 0] += patch * (cells[:, 0].max() + 1)
+    first, cell = equal_rows(cells)
+    coarse = first[cell[faces]]
+    a, b, c = coarse.T
+    return coarse[(a != b) & (b != c) & (c != a)]

@@ -19,16 +19,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from paint_deposition.part.edges import edges_of
+from paint_deposition.part.edges import BLOCK, next_half_edge
 
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
 GUN_M = 0.3
 # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
-LEAST_EDGE_M = 0.004
 MOST_EDGES = 5_000
-# A point within a triangle lies near the middles of its sides, and of few others.
-NEAR_EDGES = 8
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ class CurvedEdges:
         return len(self.lengths_m)
 
     def turned(self) -> 'CurvedEdges':
-        """The same of the surface's other side."""
+        """The edges as seen from the surface's other side."""
         return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
 
     def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +56,8 @@ class CurvedEdges:
         """
         if not len(self):
             return np.zeros_like(positions_m), np.zeros_like(positions_m)
-        near = min(NEAR_EDGES, len(self))
+        # A point within a triangle lies near the middles of its sides, and of few others.
+        near = min(8, len(self))
         away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
         fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
         off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
@@ -69,16 +67,23 @@ class CurvedEdges:
         )
 
     @staticmethod
-    def of(vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray) -> 'CurvedEdges':
+    def of(
+        vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, half_edges: np.ndarray
+    ) -> 'CurvedEdges':
         """Find them on the triangles of a file, whose smooth patches have corners of their own.
+
+        Of each edge one of its half-edges is given, or both.
 
         Facets that meet at a crease, see ``creases.CREASE_RAD``, have corners and normals of their
         own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
         """
-        edges = edges_of(faces)[0]
-        error = _bends(vertices_m, normals, edges)[0]
-        matter = np.flatnonzero(error > LEAST_ERROR)
-        edges = edges[matter[np.argsort(-error[matter], kind='stable')[:MOST_EDGES]]]
+        bent = []
+        for some in np.array_split(half_edges, 1 + len(half_edges) // BLOCK):
+            edges = faces.ravel()[np.stack([some, next_half_edge(some)], axis=1)]
+            bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
+        edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
+        worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
+        edges = edges[worst_first[:MOST_EDGES]]
         _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
         start, end = edges.T
         along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
@@ -97,7 +102,7 @@ class CurvedEdges:
 def _bends(
     vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Of edges (E, 2): what they cost, lengths, leans and sagittas."""
+    """What edges (E, 2) cost, their lengths, leans and sagittas."""
     start, end = edges.T
     along = vertices_m[end] - vertices_m[start]
     length = np.linalg.norm(along, axis=1)
@@ -105,7 +110,8 @@ def _bends(
     at_start, at_end = (np.einsum('ij,ij->i', normals[v], along) for v in (start, end))
     lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
     cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
-    return np.where(length < LEAST_EDGE_M, 0.0, cost), length, lean, sagitta
+    # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
+    return np.where(length < 0.004, 0.0, cost), length, lean, sagitta
 
 
 def _unit(vectors: np.ndarray) -> np.ndarray:

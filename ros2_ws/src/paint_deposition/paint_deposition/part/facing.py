@@ -9,8 +9,6 @@ from paint_deposition.part.orientation import CANCELLED, ONE_SIDED, mean_normal
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 
-MAX_POSES = 2000
-
 
 @dataclass(frozen=True)
 class Facing:
@@ -41,7 +39,7 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
 
 
 def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
-    """The same for one gun."""
+    """Turn a part as ``toward_the_guns`` does, for one gun."""
     return toward_the_guns(surface, [(positions_m, z_axes)])
 
 
@@ -78,7 +76,7 @@ def _met(
     surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
 ) -> tuple[Facing, np.ndarray]:
     """What poses look at, and tool z (M, 3) of those that look at the surface."""
-    some = slice(None, None, max(1, len(positions_m) // MAX_POSES))
+    some = slice(None, None, max(1, len(positions_m) // 2000))  # 2000 poses tell it
     positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
     face = surface.first_faces(positions_m, z_axes)
     met = face >= 0

@@ -7,9 +7,6 @@ from paint_deposition.part.edges import near_pairs
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
-# How far before the part rays begin [m].
-BEFORE_M = 0.1
-
 
 def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Points of the surface that lie straight before places on its face.
@@ -20,7 +17,8 @@ def on_face_m(surface: Surface, from_left_m: np.ndarray) -> tuple[np.ndarray, np
     """
     outward, vertices = surface.outward, surface.vertices_m
     right, up, left, low = _face(surface)
-    front = (vertices @ outward).max() + BEFORE_M
+    # How far before the part rays begin [m].
+    front = (vertices @ outward).max() + 0.1
     places = np.nan_to_num(np.asarray(from_left_m, dtype=float))
     starts = np.outer(left + places[:, 0], right) + np.outer(low + places[:, 1], up)
     starts += front * outward
@@ -49,10 +47,6 @@ def _face(surface: Surface) -> tuple[np.ndarray, np.ndarray, float, float]:
 
 # The foot of a usual gauge, from its middle to its rim [m].
 FOOT_M = 0.015
-# Under the foot the surface turns away by no more: a radius of about 85 mm.
-MOST_LEAN_RAD = np.radians(10.0)
-# Area that discs thrown at random take up until none fits any more, for a disc of diameter 1.
-AREA_A_DISC = 1.436
 # A grid is made finer by this factor until it has points enough, down to this pitch [m].
 FINER, LEAST_PITCH_M = 0.98, 0.005
 
@@ -66,13 +60,15 @@ def can_stand(surface: Surface, foot_m: float = FOOT_M) -> np.ndarray:
         # What faces the other way is the back of the sheet.
         turned = np.where(cosine > 0.0, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
         np.maximum.at(lean, block.start + one, turned)
-    return (surface.points().edge_distance_m > foot_m) & (lean <= MOST_LEAN_RAD)
+    # Under the foot the surface turns away by no more: a radius of about 85 mm.
+    return (surface.points().edge_distance_m > foot_m) & (lean <= np.radians(10.0))
 
 
 def spread_places(surface: Surface, usable: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
     """About ``count`` of the usable vertices (V,) bool, drawn at a distance; their rows."""
     area_m2 = float(surface.vertex_areas_m2[usable].sum())
-    apart_m = np.sqrt(area_m2 / (AREA_A_DISC * count))
+    # Area that discs thrown at random take up until none fits any more, for a disc of diameter 1.
+    apart_m = np.sqrt(area_m2 / (1.436 * count))
     order = np.random.default_rng(seed).permutation(np.flatnonzero(usable))
     tree, free, kept = cKDTree(surface.vertices_m[order]), np.ones(len(order), dtype=bool), []
     for row, vertex in enumerate(order):
@@ -92,16 +88,15 @@ def grid_places(surface: Surface, usable: np.ndarray, count: int) -> np.ndarray:
     tree, size = cKDTree(surface.vertices_m), face.max(axis=0)
     pitch_m = 1.5 * np.sqrt(surface.vertex_areas_m2[rows].sum() / count)
     while True:
-        across, up = (_centred(length, pitch_m) for length in size)
+        # Places at a pitch along both sides, as far from both of their ends.
+        steps = [np.arange(int(length / pitch_m) + 1) for length in size]
+        across, up = (
+            0.5 * (length - step[-1] * pitch_m) + pitch_m * step
+            for length, step in zip(size, steps, strict=True)
+        )
         places, hit = on_face_m(surface, np.stack(np.meshgrid(across, up), -1).reshape(-1, 2))
         near = np.unique(tree.query(places[hit])[1])
         near = near[usable[near]]
         if len(near) >= count or pitch_m < LEAST_PITCH_M:
             return near[np.linspace(0, len(near) - 1, min(count, len(near))).round().astype(int)]
         pitch_m *= FINER
-
-
-def _centred(length_m: float, pitch_m: float) -> np.ndarray:
-    """Places at a pitch along a length, as far from both of its ends."""
-    count = int(length_m / pitch_m) + 1
-    return 0.5 * (length_m - (count - 1) * pitch_m) + pitch_m * np.arange(count)

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.part.face_tree import DEPTH, FaceTree, box_distance, leaf_faces, wait
 
 # How much further away than the nearest surface the side that a normal points out of may be.

@@ -7,12 +7,9 @@ CANCELLED = 0.1
 # Parts whose mean normal is longer have their surface on one side, give or take a flange.
 ONE_SIDED = 0.5
 # Surface of the side that the gun paints leans less than this from the side's mean.
-SIDE_COSINE = 0.5
 MOST_ROUNDS = 32
 # A part whose mean normal leans less than this from the horizontal plane stands.
 STANDING_COSINE = 0.7
-# Share of a closed body's surface along one direction that makes it a plate.
-PLATE_SHARE = 0.7
 # A part drawn flat is no further from the plane z = 0 of its file.
 DRAWN_FLAT_M = 0.1
 
@@ -73,7 +70,8 @@ def _lies(normals: np.ndarray, areas_m2: np.ndarray) -> bool:
         return bool(abs(mean[2]) >= STANDING_COSINE * length)
     spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
     shares, directions = np.linalg.eigh(spread)
-    return bool(shares[-1] > PLATE_SHARE and abs(directions[2, -1]) >= STANDING_COSINE)
+    # Share of a closed body's surface along one direction that makes it a plate.
+    return bool(shares[-1] > 0.7 and abs(directions[2, -1]) >= STANDING_COSINE)
 
 
 def _facing_side(
@@ -84,18 +82,14 @@ def _facing_side(
     direction /= np.linalg.norm(direction)
     chosen = None
     for _ in range(MOST_ROUNDS):
-        about = normals @ direction > SIDE_COSINE
+        # Surface of the side that the gun paints leans less than this from the side's mean.
+        about = normals @ direction > 0.5
         if not about.any() or (chosen is not None and np.array_equal(about, chosen)):
             break
         chosen = about
         direction = mean_normal(normals[about], None if areas_m2 is None else areas_m2[about])
         direction /= np.linalg.norm(direction)
     return direction
-
-
-# A part that leans less than this from the horizontal lies flat: its lean says not which side is
-# the right one [rad].
-FLAT_RAD = np.radians(3.0)
 
 
 def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:
@@ -105,7 +99,9 @@ def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:
     """
     level = np.cross(outward, down)
     length = np.linalg.norm(level)
-    if length > FLAT_RAD:
+    # A part that leans less than this from the horizontal lies flat: its lean says not which side
+    # is the right one [rad].
+    if length > np.radians(3.0):
         return level / length
     axis = np.eye(3)[0] if abs(down[0]) < 0.9 else np.eye(3)[1]
     level = axis - (axis @ down) * down

@@ -19,8 +19,6 @@ WIDEST_RAD, BEYOND = np.radians(40.0), 0.05
 MOST_SIDES, ROUNDS = 12, 30
 # What is smaller than this share of the part goes with the neighbour that it leans least from.
 LEAST_SHARE = 0.02
-# So many of its triangles a margin leaves of a face, those farthest from its seams.
-LEAST_LEFT = 0.15
 # Vertices nearer than this are one place [m].
 SAME_PLACE_M = 1e-6
 
@@ -37,7 +35,8 @@ class Face:
     def without_margin(self, margin_m: float) -> 'Face':
         """The face less a margin along its seams, which leaves its middle in any case [m]."""
         depth_m = self.seam_distance_m[self.surface.faces].min(axis=1)
-        middle_m = float(np.sort(depth_m)[int((1.0 - LEAST_LEFT) * len(depth_m))])
+        # A margin leaves 15 % of the triangles of a face, those farthest from its seams.
+        middle_m = float(np.sort(depth_m)[int(0.85 * len(depth_m))])
         margin_m = min(margin_m, middle_m)
         if margin_m <= 0.0 or np.isinf(depth_m).all():
             return self

@@ -9,18 +9,15 @@ import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
 from paint_deposition.part import creases, derivatives, locating
+from paint_deposition.part.derivatives import surface_normals
 from paint_deposition.part.edges import Edges, edge_distance_m
 from paint_deposition.part.face_tree import FaceTree
 from paint_deposition.part.facets import NO_EDGES, CurvedEdges
 from paint_deposition.part.locating import Location
-from paint_deposition.part.normals import surface_normals
 from paint_deposition.part.orientation import gravity, outward_side
 from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
 from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine
 from paint_deposition.part.visibility import Occluder
-
-# A gun whose mean direction is shorter has turned to more sides of the part than one.
-ONE_WAY = 0.9
 
 
 @dataclass(frozen=True)
@@ -88,11 +85,16 @@ class Surface:
         edges = Edges.of(faces)
         folds = creases.folds_rad(vertices_m, faces, edges)
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
-        origin, patches = creases.split_at_creases(faces, edges, folds, rim)
+        smooth = (np.abs(folds) <= creases.CREASE_RAD) & ~rim
+        origin, patches = creases.split_at_creases(faces, edges, smooth)
         rim_m = creases.rim_segments_m(vertices_m, faces, edges, rim)
         strip = creases.strip_vertices(vertices_m[origin], patches, edges.paired[rim].ravel())
-        del edges, folds  # large ones, before the next are made
-        corners, read_normals = vertices_m[origin], surface_normals(vertices_m[origin], patches)
+        corners = vertices_m[origin]
+        read_normals = surface_normals(corners, patches)
+        unjoined = edges.paired[~smooth, 1], edges.clashing.ravel(), edges.single
+        half_edges = np.concatenate([edges.paired[:, 0], *unjoined])
+        curved_edges = CurvedEdges.of(corners, read_normals, patches, half_edges)
+        del edges, folds, half_edges  # large ones, before the next are made
         vertices, normals, fine = refine(corners, read_normals, patches, max_edge_length_m)
         areas = np.repeat(face_areas_m2(vertices, fine) / 3.0, 3)
         vertex_areas = np.bincount(fine.ravel(), areas, minlength=len(vertices))
@@ -109,7 +111,7 @@ class Surface:
             rim_m,
             notes,
             in_hem=creases.carried_over(strip, fine, len(vertices)),
-            curved_edges=CurvedEdges.of(corners, read_normals, patches),
+            curved_edges=curved_edges,
             neighbours=neighbours_together(vertices),
         )
 
@@ -120,7 +122,7 @@ class Surface:
         return hashlib.sha256(content).hexdigest()[:16]
 
     def seen_from(self, gun_side: np.ndarray) -> 'Surface':
-        """The same part with the gun (3,) on that side; what rays and searches need is shared."""
+        """The part with the gun (3,) on that side; what rays and searches need is shared."""
         known = replace(self, gun_side=gun_side)
         made = vars(self).items()
         vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
@@ -221,7 +223,8 @@ class Surface:
 
     @property
     def _only_side(self) -> np.ndarray | None:
-        if self.gun_side is None or np.linalg.norm(self.gun_side) < ONE_WAY:
+        # A gun whose mean direction is shorter has turned to more sides of the part than one.
+        if self.gun_side is None or np.linalg.norm(self.gun_side) < 0.9:
             return None
         return self.outward
 

@@ -9,14 +9,14 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from paint_deposition.kernel.code_cache import named_for_its_code
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
     DEPTH,
     FaceTree,
     box_distance,
+    first_hits,
     leaf_faces,
     support,
     wait,
@@ -131,8 +131,6 @@ LIFT_M = 1e-4
 AZIMUTHS, ELEVATIONS = 32, 8
 SKY_RAYS = AZIMUTHS * ELEVATIONS
 FAR_M = 1e3
-BLOCK_RAYS = 1_000_000
-_GOLDEN_RATIO = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Occluder:
@@ -177,12 +175,16 @@ class Occluder:
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        starts, ways = (
-            (starts_m - self._origin_m).astype(np.float32),
-            directions.astype(np.float32),
-        )
-        met = self._scene.run(starts, ways, query='INTERSECT')
-        return np.where(met >= 0, self._tree().order[met], -1)
+        tree, met = self._tree(), np.empty(len(starts_m), dtype=np.int64)
+        starts = np.ascontiguousarray(starts_m, dtype=np.float64)
+        ways = np.ascontiguousarray(directions, dtype=np.float64)
+
+        def fill(start: int, stop: int) -> None:
+            rays = starts[start:stop], ways[start:stop]
+            first_hits(*rays, tree.vertices_m, tree.faces, tree.nodes, met[start:stop])
+
+        shared_among_threads(len(starts), fill)
+        return np.where(met >= 0, tree.order[met], -1)
 
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) sine of the highest elevation at which a point sees any of the part.
@@ -210,7 +212,7 @@ class Occluder:
         sky, weights = _sky()
         horizon = self.horizon_sines(points_m, normals)
         open_share = np.empty(len(points_m))
-        rows = BLOCK_RAYS // SKY_RAYS
+        rows = 1_000_000 // SKY_RAYS
         for start in range(0, len(points_m), rows):
             part = slice(start, start + rows)
             up = normals[part]
@@ -242,7 +244,7 @@ def _sky() -> tuple[np.ndarray, np.ndarray]:
     together near the horizon, where they are needed. Strata are shifted from azimuth to azimuth.
     """
     azimuth, stratum = np.divmod(np.arange(SKY_RAYS), ELEVATIONS)
-    t = (stratum + (azimuth * _GOLDEN_RATIO) % 1.0) / ELEVATIONS
+    t = (stratum + 0.5 * (np.sqrt(5.0) - 1.0) * azimuth % 1.0) / ELEVATIONS
     angle = 2.0 * np.pi * (azimuth + 0.5) / AZIMUTHS
     across = np.sqrt(1.0 - t**2)
     return np.stack([across * np.cos(angle), across * np.sin(angle), t]), t / t.sum()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -22,20 +21,6 @@ BESIDE_M, ABOVE_M, AGREE = 1e-3, 5e-3, 0.7
 NONE = -1
 
 
-class Region(Protocol):
-    """A region of a part's surface."""
-
-    @property
-    def box_m(self) -> np.ndarray:
-        """(2, 3) lowest and highest corner of a box around it [m]."""
-
-    def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
-
-    def facing(self, surface: Surface) -> Region:
-        """The same with the outward side of the surface."""
-
-
 @dataclass(frozen=True)
 class Box:
     """What lies between two corners in the frame of the mesh."""
@@ -43,12 +28,12 @@ class Box:
     box_m: np.ndarray  # (2, 3) lowest and highest corner [m]
 
     def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """As ``Region``."""
+        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie in it."""
         low, high = self.box_m
         return np.all((positions_m >= low) & (positions_m <= high), axis=1)
 
     def facing(self, surface: Surface) -> Box:
-        """As ``Region``: a box has no side."""
+        """The box itself: it has no side."""
         return self
 
 
@@ -60,18 +45,18 @@ class Patch:
 
     @cached_property
     def box_m(self) -> np.ndarray:
-        """As ``Region``."""
+        """(2, 3) lowest and highest corner of a box around it [m]."""
         return np.stack([self.corners_m.min(axis=(0, 1)), self.corners_m.max(axis=(0, 1))])
 
     def holds(self, positions_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
-        """As ``Region``."""
+        """(N,) bool, which points (N, 3) [m] with outward unit normals (N, 3) lie over it."""
         near, over, place = self._over(positions_m, normals)
         held = np.zeros(len(positions_m), dtype=bool)
         held[near] = over & (np.cos(place.angle_rad) >= AGREE)
         return held
 
     def facing(self, surface: Surface) -> Patch:
-        """As ``Region``: most of the surface over the triangles says which way they are wound."""
+        """The patch wound outward: most of the surface over its triangles says which way."""
         near, over, place = self._over(surface.vertices_m, None)
         cosine = np.einsum('ij,ij->i', place.normals, surface.normals[near])
         area = surface.vertex_areas_m2[near] * (over & (np.abs(cosine) >= AGREE))
@@ -96,6 +81,9 @@ class Patch:
         corners = self.corners_m.reshape(-1, 3)
         faces = np.arange(len(corners)).reshape(-1, 3)
         return FaceTree.of(corners, faces), np.repeat(face_normals(corners, faces), 3, axis=0)
+
+
+Region = Box | Patch
 
 
 @dataclass(frozen=True)
@@ -160,11 +148,11 @@ class PointZones:
                 yield zone, own
 
     def select(self, rows: np.ndarray) -> PointZones:
-        """Those of some of the points."""
+        """The zones of some of the points."""
         return replace(self, number=self.number[rows])
 
     def at(self, positions_m: np.ndarray, normals: np.ndarray) -> PointZones:
-        """Those of other points (N, 3) [m] of the same part, with outward unit normals (N, 3)."""
+        """The zones of points (N, 3) [m] of the same part, with outward unit normals (N, 3)."""
         return replace(self, number=self.zones.of(positions_m, normals))
 
     @property

@@ -8,11 +8,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
-from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S, gap_ns, spray_path
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen
 from paint_deposition.motion.programmed import Move
-from paint_deposition.motion.trajectory import Trajectory, numbered
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import (
+    DEFAULT_MAX_POSE_GAP_S,
+    ONLY_BRUSH,
+    Trajectory,
+    gap_ns,
+    numbered,
+)
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.requests import ImproveRequest
 

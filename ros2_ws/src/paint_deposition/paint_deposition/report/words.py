@@ -9,9 +9,12 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.effects.learned.footprint import LearnedFootprint
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
-from paint_deposition.effects.learned.place import LearnedMap
+from paint_deposition.effects.learned.law import (
+    LEAST_FACTOR,
+    LearnedFootprint,
+    LearnedLaw,
+    LearnedMap,
+)
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.proposals import Spray

@@ -9,8 +9,7 @@ from numba.extending import register_jitable
 from pydantic import Field, model_validator
 
 from paint_deposition.effects.base import PathContext
-from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied
-from paint_deposition.effects.learned.place import places_m
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw, applied, places_m
 from paint_deposition.kernel.laws import Ray
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -185,23 +184,14 @@ def _curve_class(
     return cast(type[LearnedCurve], law)
 
 
-def _edge_axis(value: Any) -> Any:
-    """A scale that resolves what is close to the edge."""
-    return np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
-
-
-def _incidence_axis(value: Any) -> Any:
-    """Minus the angle's cosine, which the kernel knows."""
-    return -np.cos(np.radians(value))
-
-
 # Learned curves by covariate.
 CURVES: dict[str, type[LearnedCurve]] = {
     law.covariate: law
     for law in (
         _curve_class(
             _RayCurve, 'incidence_deg', 'deg', 'the angle of incidence',
-            axis=staticmethod(_incidence_axis),
+            # Minus the angle's cosine, which the kernel knows.
+            axis=staticmethod(lambda value: -np.cos(np.radians(value))),
             flux_factor=staticmethod(_ray_factor(lambda ray: -ray.cos_incidence)),
         ),
         _curve_class(
@@ -219,7 +209,10 @@ CURVES: dict[str, type[LearnedCurve]] = {
         _curve_class(_SurfaceCurve, 'curvature_per_m', '1/m', 'the curvature of the surface'),
         _curve_class(
             _SurfaceCurve, 'edge_distance_m', 'm', 'the distance to the nearest free edge',
-            axis=staticmethod(_edge_axis),
+            # A scale that resolves what is close to the edge.
+            axis=staticmethod(
+                lambda value: np.log1p(np.minimum(value, FARTHEST_EDGE_M) / EDGE_SCALE_M)
+            ),
         ),
         _curve_class(
             _SurfaceCurve, 'sky_view_factor', '1',

@@ -9,9 +9,9 @@ import numpy as np
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.rapid.parser import Instruction, Node
 from paint_deposition.files.rapid.values import Values
-from paint_deposition.model.brush import MOST
+from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import GunSwitch, Move
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # Outputs that `writer` uses: an analogue one for the relative flow, a group output for the brush.
 FLOW_SIGNAL, BRUSH_SIGNAL = 'aoflow', 'gobrush'

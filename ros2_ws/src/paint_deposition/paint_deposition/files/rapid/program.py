@@ -18,8 +18,7 @@ from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot

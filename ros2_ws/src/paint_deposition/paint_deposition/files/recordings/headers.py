@@ -8,7 +8,7 @@ import numpy as np
 from paint_deposition.errors import RecordingError
 from paint_deposition.motion.part_frame import is_pose
 from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
-from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 
 PLACED = ('translation', 'rotation')
 

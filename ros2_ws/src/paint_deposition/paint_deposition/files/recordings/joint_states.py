@@ -19,8 +19,7 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.tables.headings import ANGLES, LENGTHS
 from paint_deposition.motion.arm import Arm
-from paint_deposition.motion.stream_figures import RepeatedSamples
-from paint_deposition.motion.stream_quality import StreamQuality
+from paint_deposition.motion.stream_quality import RepeatedSamples, StreamQuality
 from paint_deposition.motion.trajectory import Trajectory
 
 DEFAULT_TIP = 'tool0'

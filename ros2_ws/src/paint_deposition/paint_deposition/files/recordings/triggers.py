@@ -13,8 +13,7 @@ from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.motion.trajectory import numbered
-from paint_deposition.motion.trigger import SPRAYS_NOTHING, relative_flow
+from paint_deposition.motion.trajectory import SPRAYS_NOTHING, numbered, relative_flow
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # Fields of AtomizerState that are summarised while the gun sprays.

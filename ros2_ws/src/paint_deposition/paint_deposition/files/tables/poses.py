@@ -19,11 +19,10 @@ from paint_deposition.files.tables.pose_columns import (
     translated,
 )
 from paint_deposition.files.tables.table import SWITCHED
-from paint_deposition.model.brush import MOST
+from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.stream_quality import FARTHEST_PART_M, StreamQuality
-from paint_deposition.motion.trajectory import Trajectory, numbered
-from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered, relative_flow
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot

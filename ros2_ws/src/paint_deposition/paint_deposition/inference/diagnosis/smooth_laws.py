@@ -12,9 +12,17 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES, LearnedCurve, knot_positions
-from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, waves
-from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weights
-from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
+from paint_deposition.effects.learned.law import (
+    WAVES,
+    LearnedFootprint,
+    LearnedLaw,
+    LearnedMap,
+    PartGrid,
+    hat_sums,
+    hat_weights,
+    places_m,
+    waves,
+)
 from paint_deposition.inference.fitting.least_squares import STEP, Fit
 from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study

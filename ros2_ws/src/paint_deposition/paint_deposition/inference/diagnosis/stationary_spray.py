@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.coats import ONE_FILM
+from paint_deposition.film.common_film import ONE_FILM
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory

@@ -11,8 +11,8 @@ from paint_deposition.errors import ReadingsError
 from paint_deposition.film.paint_used import efficiency
 from paint_deposition.inference.fitting.estimates import Estimate
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.model.brush import Brush, SetPoints, listed
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.model.eq1_pattern import Brush, SetPoints, listed
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # What recordings hold of the process beside the flow, which is relative to the brush's.
 RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')

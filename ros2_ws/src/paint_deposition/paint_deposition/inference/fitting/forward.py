@@ -11,7 +11,7 @@ from scipy.linalg import block_diag
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.coats import sum_um
+from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import (
     FEW_RAYS,
     FilmIntegrator,

@@ -14,7 +14,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.pattern_vector import COS, SIN, PatternVector
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS
+from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """The entries of a fit's vector for the patterns of a model.
 
-One pattern has the coordinates of ``model/coordinates.py``. Of several brushes the first has them
+One pattern has the coordinates of ``model/eq1_pattern.py``. Of several brushes the first has them
 all. Each other has its own too, but the phase of the asymmetry is the bell's and shared: in its
 place stands the logarithm of its K3 over that of the first. From job to job brushes change nearly
 alike: what is known of one job makes its brushes move together in the next.
@@ -12,8 +12,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paint_deposition.model.coordinates import PATTERN, Coordinate
-from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq1_pattern import PATTERN, Coordinate, PlanarPattern
 
 PATTERN_NAMES = ('K1_cm3_per_s', 'K2', 'K3', 'phi_rad', 'r_m', 'sigma1_m', 'sigma2_m')
 COS, SIN = 2, 3

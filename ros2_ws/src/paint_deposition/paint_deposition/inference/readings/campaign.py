@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.film.coats import ONE_FILM, TOTAL, WetFilms
+from paint_deposition.film.common_film import ONE_FILM, TOTAL, WetFilms
 from paint_deposition.inference.readings.gauge_noise import left_out_lines
 from paint_deposition.inference.readings.placement import (
     columns_or_rows,

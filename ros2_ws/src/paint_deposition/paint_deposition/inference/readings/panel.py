@@ -7,7 +7,7 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.pass_film import collapse_um
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 # Cosines of the largest angles: between normals of a flat panel, between parallel passes, and
 # between the gun's axis and the panel's normal.

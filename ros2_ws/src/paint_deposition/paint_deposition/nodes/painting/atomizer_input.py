@@ -15,8 +15,8 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import pose_of, stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
-from paint_deposition.motion.trigger import SPRAYS_NOTHING
+from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
+from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription

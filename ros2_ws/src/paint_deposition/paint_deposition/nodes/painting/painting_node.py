@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from rclpy.timer import Timer
 
-from paint_deposition.effects.user_effects import read_effect_file, try_effect
+from paint_deposition.effects.catalogue import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trigger import BEFORE_ALL_NS
+from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
 from paint_deposition.nodes.painting.outward_side import OutwardSide
@@ -171,7 +171,7 @@ class PaintingNode(ManagedNode, ABC):
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
-            new.start_bare_after(old)
+            new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
         self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points

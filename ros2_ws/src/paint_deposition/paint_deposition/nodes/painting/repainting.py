@@ -59,7 +59,7 @@ class Repainting:
             if gun.log.poses or gun.log.changes:
                 film.replay(gun.log.events(film.log.poses, film.log.changes))
             else:  # after a reset the gun stays on or off
-                film.start_bare_after(gun)
+                film.reset_keeping_trigger_of(gun)
         return films
 
     @property

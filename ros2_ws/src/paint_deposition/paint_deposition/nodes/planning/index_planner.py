@@ -13,7 +13,7 @@ from paint_msgs.srv import RecommendIndex
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.model.brush import MOST
+from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.planning.actions import PassesAction, Progress
 from paint_deposition.nodes.runtime import topics

@@ -27,8 +27,7 @@ from paint_deposition.files.recordings.pose_topics import (
     read_frames,
 )
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 STATE_FIELDS = AtomizerState.get_fields_and_field_types()

@@ -16,9 +16,9 @@ from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, JointNotation, Robot
 from paint_deposition.files.recordings.triggers import Signal
-from paint_deposition.model.brush import MOST
+from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
-from paint_deposition.motion.trigger import ONLY_BRUSH
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.nodes.robot.robot_poses import (
     QUEUE_DEPTH,
     JointPoses,

@@ -16,7 +16,7 @@ from rclpy.qos import qos_profile_sensor_data
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import pose_of, stamp_ns
-from paint_deposition.motion.stream_figures import SpeedNow
+from paint_deposition.motion.stream_quality import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.user_effects import load_effect_file
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.model_file import LoadEffect, read_model
-from paint_deposition.film.common_film import require_one_finish
+from paint_deposition.film.common_film import require_same_film_effects
 from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable
 
 
@@ -64,7 +64,7 @@ def models_from_parameters(
             'model_file for all, or model_files one for each of atomizers'
         )
     models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
-    require_one_finish(dict(zip(guns, models, strict=True)))
+    require_same_film_effects(dict(zip(guns, models, strict=True)))
     return models
 
 

@@ -6,9 +6,12 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.effects.learned.footprint import LearnedFootprint
-from paint_deposition.effects.learned.law import LEAST_FACTOR
-from paint_deposition.effects.learned.place import LearnedMap, places_m
+from paint_deposition.effects.learned.law import (
+    LEAST_FACTOR,
+    LearnedFootprint,
+    LearnedMap,
+    places_m,
+)
 from paint_deposition.inference.diagnosis.closed_forms import forms_of, variable_at
 from paint_deposition.inference.diagnosis.verdict import percent
 from paint_deposition.report.data import ReportData

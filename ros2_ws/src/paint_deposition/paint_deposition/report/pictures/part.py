@@ -16,12 +16,15 @@ from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.edges import edges_of
+from paint_deposition.part.edges import coarse_faces, edges_of
 from paint_deposition.part.orientation import downhill_axis
+from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
 
+# A part of more triangles is drawn with vertices this share of its size apart, two pixels.
+MOST_FACES, CELL = 200_000, 1 / 500
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 # Where a label of a point may stand [pt], the best place first.
 AROUND_POINT = 9.0 * np.array(
@@ -99,8 +102,10 @@ class PartPicture:
         """The part from the gun's side, gravity down."""
         view = View.of_front(surface.outward, surface.down)
         flat = view.flat(surface.vertices_m)
-        first, second = (flat[surface.faces[:, k]] - flat[surface.faces[:, 0]] for k in (1, 2))
-        front = surface.faces[first[:, 0] * second[:, 1] > first[:, 1] * second[:, 0]]
+        front = face_normals(surface.vertices_m, surface.faces) @ view.toward > 0.0
+        front = surface.faces[front]
+        if len(front) > MOST_FACES:
+            front = coarse_faces(surface.vertices_m, front, CELL * np.ptp(flat, axis=0).max())
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
         # Whether a triangle is hidden is seen from a place so far above it [m].
         above = surface.vertices_m[faces].mean(axis=1) + 1e-3 * view.toward
