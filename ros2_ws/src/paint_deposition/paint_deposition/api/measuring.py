@@ -3,10 +3,11 @@
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from paint_deposition.api.simulation import look_at, require_brushes
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose
 from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.posterior import Posterior
@@ -46,7 +47,7 @@ def choose_readings(
         ReadingsError: the part has no room for so many points.
     """
     request, model = MeasureRequest(**wanted), model or DepositionModel()
-    require_brushes(trajectory, model)
+    without_refused_states(trajectory, model, strict=True)
     model = model.of_numbers(trajectory.brushes).single('a choice of points')
     seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}

@@ -16,6 +16,7 @@ from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
 from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_node import PaintingNode
@@ -280,7 +281,7 @@ class PartChange:
             run.motions, node.film.guns, node.inputs, log, strict=True
         ):
             film.forget_trigger()
-            film.replay(events_of(motion))
+            film.replay(events_of(without_refused_states(motion, film.model)))
             stamps = motion.stamps_ns
             if not source.received_ns or source.received_ns in stamps:
                 source.drop_held(int(stamps[-1]) if len(stamps) else 0)

@@ -22,16 +22,20 @@ from paint_deposition.nodes.runtime.messages import header_stamp_ns
 REMEMBERED_MESSAGES = 20_000
 # Transforms last in tf2 for so long.
 TF, REMEMBERED_TF_NS = '/tf', 10_000_000_000
+CLOSED = -1
 
 
 class Recorded(NamedTuple):
-    """A serialised message, when it was logged and sent, and its stamp if it moves a gun."""
+    """A serialised message, when it was logged and sent; its stamp if it moves a gun, and the
+    brush of a state that opens it.
+    """
 
     topic: str
     cdr: bytes
     log_time_ns: int
     sent_ns: int
     stamp_ns: int = 0
+    brush: int = CLOSED
 
 
 class InitialMessages:
@@ -71,12 +75,15 @@ class InitialMessages:
             if topic in self._guns:
                 states = self._states_in_force(message)
                 self._motion[topic].append(message)
-                self._reached_ns[self._guns[topic]] = message.stamp_ns
+                if message.stamp_ns:
+                    self._reached_ns[self._guns[topic]] = message.stamp_ns
                 return states
             try:
-                trigger_change(deserialize_message(cdr, AtomizerState))
+                change = trigger_change(deserialize_message(cdr, AtomizerState))
             except RecordingError:  # whoever paints refuses it, too
                 return []
+            if change.flow > 0.0:
+                message = message._replace(brush=change.brush)
             states = self._states_in_force(message)
             self._remember_state(message)
             return states
@@ -165,12 +172,14 @@ class InitialMessages:
     def _states_in_force(self, first: Recorded) -> list[Recorded]:
         """The states of a gun before its first message in a run, unless its stream restarted."""
         topic = self._states_of[first.topic]
-        if topic not in self._due:
+        if topic not in self._due or not first.stamp_ns:
             return []
         self._due.remove(topic)
         states = self._motion[topic]
-        if states and first.stamp_ns < states[0].stamp_ns:
-            states.clear()
+        if states and states[0].stamp_ns - first.stamp_ns > STREAM_RESTART_NS:
+            # Latched states may come before those that were sent, and hold, before them.
+            for state in [state for state in states if state.sent_ns <= first.sent_ns]:
+                states.remove(state)
         # Not at the time of the first message: one received before it may be taken after it.
         return [state._replace(log_time_ns=self.begin_ns) for state in states]
 
@@ -188,8 +197,12 @@ class InitialMessages:
                 or last.stamp_ns - state.stamp_ns <= STREAM_RESTART_NS
             )
         ]  # fmt: skip
-        for _ in range(passed[-1] if passed else 0):
-            states.popleft()
+        # Whoever paints may refuse a brush that its model lacks; the state before it then holds.
+        newest = {states[row].brush: row for row in passed}
+        kept = {row for row in newest.values() if row >= newest.get(CLOSED, 0)}
+        for row in reversed(passed):
+            if row not in kept:
+                del states[row]
         return len(remembered)
 
 
