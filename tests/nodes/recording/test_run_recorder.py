@@ -67,7 +67,7 @@ def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until
     first.publish(pose(START_NS))
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
     second = publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
-    wait_until(lambda: first.get_subscription_count() == 1, what='one subscription')
+    wait_until(lambda: second.get_subscription_count() == 1, what='a subscription that fits')
     first.publish(pose(START_NS + 1))
     second.publish(pose(START_NS + 2))
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 3, what='the poses of both')

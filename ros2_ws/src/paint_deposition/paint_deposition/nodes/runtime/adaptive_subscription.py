@@ -1,4 +1,4 @@
-"""A subscription that adapts its quality of service to that of its publishers."""
+"""A subscription that hears each publisher by the best quality of service that it offers."""
 
 import time
 from collections.abc import Callable, Mapping
@@ -10,13 +10,14 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 
 from paint_deposition.nodes.runtime.messages import SequenceNumbers
-from paint_deposition.nodes.runtime.topics import compatible_qos
 
 QOS_PERIOD_S = 0.1
-# More than a publisher keeps for late subscribers, or sends while a subscription is replaced.
+# More than a publisher keeps for late subscribers, or sends while a subscription is new.
 REMEMBERED_MESSAGES = 2000
-# Both ends of a new subscription know of each other after less; meanwhile the old one is there.
+# Both ends of a new subscription know of each other after less; meanwhile others count, too.
 OVERLAP_S = 1.0
+Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
+USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
 
 class PolledCallbackGroup(CallbackGroup):
@@ -33,10 +34,11 @@ class PolledCallbackGroup(CallbackGroup):
 
 
 class AdaptiveSubscription:
-    """A subscription that is as reliable, and with `latched` as latched, as all publishers allow.
+    """Hears each publisher of a topic as reliably, and with `latched` as latched, as it offers.
 
-    It is replaced when they come and go; nothing is lost over that, and a message that is received
-    twice counts once.
+    There is one subscription for each quality of service among the publishers: one that fits all
+    would lose messages of the reliable ones, and what the latched ones keep, because of a weaker
+    one. A message that several of them receive counts once.
 
     Args:
         take: called with each message and what the middleware says of it.
@@ -59,18 +61,17 @@ class AdaptiveSubscription:
         polled: bool = True,
     ) -> None:
         self._node, self._message, self._topic, self._take = node, message, topic, take
-        self._latched, self._raw, self._polled = latched, raw, polled
+        self._depth, self._latched, self._raw, self._polled = depth, latched, raw, polled
         self._group = PolledCallbackGroup() if polled else None
         self._numbers = SequenceNumbers()
         # Times and publishers of messages that may come again, the newest last.
         self._taken: dict[tuple[int, bytes], None] = {}
-        self._profile = QoSProfile(depth=depth, reliability=ReliabilityPolicy.RELIABLE)
-        # At once as the publishers that are known: they would report one that does not match.
-        self._profile = self._best_profile()
-        self._subscription = self._create_subscription()
-        # The one that is replaced, and until when it is there, too.
-        self._before: Subscription | None = None
-        self._overlaps_s = self._matched_s = 0.0
+        # The subscriptions, the strictest first, and when each was made or was last wanted.
+        self._subscriptions: dict[Quality, Subscription] = {}
+        self._made_s: dict[Quality, float] = {}
+        self._wanted_s: dict[Quality, float] = {}
+        self._offered: dict[bytes, Quality] = {}
+        self.match_qos()
 
     @property
     def lost(self) -> int:
@@ -78,68 +79,79 @@ class AdaptiveSubscription:
         return self._numbers.lost
 
     def take_pending(self) -> None:
-        """Take all messages in the queue."""
+        """Take all messages in the queues."""
         if self._polled and time.monotonic() - self._matched_s > QOS_PERIOD_S:
             self.match_qos()
-        self._drain()
+        for subscription in self._subscriptions.values():
+            self._drain(subscription)
 
     def match_qos(self) -> None:
-        """Replace the subscription if another quality of service matches the publishers better."""
+        """Subscribe by each quality of service that a publisher offers, and by no other."""
         self._matched_s = time.monotonic()
-        if self._before is not None:
-            if self._matched_s > self._overlaps_s:
-                self._drain()
-                self._node.destroy_subscription(self._before)
-                self._before = None
-            return
-        best = self._best_profile()
-        now = self._profile.reliability, self._profile.durability
-        if (best.reliability, best.durability) != now:
-            self._before, self._profile = self._subscription, best
-            self._subscription = self._create_subscription()
-            self._overlaps_s = self._matched_s + OVERLAP_S
-
-    def destroy(self) -> None:
-        """Take what is in the queue, and unsubscribe."""
-        self._drain()
-        for subscription in (self._before, self._subscription):
-            if subscription is not None:
-                self._node.destroy_subscription(subscription)
-
-    def _best_profile(self) -> QoSProfile:
         topic = self._node.resolve_topic_name(self._topic)
         publishers = self._node.get_publishers_info_by_topic(topic)
-        if not publishers:
-            return self._profile
-        best = compatible_qos([info.qos_profile for info in publishers], self._profile.depth)
-        if not self._latched:
-            best.durability = DurabilityPolicy.VOLATILE
-        return best
+        self._offered = {
+            bytes(info.endpoint_gid): self._quality(info.qos_profile) for info in publishers
+        }
+        wanted = {*self._offered.values()} or {*self._subscriptions} or {USUAL}
+        for quality in sorted(wanted - self._subscriptions.keys(), key=_strictest_first):
+            self._made_s[quality] = self._matched_s
+            self._subscriptions[quality] = self._subscribe(*quality)
+        self._wanted_s |= dict.fromkeys(wanted, self._matched_s)
+        for quality in [*self._subscriptions]:
+            if self._matched_s - self._wanted_s[quality] > OVERLAP_S:
+                subscription = self._subscriptions.pop(quality)
+                self._drain(subscription)
+                self._node.destroy_subscription(subscription)
+        self._subscriptions = dict(
+            sorted(self._subscriptions.items(), key=lambda item: _strictest_first(item[0]))
+        )
 
-    def _create_subscription(self) -> Subscription:
+    def destroy(self) -> None:
+        """Take what is in the queues, and unsubscribe."""
+        for subscription in self._subscriptions.values():
+            self._drain(subscription)
+            self._node.destroy_subscription(subscription)
+        self._subscriptions.clear()
+
+    def _quality(self, offered: QoSProfile) -> Quality:
+        return offered.reliability, offered.durability if self._latched else USUAL[1]
+
+    def _subscribe(self, reliability: ReliabilityPolicy, durability: DurabilityPolicy):
+        profile = QoSProfile(depth=self._depth, reliability=reliability, durability=durability)
+        quality = reliability, durability
+
+        def on_message(message: Any, info: Mapping[str, Any]) -> None:
+            self._on_message(quality, message, info)
+
         return self._node.create_subscription(
-            self._message, self._topic, self._on_message, self._profile,
+            self._message, self._topic, on_message, profile,
             callback_group=self._group, raw=self._raw,
         )  # fmt: skip
 
-    def _drain(self) -> None:
-        for subscription in (self._before, self._subscription):
-            if subscription is not None:
-                handle = subscription.handle
-                with handle:
-                    while taken := handle.take_message(self._message, self._raw):
-                        self._on_message(*taken)
+    def _drain(self, subscription: Subscription) -> None:
+        handle = subscription.handle
+        with handle:
+            while taken := handle.take_message(self._message, self._raw):
+                subscription.callback(*taken)
 
-    def _on_message(self, message: Any, info: Mapping[str, Any]) -> None:
+    def _on_message(self, heard_by: Quality, message: Any, info: Mapping[str, Any]) -> None:
         publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
+        offered = self._offered.get(publisher, heard_by)
+        if offered != heard_by and time.monotonic() - self._made_s[offered] > OVERLAP_S:
+            return  # in its order it comes by the subscription of its own
         # Some middleware does not number messages.
         self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
         # Publisher and time identify a message.
         identity = info['source_timestamp'], publisher
         if identity in self._taken:
             return
-        if identity[0] and (self._latched or self._before is not None):
+        if identity[0]:
             self._taken[identity] = None
             if len(self._taken) > REMEMBERED_MESSAGES:
                 del self._taken[next(iter(self._taken))]
         self._take(message, info)
+
+
+def _strictest_first(quality: Quality) -> tuple[bool, bool]:
+    return quality[0] != ReliabilityPolicy.RELIABLE, quality[1] == DurabilityPolicy.VOLATILE

@@ -1,7 +1,5 @@
 """Names and quality of service of the topics."""
 
-from collections.abc import Sequence
-
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
@@ -25,17 +23,6 @@ CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 def gun_topic(name: str, topic: str) -> str:
     """A topic of the named gun; '' is the only gun of a cell."""
     return f'{name}/{topic}' if name else topic
-
-
-def compatible_qos(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
-    """The strictest QoS of a subscription that is compatible with all these publishers."""
-    all_reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
-    all_latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
-    )
 
 
 def node_name(info: TopicEndpointInfo) -> str:
