@@ -237,6 +237,15 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_conte
     assert managed.shutdown() == (True, 'finalized')
 
 
+def test_a_node_that_is_destroyed_has_no_services(ros_context, viewer, wait_until):
+    """Whoever holds on to it."""
+    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
+    service = '/faulty/change_state'
+    wait_until(lambda: viewer.count_services(service) == 1, what='the service')
+    node.destroy_node()
+    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
+
+
 def of_this_process() -> tuple[int, int]:
     return threading.active_count(), len(os.listdir('/proc/self/fd'))
 

@@ -92,6 +92,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         if self.configured:
             self._leave(self._run_cleanup)
 
+    def destroy_node(self) -> None:
+        super().destroy_node()
+        # rclpy leaves the services of the lifecycle to the garbage collector, and meanwhile whoever
+        # looks for those of the next node of this name counts them.
+        if hasattr(self, '_state_machine'):
+            self._state_machine.destroy_when_not_in_use()
+
     # --- transitions
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
