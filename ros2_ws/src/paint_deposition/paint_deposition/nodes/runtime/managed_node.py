@@ -94,8 +94,8 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def destroy_node(self) -> None:
         super().destroy_node()
-        # rclpy leaves the services of the lifecycle to the garbage collector, and meanwhile whoever
-        # looks for those of the next node of this name counts them.
+        # rclpy leaves the services of the lifecycle to the garbage collector. Meanwhile they are
+        # counted by whoever looks for those of the next node of this name.
         if hasattr(self, '_state_machine'):
             self._state_machine.destroy_when_not_in_use()
 
