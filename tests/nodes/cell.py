@@ -132,6 +132,18 @@ class Robot(Node):
             for publisher in (self.pose_publisher, self.state_publisher)
         )
 
+    def is_heard_by(self, *names: str) -> bool:
+        """Whether nodes of these names listen to poses and states as reliably as they are sent."""
+        return all(
+            {*names}
+            <= {
+                info.node_name
+                for info in self.get_subscriptions_info_by_topic(publisher.topic_name)
+                if info.qos_profile.reliability == publisher.qos_profile.reliability
+            }
+            for publisher in (self.pose_publisher, self.state_publisher)
+        )
+
     def send_pose(self, stamp_ns, position, quaternion, frame_id: str = 'part') -> None:
         message = PoseStamped()
         message.header.frame_id = frame_id
