@@ -16,8 +16,8 @@ from rclpy.qos import QoSProfile
 from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.topics import LATCHED
 

@@ -14,14 +14,14 @@ from std_srvs.srv import Trigger
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from nodes.odd_messages import Peer, odd_message
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
-from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.rws_source import SOURCE
+from paint_deposition.nodes.robot.controllers import RwsSource
 from paint_deposition.nodes.robot.signal_source import SignalSource
-from paint_deposition.nodes.viewing.web_view import WebView
+from paint_deposition.nodes.web_view import WebView
 from robot_arm import urdf
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
@@ -31,7 +31,7 @@ MOTION = two_passes()
 class IdleSource(SignalSource):
     """A source of signals whose controller says nothing."""
 
-    PARAMETERS = SOURCE
+    PARAMETERS = RwsSource.PARAMETERS
 
     def follow(self, stopped) -> None:
         while not stopped():

@@ -50,7 +50,7 @@ from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.egm_source import EgmSource
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.viewing.web_view import WebView
+from paint_deposition.nodes.web_view import WebView
 
 STEPS = int(os.environ.get('PAINT_STEPS', '30'))
 SEED = os.environ.get('PAINT_SEED')
@@ -61,7 +61,8 @@ SPEED_M_PER_S = 0.8
 WRITTEN_S = 0.8
 POSES = {False: [], True: [0.1, 0.0, 0.05, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]}
 BRUSHES = {1, 2}
-HEARERS = 'deposition_simulator', 'run_recorder', 'web_view'
+# The simulator and the page, and the recorder.
+HEARERS = 2, 1
 SIMULATOR, RECORDER = '/deposition_simulator', '/run_recorder'
 counts = st.integers(0, 80)
 
@@ -150,7 +151,7 @@ class Cell(RuleBasedStateMachine):
         self.recorder = NodeProcess(
             log, 'run_recorder', output_directory=self.folder / 'runs', name=name
         )
-        self.wait_until(lambda: self.robot.is_heard_by(*HEARERS), what='the recorder')
+        self.wait_until(lambda: self.robot.hearers() == HEARERS, what='the recorder')
         self.run, self.is_whole = name, False
 
     def call(self, service, name: str, **fields):
@@ -287,13 +288,13 @@ class Cell(RuleBasedStateMachine):
             self.settle()
             self.weak = Robot(self.context, reliable=False)
             self.executor.add_node(self.weak)
-            self.wait_until(lambda: self.weak.is_heard_by(*HEARERS), what='best effort')
+            self.wait_until(lambda: self.weak.hearers() == HEARERS, what='best effort')
         else:
             self.executor.remove_node(self.weak)
             self.weak.destroy_node()
             self.weak = None
             self.settle()
-            self.wait_until(lambda: self.robot.is_heard_by(*HEARERS), what='reliable ones')
+            self.wait_until(lambda: self.robot.hearers() == HEARERS, what='reliable ones')
 
     @invariant()
     def every_node_lives(self) -> None:
@@ -394,10 +395,10 @@ class Cell(RuleBasedStateMachine):
                 name = f'{RECORDER}/change_state'
                 assert self.call(ChangeState, name, transition=request.transition).success
                 if label == 'deactivate':
-                    self.wait_until(lambda: not self.robot.is_heard_by('run_recorder'))
+                    self.wait_until(lambda: not self.robot.hearers()[1])
             if self.is_whole:
                 self.check(run, of)
-            self.wait_until(lambda: self.robot.is_heard_by(*HEARERS))
+            self.wait_until(lambda: self.robot.hearers() == HEARERS)
             self.is_whole = False
             return
         if signal == 'stop':
@@ -412,7 +413,7 @@ class Cell(RuleBasedStateMachine):
             run = recover(run, run.with_name(f'{run.name}_recovered')).folder
         if self.is_whole:
             self.check(run, of)
-        self.wait_until(lambda: not self.robot.is_heard_by('run_recorder'))
+        self.wait_until(lambda: not self.robot.hearers()[1])
         self.clients = {name: c for name, c in self.clients.items() if RECORDER not in name}
         self.start_recorder()
 

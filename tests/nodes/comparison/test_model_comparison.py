@@ -17,7 +17,7 @@ from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN
 

@@ -24,10 +24,10 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.model.brush import Brush
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import ERROR, OK
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'

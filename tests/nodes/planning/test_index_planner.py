@@ -13,7 +13,7 @@ from nodes.cell import PANEL_M, parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.eq1_pattern import PlanarPattern
-from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest

@@ -10,7 +10,7 @@ from rclpy.action import ActionClient
 from nodes.cell import parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.nodes.planning.index_planner import IndexPlanner
+from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.planning.plan import plan
 from paint_deposition.planning.requests import PlanRequest

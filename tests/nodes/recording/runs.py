@@ -6,7 +6,7 @@ from rclpy.time import Time
 from rclpy.utilities import get_rmw_implementation_identifier
 
 from paint_deposition.files.recordings.bag_files import open_bag
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
 # Whether messages come with a number; CycloneDDS gives them none.
 NUMBERED = get_rmw_implementation_identifier() != 'rmw_cyclonedds_cpp'

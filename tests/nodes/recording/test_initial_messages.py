@@ -6,7 +6,7 @@ from paint_msgs.msg import AtomizerState, Part
 from rclpy.serialization import deserialize_message, serialize_message
 
 from nodes.cell import START_NS
-from paint_deposition.nodes.recording.initial_messages import InitialMessages
+from paint_deposition.nodes.bags.initial_messages import InitialMessages
 from paint_deposition.nodes.runtime.messages import header
 
 POSE, STATE = '/atomizer/pose', '/atomizer/state'

@@ -17,8 +17,8 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 

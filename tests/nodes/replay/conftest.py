@@ -12,7 +12,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 def play(ros_context, spin):
     """`play(bag, **parameters)`: a player of this bag, running."""
     from nodes.cell import parameters
-    from paint_deposition.nodes.replay.bag_player import BagPlayer
+    from paint_deposition.nodes.bags.bag_player import BagPlayer
 
     def play(bag, namespace='', **chosen) -> BagPlayer:
         values = {'bag': str(bag)} | chosen

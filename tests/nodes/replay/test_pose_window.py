@@ -1,6 +1,6 @@
 """Flow control of a replay: who has taken what, and who is not waited for."""
 
-from paint_deposition.nodes.replay.flow_control import (
+from paint_deposition.nodes.bags.pace import (
     LOST_TIMEOUT_S,
     NO_REPORT_TIMEOUT_S,
     PoseWindow,

@@ -9,7 +9,7 @@ from nodes.cell import Robot, offline_um, parameters, two_passes
 from paint_deposition.api.simulation import simulate
 from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
 GUNS = ['robot_1', 'robot_2']
 HIGH, OTHER = two_passes(poses=400), two_passes(poses=320)

@@ -8,11 +8,11 @@ from rclpy.node import Node
 
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.index_planner import IndexPlanner
+from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.planning.index_planner import IndexPlanner
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
-from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.runtime.parameters import NodeParameter, declare_parameters
 
 NODES = (BagPlayer, DepositionSimulator, IndexPlanner, ModelComparison, RunRecorder)

@@ -7,7 +7,7 @@ from chromium import CHROMIUM, Chromium
 from nodes.cell import parameters, two_passes, write_panel
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.nodes.runtime.node import WARN
-from paint_deposition.nodes.viewing.web_view import WebView
+from paint_deposition.nodes.web_view import WebView
 from paint_deposition.report.live.scene import STEP_UM, Scene, Seen
 from paint_deposition.report.live.server import Page
 

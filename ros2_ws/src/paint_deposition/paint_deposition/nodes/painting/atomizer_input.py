@@ -19,9 +19,8 @@ from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trigger import SPRAYS_NOTHING
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
 # Messages are polled: waking up for each pose would cost more than painting it.
 TAKE_PERIOD_S = 0.02

@@ -13,8 +13,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_writer
-from paint_deposition.nodes.painting.film_trust import FilmTrust
-from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
+from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version

@@ -13,9 +13,9 @@ from paint_deposition.files.recordings.headers import transforms_of
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
 FRAME_REMEDY = 'set part_pose and part_parent_frame, or frame_id'
 CLOCK_REMEDY = 'publish tf without gaps and by the clock of the poses'

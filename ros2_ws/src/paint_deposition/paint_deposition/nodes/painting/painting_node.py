@@ -17,17 +17,16 @@ from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trigger import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
+    models_from_parameters,
     read_part,
     unpainted_films,
     warm_up,
     zones_on,
 )
-from paint_deposition.nodes.painting.repainting import Repainting
+from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.model_parameters import models_from_parameters
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 

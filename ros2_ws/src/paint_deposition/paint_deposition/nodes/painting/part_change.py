@@ -18,7 +18,11 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
-from paint_deposition.nodes.painting.film_files import film_writer
+from paint_deposition.nodes.painting.film_files import (
+    RecordedPart,
+    film_writer,
+    read_recorded_part,
+)
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
@@ -27,7 +31,6 @@ from paint_deposition.nodes.painting.painting_parameters import (
     warm_up,
     zones_on,
 )
-from paint_deposition.nodes.painting.recorded_part import RecordedPart, read_recorded_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, real_path

@@ -25,11 +25,10 @@ from paint_deposition.nodes.robot.robot_poses import (
     PublishedPoses,
     TfPoses,
 )
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.messages import header, message_class
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -45,6 +44,7 @@ USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
 TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
+
 SOURCE = fixed_while_running(
     'the subscriptions are made with it when the node starts; restart the node',
     urdf_file=NodeParameter(
@@ -58,7 +58,8 @@ SOURCE = fixed_while_running(
     base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
     joint_prefix=NodeParameter(
-        '', "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]"
+        '',
+        "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]",
     ),
     angle_unit=NodeParameter(
         '',
@@ -74,7 +75,8 @@ SOURCE = fixed_while_running(
         element=float,
     ),
     trigger=NodeParameter(
-        '', f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]'
+        '',
+        f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
     ),
     flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
     brush=NodeParameter(

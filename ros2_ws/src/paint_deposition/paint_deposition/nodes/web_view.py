@@ -29,7 +29,6 @@ from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -40,7 +39,7 @@ from paint_deposition.nodes.runtime.parameters import (
     require_colours,
     thickness_parameter,
 )
-from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.facing import turned
 from paint_deposition.report.live.scene import Scene
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
@@ -50,6 +49,7 @@ TAKE_PERIOD_S = 0.05
 DEPTH = 500
 # The simulator speaks twice a second [s].
 TRUST_PERIOD_S, SILENT_S = 0.5, 2.0
+
 
 WEB_VIEW = dict(
     **fixed_while_running(

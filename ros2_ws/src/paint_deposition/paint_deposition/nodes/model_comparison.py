@@ -19,7 +19,7 @@ from paint_deposition.inference.readings.plausibility import readings_in_doubt, 
 from paint_deposition.inference.readings.residuals import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.film_display import legend
-from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
+from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics

@@ -19,9 +19,8 @@ from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, choose_pose_topic
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
-from paint_deposition.nodes.replay.flow_control import FlowControl
-from paint_deposition.nodes.replay.replay_clock import ReplayClock
-from paint_deposition.nodes.replay.replayed_messages import (
+from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
+from paint_deposition.nodes.bags.replayed_messages import (
     ReplayedTransforms,
     ReplayMessage,
     pose_messages,

@@ -15,7 +15,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.film.live_film import STREAM_RESTART_NS
 from paint_deposition.motion.part_frame import Rigid, is_pose
-from paint_deposition.nodes.recording.recorder_parameters import PARAMETER_EVENTS, STATIC_TF
+from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
 # Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.

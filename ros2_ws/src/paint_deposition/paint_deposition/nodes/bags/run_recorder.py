@@ -17,14 +17,16 @@ from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
-from paint_deposition.nodes.recording.initial_messages import TF, InitialMessages
-from paint_deposition.nodes.recording.recorded_topic import UNHEARD, RecordedTopic, bag_qos
-from paint_deposition.nodes.recording.recorder_parameters import (
+from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
+from paint_deposition.nodes.bags.recorded_topic import (
     PARAMETER_EVENTS,
     PART_POSE,
     POSES,
     RECORDER,
     STATES,
+    UNHEARD,
+    RecordedTopic,
+    bag_qos,
     default_topics,
     part_data,
     unused_name,
