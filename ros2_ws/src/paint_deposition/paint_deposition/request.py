@@ -6,11 +6,14 @@ is written of it follow from these models.
 
 import inspect
 from collections.abc import Callable
-from typing import Any, ClassVar, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
+
+if TYPE_CHECKING:
+    from pydantic_core import ErrorDetails
 
 Verb = TypeVar('Verb', bound=Callable)
 # How bounds are said.
@@ -74,13 +77,18 @@ def reason(error: ValidationError, kind: type[BaseModel]) -> str:
         return f'{name} is no option here; {did_you_mean(name, kind.model_fields)}'
     if first['type'] == 'value_error':
         return f'{name}: {first["ctx"]["error"]}' if name else str(first['ctx']['error'])
+    field = kind.model_fields.get(str(first['loc'][0]))
+    about = f': {field.description}' if field and field.description else ''
+    return f'{name} {is_wrong(first)}{about}'
+
+
+def is_wrong(first: 'ErrorDetails') -> str:
+    """'is VALUE; give REMEDY' for what is wrong with a value."""
     value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
     for long, short in BOUNDS.items():
         remedy = remedy.replace(long, short)
     shown = f'{value:g}' if isinstance(value, float) else quoted(value)
-    field = kind.model_fields.get(str(first['loc'][0]))
-    about = f': {field.description}' if field and field.description else ''
-    return f'{name} is {shown}; give {remedy}{about}'
+    return f'is {shown}; give {remedy}'
 
 
 def takes(*kinds: type[BaseModel]) -> Callable[[Verb], Verb]:

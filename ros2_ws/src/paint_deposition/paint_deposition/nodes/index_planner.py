@@ -32,11 +32,11 @@ from paint_deposition.nodes.runtime.parameters import (
     direction_parameter,
     fixed_while_running,
     mesh_parameters,
-    thickness_parameter,
+    requested,
 )
 from paint_deposition.planning.plan import Plan, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.requests import FASTEST_M_PER_S, IndexRequest, PlanRequest
+from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
 SPACING_M = 0.02
 # 0 stands for none in fields of a service request and in optional parameters.
@@ -50,8 +50,6 @@ GOAL_FIELDS = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction'
 
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]
-# (parameters to replace, progress) -> plan, published path.
-PlanAndPublish = Callable[[Mapping[str, Any], Progress], tuple[Plan, Path]]
 
 
 PLANNER = dict(
@@ -61,50 +59,20 @@ PLANNER = dict(
         'Number of the brush to plan for, of a model with several; 0: the only one [-]',
         (0, MOST),
     ),
-    width_m=NodeParameter(
-        0.0, 'Width to paint where a request gives none; 0: none [m]', (0.0, 100.0)
-    ),
-    length_m=NodeParameter(
-        0.0, 'Length of a pass, for the cycle time; 0: as long as the width [m]', (0.0, 100.0)
-    ),
-    standoff_m=NodeParameter(
-        0.0,
-        'Distance of the TCP from the part; 0: the part lies on the model plane [m]',
-        (0.0, 5.0),
-    ),
-    travel_rad=NodeParameter(
-        0.0,
-        "Direction of the first pass in the tool's x-y frame, from x to y [rad]",
-        (-2.0 * math.pi, 2.0 * math.pi),
-    ),
-    gun_turns=NodeParameter(
-        False,
-        'Turn the gun by 180 deg for every return pass; else it keeps its orientation and '
-        'lays the same profile both ways [true/false]',
-    ),
+    width_m=requested(IndexRequest, 'width_m', none='that of a request'),
+    length_m=requested(IndexRequest, 'length_m'),
+    standoff_m=requested(PlanRequest, 'standoff_m'),
+    travel_rad=requested(PlanRequest, 'travel_rad'),
+    gun_turns=requested(IndexRequest, 'gun_turns', False),
     **fixed_while_running(
         'passes are planned once, when the node starts; restart the node with the new value',
         **mesh_parameters(max_edge_length_m=0.02),
-        direction=NodeParameter(
-            'horizontal',
-            'How planned passes run on the part [name]',
-            choices=('horizontal', 'vertical'),
-        ),
-        speed_m_per_s=NodeParameter(
-            0.3, 'Speed of planned passes; 0: from target_um [m/s]', (0.0, FASTEST_M_PER_S)
-        ),
-        target_um=thickness_parameter('Mean film of planned passes where speed_m_per_s is 0 [µm]'),
-        index_m=NodeParameter(
-            0.0, 'Distance between planned passes; 0: the most even [m]', (0.0, 10.0)
-        ),
-        smoothing_radius_m=NodeParameter(
-            PlanRequest.model_fields['smoothing_radius_m'].default,
-            'Radius over which the surface is smoothed; finer shapes are not followed [m]',
-            (0.005, 2.0),
-        ),
-        acceleration_m_per_s2=NodeParameter(
-            2.0, 'Acceleration of the robot [m/s^2]', (0.05, 50.0)
-        ),
+        direction=requested(PlanRequest, 'direction', 'horizontal'),
+        speed_m_per_s=requested(PlanRequest, 'speed_m_per_s', 0.3, none='from target_um'),
+        target_um=requested(PlanRequest, 'target_um', none='none'),
+        index_m=requested(PlanRequest, 'index_m'),
+        smoothing_radius_m=requested(PlanRequest, 'smoothing_radius_m', 0.1),
+        acceleration_m_per_s2=requested(PlanRequest, 'acceleration_m_per_s2', 2.0),
         outward=direction_parameter(
             'Direction from the part to the gun, any length; empty: the mean normal [-]'
         ),
@@ -125,7 +93,13 @@ class IndexPlanner(PaintNode):
         self._requests = 0
         self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
-        self._action = PassesAction(self, self._plan)
+        self._planning = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
+        self._closed = False
+        self._action = ActionServer(
+            self, PlanPasses, 'plan_passes', self._execute,
+            callback_group=ReentrantCallbackGroup(),
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )  # fmt: skip
         self._diagnostics = Diagnostics(self, {'index': self._status})
 
     def _load_files(self) -> None:
@@ -135,7 +109,10 @@ class IndexPlanner(PaintNode):
             self._plan({})
 
     def close(self) -> None:
-        self._action.close()
+        """Cancel the goal that is under way, and destroy the action server."""
+        self._closed = True
+        self._planning.shutdown(cancel_futures=True)
+        self._action.destroy()
 
     def _selected_model(self) -> DepositionModel:
         """The model, with the brush of the parameters if there is one."""
@@ -191,6 +168,47 @@ class IndexPlanner(PaintNode):
         path = _path_message(planned.trajectory, self.get_clock().now().nanoseconds)
         self._path_publisher.publish(path)
         return planned, path
+
+    async def _execute(self, goal: ServerGoalHandle) -> PlanPasses.Result:
+        """Plan in a thread, one goal at a time; a cancelled one ends at its next progress."""
+        reported_s, reported = 0.0, ''
+
+        def progress(stage: str, share: float) -> None:
+            nonlocal reported_s, reported
+            if self._closed or goal.is_cancel_requested:
+                raise CancelledError
+            now_s = time.monotonic()
+            if stage != reported or now_s - reported_s > FEEDBACK_PERIOD_S:
+                reported_s, reported = now_s, stage
+                goal.publish_feedback(PlanPasses.Feedback(stage=stage, share=float(share)))
+
+        def work() -> tuple[Plan, Path]:
+            progress('begin', 0.0)
+            given = {n: getattr(goal.request, n) for n in GOAL_FIELDS if getattr(goal.request, n)}
+            if 'target_um' in given:  # the speed is for it, not that of the parameter
+                given.setdefault('speed_m_per_s', 0.0)
+            return self._plan(given, progress)
+
+        try:
+            planned, path = await self.result_of(self._planning.submit(work))
+        except CancelledError:
+            goal.canceled()
+            return PlanPasses.Result(message='cancelled')
+        except (PaintError, MemoryError) as error:
+            goal.abort()
+            return PlanPasses.Result(message=str(error) or 'not enough memory')
+        goal.succeed()
+        return PlanPasses.Result(
+            success=True,
+            message=planned.sentence,
+            path=path,
+            passes=len(planned.passes),
+            index_m=planned.placement.index_m,
+            speed_m_per_s=planned.style.speed_m_per_s,
+            duration_s=planned.cycle_time_s,
+            mean_um=planned.mean_um,
+            sigma_n=planned.sigma_n,
+        )
 
     # --- parameters and diagnostics
 
@@ -250,69 +268,3 @@ def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
         q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()
         message.poses.append(pose)
     return message
-
-
-class PassesAction:
-    """The action server `plan_passes`, which executes one goal at a time, in a thread.
-
-    A cancelled goal ends at the next report of progress. A PaintError aborts the goal and is the
-    message of its result.
-    """
-
-    def __init__(self, node: PaintNode, plan_and_publish: PlanAndPublish) -> None:
-        self._node, self._plan_and_publish = node, plan_and_publish
-        self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix='plan_passes')
-        self._closed = False
-        self._server = ActionServer(
-            node, PlanPasses, 'plan_passes', self._execute,
-            callback_group=ReentrantCallbackGroup(),
-            cancel_callback=lambda _: CancelResponse.ACCEPT,
-        )  # fmt: skip
-
-    def close(self) -> None:
-        """Cancel the running goal and destroy the server."""
-        self._closed = True
-        self._thread.shutdown(cancel_futures=True)
-        self._server.destroy()
-
-    async def _execute(self, goal: ServerGoalHandle) -> PlanPasses.Result:
-        reported_s, reported = 0.0, ''
-
-        def progress(stage: str, share: float) -> None:
-            nonlocal reported_s, reported
-            if self._closed or goal.is_cancel_requested:
-                raise CancelledError
-            now_s = time.monotonic()
-            if stage != reported or now_s - reported_s > FEEDBACK_PERIOD_S:
-                reported_s, reported = now_s, stage
-                goal.publish_feedback(PlanPasses.Feedback(stage=stage, share=float(share)))
-
-        work = self._thread.submit(self._plan, goal.request, progress)
-        try:
-            result = await self._node.result_of(work)
-        except CancelledError:
-            goal.canceled()
-            return PlanPasses.Result(message='cancelled')
-        except (PaintError, MemoryError) as error:
-            goal.abort()
-            return PlanPasses.Result(message=str(error) or 'not enough memory')
-        goal.succeed()
-        return result
-
-    def _plan(self, goal: PlanPasses.Goal, progress: Progress) -> PlanPasses.Result:
-        progress('begin', 0.0)
-        given = {name: getattr(goal, name) for name in GOAL_FIELDS if getattr(goal, name)}
-        if 'target_um' in given and 'speed_m_per_s' not in given:
-            given['speed_m_per_s'] = 0.0  # from the target, not from the parameter
-        planned, path = self._plan_and_publish(given, progress)
-        return PlanPasses.Result(
-            success=True,
-            message=planned.sentence,
-            path=path,
-            passes=len(planned.passes),
-            index_m=planned.placement.index_m,
-            speed_m_per_s=planned.style.speed_m_per_s,
-            duration_s=planned.cycle_time_s,
-            mean_um=planned.mean_um,
-            sigma_n=planned.sigma_n,
-        )

@@ -232,8 +232,7 @@ class PartChange:
         if request.resume and (request.coat or not request.serial):
             raise PaintError('resume: give the serial number of the part, and its first coat')
         pose = list(request.part_pose)
-        if wrong := self._node.PARAMETERS['part_pose'].error_for(pose):
-            raise PaintError(f'part_pose {wrong}')
+        self._node.PARAMETERS['part_pose'].checked('part_pose', pose)
         if pose and not self._node.values['part_parent_frame']:
             raise PaintError('part_pose is given, and the parameter part_parent_frame is empty')
         part, mesh_file = self.part, os.path.expanduser(request.mesh_file) or self.part.mesh_file
@@ -286,6 +285,7 @@ class PartChange:
             film.forget_trigger()
             film.replay(events_of(without_refused_states(motion, film.model)))
             stamps = motion.stamps_ns
+            source.take_pending()  # a recorder may have taken them before
             if not source.received_ns or source.received_ns in stamps:
                 source.drop_held(int(stamps[-1]) if len(stamps) else 0)
             else:

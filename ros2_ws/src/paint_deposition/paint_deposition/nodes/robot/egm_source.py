@@ -204,7 +204,7 @@ EGM = fixed_while_running(
     ),
     external_scales=NodeParameter(
         [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
-        constraints='above 0, one for each external axis',
+        constraints='numbers above 0, one for each external axis',
         allows=lambda value: all(scale > 0.0 for scale in value or ()),
         element=float,
     ),
