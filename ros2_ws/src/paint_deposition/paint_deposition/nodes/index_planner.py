@@ -39,14 +39,7 @@ from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
 SPACING_M = 0.02
-# 0 stands for none in fields of a service request and in optional parameters.
-REQUEST_FIELDS = ('speed_m_per_s', 'target_um', 'index_min_m', 'index_max_m', 'tolerance')
-OPTIONAL_PARAMETERS = ('speed_m_per_s', 'target_um', 'index_m', 'standoff_m')
-REQUIRED_PARAMETERS = ('direction', 'smoothing_radius_m', 'acceleration_m_per_s2', 'travel_rad')
 
-FEEDBACK_PERIOD_S = 0.1
-# Fields of a goal that replace the parameters of the same names.
-GOAL_FIELDS = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction')
 
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]
@@ -125,7 +118,10 @@ class IndexPlanner(PaintNode):
         self._requests += 1
         values = self.values
         # In requests and parameters 0 stands for none.
-        asked = {name: getattr(request, name) or None for name in REQUEST_FIELDS}
+        asked = {
+            name: getattr(request, name) or None
+            for name in ('speed_m_per_s', 'target_um', 'index_min_m', 'index_max_m', 'tolerance')
+        }
         try:
             index_request = IndexRequest(
                 **asked,
@@ -158,8 +154,14 @@ class IndexPlanner(PaintNode):
         for note in surface.notes:
             self.get_logger().warning(note)
         request = PlanRequest(
-            **{name: values[name] or None for name in OPTIONAL_PARAMETERS},
-            **{name: values[name] for name in REQUIRED_PARAMETERS},
+            speed_m_per_s=values['speed_m_per_s'] or None,
+            target_um=values['target_um'] or None,
+            index_m=values['index_m'] or None,
+            standoff_m=values['standoff_m'] or None,
+            direction=values['direction'],
+            smoothing_radius_m=values['smoothing_radius_m'],
+            acceleration_m_per_s2=values['acceleration_m_per_s2'],
+            travel_rad=values['travel_rad'],
             outward=tuple(values['outward']) or None,
         )
         frame_id = values['frame_id'].lstrip('/')
@@ -178,13 +180,15 @@ class IndexPlanner(PaintNode):
             if self._closed or goal.is_cancel_requested:
                 raise CancelledError
             now_s = time.monotonic()
-            if stage != reported or now_s - reported_s > FEEDBACK_PERIOD_S:
+            if stage != reported or now_s - reported_s > 0.1:
                 reported_s, reported = now_s, stage
                 goal.publish_feedback(PlanPasses.Feedback(stage=stage, share=float(share)))
 
         def work() -> tuple[Plan, Path]:
             progress('begin', 0.0)
-            given = {n: getattr(goal.request, n) for n in GOAL_FIELDS if getattr(goal.request, n)}
+            fields = ('mesh_file', 'speed_m_per_s', 'target_um', 'index_m', 'direction')
+            goals = {name: getattr(goal.request, name) for name in fields}
+            given = {name: value for name, value in goals.items() if value}
             if 'target_um' in given:  # the speed is for it, not that of the parameter
                 given.setdefault('speed_m_per_s', 0.0)
             return self._plan(given, progress)

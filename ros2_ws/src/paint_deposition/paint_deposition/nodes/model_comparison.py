@@ -34,9 +34,6 @@ from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-# The automatic scale ends at this share of the thickest reading.
-SHARE_OF_READING = 0.25
-
 COMPARISON = dict(
     **PAINTING,
     **fixed_while_configured(
@@ -145,7 +142,7 @@ class ModelComparison(PaintingNode):
     @property
     def _scale(self) -> ColourScale:
         thickest = float(np.abs(self._readings.thickness_um).max())
-        return residual_scale(np.array([SHARE_OF_READING * thickest]), self.values['color_max_um'])
+        return residual_scale(np.array([0.25 * thickest]), self.values['color_max_um'])
 
     @property
     def _model_name(self) -> str:

@@ -44,9 +44,6 @@ from paint_deposition.part.facing import turned
 from paint_deposition.report.live.scene import Scene
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
-# Poses are taken from their queue so often [s]; at 1 kHz half a second of them fits into it.
-TAKE_PERIOD_S = 0.05
-DEPTH = 500
 # The simulator speaks twice a second [s].
 TRUST_PERIOD_S, SILENT_S = 0.5, 2.0
 
@@ -102,7 +99,7 @@ class WebView(PaintNode):
             self.create_subscription(message, topic, take, profile)
         self._inputs = [
             AdaptiveSubscription(
-                self, message, gun_topic(name, topic), partial(take, name), depth=DEPTH,
+                self, message, gun_topic(name, topic), partial(take, name), depth=500,
                 latched=message is AtomizerState,
             )
             for name in self.values['atomizers'] or ['']
@@ -111,7 +108,8 @@ class WebView(PaintNode):
                 (PoseStamped, 'atomizer/pose', self._take_pose),
             )
         ]  # fmt: skip
-        self.create_steady_timer(TAKE_PERIOD_S, self._take_motion)
+        # At 1 kHz fifty poses wait at most.
+        self.create_steady_timer(0.05, self._take_motion)
         self.create_steady_timer(TRUST_PERIOD_S, self._show_trust)
         self._diagnostics = Diagnostics(self, {'page': self._status})
 

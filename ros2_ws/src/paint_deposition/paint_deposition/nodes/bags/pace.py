@@ -15,8 +15,6 @@ from rclpy.publisher import Publisher
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
-# Subscriptions and progress publisher of a node are not discovered at the same moment.
-STABLE_S = 0.5
 GRAPH_PERIOD_S = 0.1
 LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
@@ -24,8 +22,6 @@ ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 LOST_TIMEOUT_S = 5.0
 # A subscriber that has not reported at all is waited for no longer than this.
 NO_REPORT_TIMEOUT_S = 20.0
-# Larger than the largest window; reports refer to poses by their stamps.
-MAX_STAMPS = 20_000
 
 
 class ReplayClock:
@@ -136,7 +132,8 @@ class PoseWindow:
         self._lock = threading.Lock()
         self._published = 0
         self._published_s = 0.0
-        self._stamps: deque[int] = deque(maxlen=MAX_STAMPS)
+        # Larger than the largest window.
+        self._stamps: deque[int] = deque(maxlen=20_000)
         self.subscribers: dict[str, Subscriber] = {}
 
     def add_sent(self, stamp_ns: int, now_s: float) -> None:
@@ -229,7 +226,8 @@ class FlowControl:
             now_s = time.monotonic()
             if present != seen:
                 seen, since_s = present, now_s
-            if count >= wanted and now_s - since_s >= STABLE_S:
+            # Its subscriptions and its publisher are not discovered at the same moment.
+            if count >= wanted and now_s - since_s >= 0.5:
                 break
             if count < wanted and now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s

@@ -91,7 +91,6 @@ RECORDER = dict(
 )
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
-MESSAGES_OF_RATE = 50
 UNHEARD = 'sent before the recorder heard their publisher'
 
 
@@ -129,7 +128,7 @@ class Beginning:
 
     def add(self, number: int, sent_ns: int) -> None:
         """Take a later message: the first few tell how often the publisher sends."""
-        if 0 < number - self._number <= MESSAGES_OF_RATE:
+        if 0 < number - self._number <= 50:
             self._period_ns = (sent_ns - self._sent_ns) / (number - self._number)
 
     @property

@@ -42,14 +42,6 @@ from paint_deposition.nodes.runtime.topics import (
     gun_topic,
 )
 
-DISCOVERY_PERIOD_S = 0.1
-PROGRESS_PERIOD_S = 0.2
-POSES_PER_REPORT = 50
-POSE_QUEUE_DEPTH = 5000
-QUEUE_DEPTH = 100
-LOW_DISK_BYTES = 1_000_000_000
-# The answer of a process that ends at once may be lost, and its client would wait for ever.
-ANSWER_S = 1.0
 # The run of a part that has left takes poses that were sent for it until none has come so long, or
 # so long after each gun's first pose for the next part: a publisher keeps the order.
 LATE_S, FOLLOWED_S = 2.0, 0.3
@@ -108,9 +100,9 @@ class RunRecorder(ManagedNode):
         self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
         # Poses of these topics have not come since it left.
         self._behind: set[str] = set()
-        self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover)
+        self.create_steady_timer(0.1, self._discover)
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
-        self.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
+        self.create_steady_timer(0.2, self._report_progress)
         self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
 
     def _load_files(self) -> None:
@@ -155,7 +147,7 @@ class RunRecorder(ManagedNode):
         if len(types) > 1:
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
-        depth = POSE_QUEUE_DEPTH if is_pose or name == TF else QUEUE_DEPTH
+        depth = 5000 if is_pose or name == TF else 100
         topic = self._topics.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
@@ -186,7 +178,7 @@ class RunRecorder(ManagedNode):
         for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
             self._guarded(self.run.write, *first[:4])
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
-        if name in self._progress and self._topics[name].messages % POSES_PER_REPORT == 0:
+        if name in self._progress and self._topics[name].messages % 50 == 0:
             self._report_progress()
 
     def _write_late(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
@@ -280,7 +272,8 @@ class RunRecorder(ManagedNode):
     def _stop(self) -> tuple[bool, str]:
         if self.active:
             self.trigger_deactivate()
-        self.create_steady_timer(ANSWER_S, self.finish)
+        # The answer of a process that ends at once may be lost; its client would wait for ever.
+        self.create_steady_timer(1.0, self.finish)
         if not self.runs:
             return True, 'nothing was recorded: the recorder was never activated'
         return self.run.complete, self.summary()
@@ -345,7 +338,7 @@ class RunRecorder(ManagedNode):
             return Status(ERROR, str(self._error), values)
         if self._refused:
             return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
-        if free < LOW_DISK_BYTES:
+        if free < 1_000_000_000:
             return Status(WARN, 'the disk is almost full', values)
         if self._too_late or any(topic.missed for topic in topics):
             return Status(WARN, f'messages were missed{self._losses}', values)

@@ -22,9 +22,6 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
-# Messages are polled: waking up for each pose would cost more than painting it.
-TAKE_PERIOD_S = 0.02
-BATCH_PERIOD_S = 0.05
 POSES_PER_BATCH = 50
 PROGRESS_PERIOD_S = 0.2
 # No robot announces a state so long before the pose at which it holds.
@@ -33,8 +30,6 @@ AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clo
 # Of what a peer names: so many different ones are told apart, and so many characters of each.
 MOST_NAMES, LONGEST_NAME = 20, 200
 OTHERS, STATES_REFUSED = 'others', 'states refused'
-# Hours of poses: more do not wait for a part.
-MOST_HELD = 2_000_000
 NOT_HELD = 'messages dropped, since too many waited for the part'
 NO_FLOW = 'states that spray with flow 0'
 
@@ -107,7 +102,8 @@ class AtomizerInput:
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
-        node.create_steady_timer(TAKE_PERIOD_S, self._take)
+        # Polled: waking up for each pose would cost more than painting it.
+        node.create_steady_timer(0.02, self._take)
         node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
 
     @property
@@ -178,7 +174,8 @@ class AtomizerInput:
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
-            if len(self._held) < MOST_HELD:
+            # Hours of poses.
+            if len(self._held) < 2_000_000:
                 self._held.append(message)
             else:
                 self.anomalies[NOT_HELD] += 1
@@ -210,7 +207,7 @@ class AtomizerInput:
 
     def _take(self) -> None:
         self._drain()
-        waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
+        waited = time.monotonic() - self._flushed_s >= 0.05
         if waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
 

@@ -68,8 +68,6 @@ SIMULATOR = PAINTING | {
         fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
 }
-# Less paint may fly past before the part.
-ENOUGH_CM3 = 5.0
 
 
 class DepositionSimulator(PaintingNode):
@@ -110,7 +108,8 @@ class DepositionSimulator(PaintingNode):
     def _part_status(self) -> Status:
         """The status of the part, and whether any of the paint lands on it."""
         status, film = self.parts.status(), self.film.snapshot()
-        if status.level != OK or film.emitted_cm3 < ENOUGH_CM3 or film.raw_um.max() > NO_PAINT_UM:
+        # Less paint may fly past before the part.
+        if status.level != OK or film.emitted_cm3 < 5.0 or film.raw_um.max() > NO_PAINT_UM:
             return status
         beside = (
             f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '

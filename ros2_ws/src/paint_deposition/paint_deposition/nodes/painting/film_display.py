@@ -38,7 +38,6 @@ STATS_FIELDS = (
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
 BAR_STEPS = 64
-BAR_LABELS = 5
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -236,7 +235,7 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
             bar.points.append(_point(place))
             bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
     markers = [bar]
-    for number, share in enumerate(np.linspace(0.0, 1.0, BAR_LABELS), start=1):
+    for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
         label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
         label.scale = Vector3(z=0.04 * size)

@@ -23,10 +23,6 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic, node_name
 
-# Real-time factor above which the node has little time for anything but painting.
-BUSY = 0.8
-# A pose refused longer ago is no longer an ERROR.
-RECENT_S = 5.0
 # Without poses for so long, a gun that sprays is reported.
 SILENT_S = 2.0
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
@@ -41,7 +37,6 @@ COUNT_LABELS = {
     'not_unit_quaternions': 'quaternions not of unit length',
     'late_triggers': 'late states',
 }
-PERIOD_S = 0.5
 # A recorder that reports so much older a pose, or nothing for so long, is behind.
 BEHIND_NS, QUIET_S = 2_000_000_000, 3.0
 
@@ -80,7 +75,7 @@ def poses_status(node: PaintingNode, number: int) -> Status:
         node.get_logger().error(another, once=True)
         return Status(ERROR, another, values)
     now_s = time.monotonic()
-    if source.refused_frames and now_s - source.refused_s < RECENT_S:
+    if source.refused_frames and now_s - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
             f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
@@ -134,7 +129,7 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     if not node.film.complete:
         limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
         return Status(WARN, f'{limit}: a new model paints from then on only', values)
-    if factor > BUSY:
+    if factor > 0.8:
         share = f'painting takes {factor:.0%} of the time that the motion lasts'
         remedy = 'poses may be lost; use a larger max_edge_length_m'
         return Status(WARN, f'{share}: {remedy}', values)
@@ -177,7 +172,7 @@ class FilmTrust:
             topic = gun_topic(source.name, PROGRESS_TOPIC)
             take = partial(self._take_report, source.name)
             node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
-        node.create_steady_timer(PERIOD_S, self.publish)
+        node.create_steady_timer(0.5, self.publish)
 
     def publish(self) -> None:
         """Publish the status of the film as it is now."""

@@ -30,8 +30,6 @@ from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-# Batches over which the real-time factor is averaged.
-AVERAGED_BATCHES = 100
 MODEL_PARAMETERS = {'model_file', 'model_files'}
 
 
@@ -87,7 +85,7 @@ class PaintingNode(ManagedNode, ABC):
         self.mesh_file: str = self.values['mesh_file']
         # (computing time, duration of the motion) of the last batches of each gun.
         self._times_s: list[deque[tuple[float, float]]] = [
-            deque(maxlen=AVERAGED_BATCHES) for _ in self.gun_names
+            deque(maxlen=100) for _ in self.gun_names
         ]
         self.model_problem, self._notes_logged = '', 0
         self.frame = PartFrame(self, self.values['frame_id'])

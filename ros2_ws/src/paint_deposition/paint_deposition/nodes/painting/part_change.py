@@ -38,14 +38,8 @@ from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
-# With several guns, poses of the others may still be on their way when those of one are there.
-SETTLE_S = 0.03
 # For so long a change, and a reset, wait for a subscriber of the part that has stalled.
 HEARD_S, RESET_HEARD_S = 3.0, 1.0
-# A recorder has on the disk what it took before this time.
-RECORDED_S = 1.2
-# Prepared parts beside the one in the cell; a large one takes some 100 MB.
-MAX_KEPT_PARTS = 4
 # Films that cannot be saved are kept, so many at most, and saved again after so long.
 MOST_UNSAVED, SAVE_AGAIN_S = 4, 10.0
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
@@ -270,7 +264,8 @@ class PartChange:
 
     async def _recorded(self, path: str) -> RecordedPart:
         """What a run holds of the part so far, once all that was received is in its file."""
-        await self._settled(RECORDED_S)
+        # What a recorder took before is on its disk.
+        await self._settled(1.2)
         names, frame_id = self._node.gun_names, self._node.frame.frame_id
         return await self._node.result_of(
             self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
@@ -298,7 +293,7 @@ class PartChange:
         read = self._prepared(version)
         return read.result() if read.done() else await self._node.result_of(read)
 
-    async def _settled(self, duration_s: float = SETTLE_S) -> None:
+    async def _settled(self, duration_s: float = 0.03) -> None:
         """Wait for messages that were sent before now."""
         settled: Future[None] = Future()
         threading.Timer(duration_s, settled.set_result, [None]).start()
@@ -344,7 +339,8 @@ class PartChange:
             part = self._reading.submit(self._prepare, version[0])
         self._parts[version] = part
         others = [kept for kept in self._parts if kept not in (version, self._version)]
-        for kept in others[: max(len(others) - MAX_KEPT_PARTS, 0)]:
+        # A large one takes some 100 MB.
+        for kept in others[: max(len(others) - 4, 0)]:
             del self._parts[kept]
         return part
 

@@ -9,8 +9,6 @@ from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.surface import Surface
 
-# At most so many poses are left for the executor's thread, which must not be blocked.
-REMAINING_POSES = 250
 # After so many poses that point at the part, or so many in all, a gun's poses have decided.
 POSES_FACING = 50
 POSES_CONSIDERED = 2000
@@ -84,7 +82,8 @@ class Repainting:
 
     def _repaint(self, films: LiveFilms) -> None:
         for film, log in zip(films.guns, self._logs, strict=True):
-            while log.poses - film.log.poses > REMAINING_POSES and self._complete:
+            # The rest is for the thread of the executor, which must not be blocked.
+            while log.poses - film.log.poses > 250 and self._complete:
                 for event in log.events(film.log.poses, film.log.changes):
                     if self._aborted.is_set():
                         return

@@ -16,12 +16,8 @@ from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while
 TIMEOUT_S = 5.0
 POLL_S = 0.2
 PATH = '/rw/iosystem/signals/'
-PROTOCOL = 'robapi2_subscription'
-# Of the three that RWS has, the one for signals that are wanted at once.
-HIGH = 2
 
 POLL_S = 0.2
-POLICIES = ('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss')
 
 
 RWS = fixed_while_running(
@@ -54,7 +50,8 @@ class RwsSource(SignalSource):
             raise PaintError('websockets is not installed; run: pip install websockets') from None
         wanted: dict[str, Any] = {'resources': [*range(1, len(self.signals) + 1)]}
         for number, signal in enumerate(self.signals, start=1):
-            wanted |= {f'{number}': f'{PATH}{signal};state', f'{number}-p': HIGH}
+            # The highest of the three priorities that RWS has.
+            wanted |= {f'{number}': f'{PATH}{signal};state', f'{number}-p': 2}
         url, user = self.values['url'].rstrip('/'), self.values['user']
         logins = request.HTTPPasswordMgrWithDefaultRealm()
         logins.add_password(None, url, user, os.environ.get(self.PASSWORD, 'robotics'))
@@ -69,7 +66,8 @@ class RwsSource(SignalSource):
                 raise PaintError(f'events are said to be at {told}, which is another host')
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
             more = {'Cookie': kept}
-            with connect(events, subprotocols=[PROTOCOL], additional_headers=more) as socket:  # type: ignore[list-item]
+            protocols: Any = ['robapi2_subscription']
+            with connect(events, subprotocols=protocols, additional_headers=more) as socket:
                 self.connected()
                 self._take_all(first)
                 while not stopped():
@@ -111,7 +109,9 @@ OPCUA = fixed_while_running(
         '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
     ),
     security_policy=NodeParameter(
-        'None', 'How messages are signed and encrypted', choices=POLICIES
+        'None',
+        'How messages are signed and encrypted',
+        choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
     ),
     certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
     private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),

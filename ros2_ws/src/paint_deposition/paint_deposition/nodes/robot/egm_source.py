@@ -36,14 +36,10 @@ MESSAGES = {
 }  # fmt: skip
 # The clock of the controller drifts: only so many packets say what the fastest way takes.
 REMEMBERED = 2500
-# A number that goes back further, or after so long, is of a stream that was started again.
-RESTART = 1000
 # A robot that has sent nothing for so long leaves the port to another [ns].
 SILENT_NS = 2_000_000_000
 SILENT_S = 2.0
 POLL_S = 0.2
-# Another sender is reported for so long [ns].
-OTHER_NS = 10_000_000_000
 
 
 @cache
@@ -163,7 +159,8 @@ class EgmStream:
     def _is_next(self, number: int) -> bool:
         """Whether a packet is newer than those before; counts what is missing between."""
         step = 1 if self._newest is None else number - self._newest
-        if step < -RESTART or (step < 0 and number <= 1):
+        # A stream that was started again.
+        if step < -1000 or (step < 0 and number <= 1):
             self._ways_ns.clear()
             step = 1
         if step <= 0:
@@ -312,7 +309,7 @@ class EgmSource(PaintNode):
             'last packet later than the fastest [ms]': f'{1e-6 * stream.late_ns:.1f}',
             "from the controller's own time to arrival [ms]": own,
         }  # fmt: skip
-        if time.time_ns() - stream.other_ns < OTHER_NS:
+        if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
             return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
         if time.monotonic() - self._heard_s > SILENT_S:

@@ -16,12 +16,12 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
@@ -244,7 +244,7 @@ class Diagnostics:
         self._node = node
         self.tasks = dict(tasks)
         self._publisher = node.create_publisher(
-            DiagnosticArray, '/diagnostics', topics.DIAGNOSTICS
+            DiagnosticArray, '/diagnostics', QoSProfile(depth=10)
         )
         node.create_steady_timer(period_s, self.publish)
 

@@ -24,8 +24,6 @@ from paint_deposition.request import is_wrong
 
 # By the endings of names.
 UNITS = {'_m_per_s': 'm/s', '_m_per_s2': 'm/s2', '_um': 'µm', '_rad': 'rad', '_m': 'm'}
-# Declared by rclpy itself, or read by it when publishers and subscriptions are created.
-RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 LONGEST_SHOWN = 40  # letters of a name that is refused
 RUNS = 'runs'  # `fixed_while`: in every state
@@ -234,8 +232,9 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     """
     # rclpy has no public access to overrides that are not declared, such as misspelt names.
     overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
-    for name in overrides:
-        if name not in {*table, *RESERVED_NAMES} and not name.startswith('qos_overrides.'):
+    of_rclpy = {'use_sim_time', 'start_type_description_service'}
+    for name in overrides.keys() - table.keys() - of_rclpy:
+        if not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
     node.add_pre_set_parameters_callback(

@@ -26,9 +26,7 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Clouds, fields and other results that are drawn or recorded as they arrive.
 RESULTS = QoSProfile(depth=10)
 PROGRESS = QoSProfile(depth=100)
-DIAGNOSTICS = QoSProfile(depth=10)
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-QOS_PERIOD_S = 0.1
 # More than a publisher keeps for late subscribers, or sends while a subscription is new.
 REMEMBERED_MESSAGES = 2000
 # Both ends of a new subscription know of each other after less; meanwhile others count, too.
@@ -107,7 +105,7 @@ class AdaptiveSubscription:
 
     def take_pending(self) -> None:
         """Take all messages in the queues."""
-        if self._polled and time.monotonic() - self._matched_s > QOS_PERIOD_S:
+        if self._polled and time.monotonic() - self._matched_s > 0.1:
             self.match_qos()
         for quality in sorted(self._subscriptions, key=_strictest_first):
             self._drain(quality)

@@ -1,6 +1,6 @@
 """A replay is as fast as those who listen take it."""
 
-from nodes.replay.listener import recorded
+from nodes.bags.listener import recorded
 
 
 def test_the_player_stays_within_its_window(play, listen, wait_until, still, pass_bag):

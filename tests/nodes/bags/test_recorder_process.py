@@ -13,8 +13,8 @@ from rosbags.rosbag2 import Reader
 from std_msgs.msg import String
 
 from files.recorded import START_NS
+from nodes.bags.runs import pose
 from nodes.processes import NodeProcess
-from nodes.recording.runs import pose
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.mcap_recovery import recover

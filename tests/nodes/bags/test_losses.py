@@ -10,7 +10,7 @@ from rclpy.qos import QoSProfile, ReliabilityPolicy
 from std_msgs.msg import String
 
 from files.recorded import START_NS
-from nodes.recording.runs import NUMBERED, UNCOUNTED, pose
+from nodes.bags.runs import NUMBERED, UNCOUNTED, pose
 
 
 def test_gaps_and_missed_messages_are_reported(record, publisher, onlooker, wait_until):

@@ -11,8 +11,8 @@ from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
 from files.recorded import START_NS, straight_pass
+from nodes.bags.runs import counts, finish, messages, offered, pose
 from nodes.cell import FACING_PANEL, Robot, parameters
-from nodes.recording.runs import counts, finish, messages, offered, pose
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
@@ -129,7 +129,7 @@ def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin
 def test_bad_input_is_reported_at_the_start(record):
     for values, says in (
         ({'mesh_file': '/nowhere.stl'}, 'mesh_file /nowhere.stl: No such file or directory'),
-        ({'compression': 'zip'}, "compression is 'zip': choose one of none, lz4, zstd"),
+        ({'compression': 'zip'}, "compression is 'zip'; give 'none', 'lz4' or 'zstd'"),
         ({'output_directory': '/dev/null/runs'}, 'cannot create /dev/null/runs/run'),
         ({'topic': 'x'}, 'run_recorder has no parameter topic; did you mean'),
     ):

@@ -7,7 +7,7 @@ from rclpy.serialization import deserialize_message
 from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
-from nodes.replay.listener import recorded
+from nodes.bags.listener import recorded
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -138,7 +138,7 @@ def test_bad_input_is_reported_at_the_start(play, pass_bag):
         ({'bag': '/nowhere'}, 'no bag at /nowhere'),
         ({'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
         ({'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
-        ({'rate': -1.0}, 'rate is -1.0: must be at least 0.0'),
+        ({'rate': -1.0}, 'rate is -1; give at least 0'),
         ({'topic': 'x'}, 'bag_player has no parameter topic; did you mean'),
     ):
         with pytest.raises((PaintError, RecordingError), match=says):
