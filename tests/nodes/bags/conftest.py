@@ -52,7 +52,7 @@ def play(ros_context, spin):
 @pytest.fixture
 def listen(ros_context, spin):
     """`listen(name)`: a node that hears the poses, running."""
-    from nodes.replay.listener import Listener
+    from nodes.bags.listener import Listener
 
     def listen(name='listener', reports=True, namespace='') -> Listener:
         listener = Listener(ros_context, name, reports, namespace)

@@ -2,6 +2,7 @@
 
 import math
 import threading
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -99,8 +100,8 @@ class BagPlayer(PaintNode):
         if self.values['publish_clock']:
             self._clock_publisher = self.create_publisher(Clock, '/clock', topics.CLOCK)
             self.create_steady_timer(0.01, self._publish_clock)
-        self.create_trigger_service('~/pause', self._pause)
-        self.create_trigger_service('~/resume', self._resume)
+        self.create_trigger_service('~/pause', partial(self._set_running, False))
+        self.create_trigger_service('~/resume', partial(self._set_running, True))
         self._stopped = threading.Event()
         self._subscribers_to_await = self.values['wait_for_subscribers']
         window = self.values['window']
@@ -159,15 +160,12 @@ class BagPlayer(PaintNode):
 
     # --- called by the executor
 
-    def _pause(self) -> tuple[bool, str]:
-        was_running = self._time.running
-        self._time.pause()
-        return was_running, 'paused' if was_running else 'already paused'
-
-    def _resume(self) -> tuple[bool, str]:
-        was_running = self._time.running
-        self._time.resume()
-        return not was_running, 'not paused' if was_running else 'resumed'
+    def _set_running(self, running: bool) -> tuple[bool, str]:
+        changes = self._time.running != running
+        self._time.change(running=running)
+        if running:
+            return changes, 'resumed' if changes else 'not paused'
+        return changes, 'paused' if changes else 'already paused'
 
     def _status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
@@ -204,16 +202,16 @@ class BagPlayer(PaintNode):
             for message in replay_messages(bag, *topics, computed):
                 if not begun:
                     begun = True
-                    self._time.stop_at(message.log_time_ns)
+                    self._time.change(started=False, time_ns=message.log_time_ns)
                     self._flow_control.wait_for_subscribers(self._subscribers_to_await)
                     self._subscribers_to_await = 0  # when looping
-                    self._time.start()
+                    self._time.change(started=True)
                 self._wait_until_due(message.log_time_ns)
                 if self._stopped.is_set():
                     return
                 self._time.jump_to(message.log_time_ns)
                 self._publish(message)
-        self._time.stop()
+        self._time.change(started=False)
         self._publish_clock()
 
     def _wait_until_due(self, log_time_ns: int) -> None:

@@ -3,7 +3,7 @@
 import math
 from bisect import bisect_right
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from geometry_msgs.msg import TransformStamped
@@ -125,7 +125,8 @@ class InitialMessages:
         # A simulator says where a part stands after it has said that the part is there.
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
         before = [*self._placed][: len(self._placed) - len(later)][-1:]
-        stays = not later and before and _pose(before[0]) == _values(part.part_pose)
+        place = list(Rigid.of(part.part_pose).values) if is_pose(part.part_pose) else []
+        stays = not later and before and _pose(before[0]) == place
         self._placed = deque(before if stays else later, REMEMBERED_MESSAGES)
         early[self._part_pose] = len(later)
         return cut_ns, {topic: count for topic, count in early.items() if count}
@@ -211,8 +212,3 @@ def _pose(message: Recorded) -> list[float]:
     placed = deserialize_message(message.cdr, TransformStamped).transform
     t, q = placed.translation, placed.rotation
     return [t.x, t.y, t.z, q.x, q.y, q.z, q.w]
-
-
-def _values(part_pose: Sequence[float]) -> list[float]:
-    """The pose as it is published, none if it is not known."""
-    return list(Rigid.of(part_pose).values) if is_pose(part_pose) else []

@@ -27,8 +27,8 @@ NO_REPORT_TIMEOUT_S = 20.0
 class ReplayClock:
     """Bag time as a function of the steady clock; thread-safe.
 
-    It does not advance before `start` and while paused. `rate` is bag seconds per second; at 0,
-    time jumps from message to message. `running` is False while paused.
+    It does not advance before it is started and while it is paused. `rate` is bag seconds per
+    second; at 0, time jumps from message to message. `running` is False while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -41,34 +41,25 @@ class ReplayClock:
 
     @property
     def time_ns(self) -> int | None:
-        """Current time in the bag [ns], None before the first `stop_at`."""
+        """Current time in the bag [ns], None before it was set."""
         with self._changed:
             if self._since_s is None or self._time_ns is None:
                 return self._time_ns
             passed_s = time.monotonic() - self._since_s
             return self._time_ns + round(passed_s * self._rate * 1e9)
 
-    def stop_at(self, time_ns: int) -> None:
-        """Set the time, and stop until `start`."""
+    def change(
+        self, *, started: bool | None = None, running: bool | None = None,
+        time_ns: int | None = None,
+    ) -> None:  # fmt: skip
+        """Start or stop, pause or go on; from now, or from that time on."""
         with self._changed:
-            self._set(started=False, running=self.running)
-            self._time_ns = time_ns
-
-    def start(self) -> None:
-        """Start from the current time, unless paused."""
-        self._set(started=True, running=self.running)
-
-    def stop(self) -> None:
-        """Stop at the current time."""
-        self._set(started=False, running=self.running)
-
-    def pause(self) -> None:
-        """Pause until `resume`."""
-        self._set(started=self._started, running=False)
-
-    def resume(self) -> None:
-        """End a `pause`."""
-        self._set(started=self._started, running=True)
+            self._time_ns = self.time_ns if time_ns is None else time_ns
+            self._started = self._started if started is None else started
+            self.running = self.running if running is None else running
+            goes = self._started and self.running and self._rate
+            self._since_s = time.monotonic() if goes else None
+            self._changed.notify_all()
 
     def jump_to(self, time_ns: int) -> None:
         """At rate 0: jump to the time of a message."""
@@ -95,12 +86,6 @@ class ReplayClock:
             return math.inf
         passed_s = time.monotonic() - self._since_s
         return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
-
-    def _set(self, started: bool, running: bool) -> None:
-        with self._changed:
-            self._time_ns, self._started, self.running = self.time_ns, started, running
-            self._since_s = time.monotonic() if started and running and self._rate else None
-            self._changed.notify_all()
 
 
 @dataclass

@@ -1,11 +1,11 @@
 """The messages that a bag player publishes: poses, states of the atomizer, transforms."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from heapq import merge
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
@@ -14,7 +14,7 @@ from rclpy.node import Node
 from rclpy.publisher import Publisher
 from rclpy.qos import DurabilityPolicy, QoSProfile
 from rclpy.serialization import deserialize_message, serialize_message
-from std_msgs.msg import Bool, Header
+from std_msgs.msg import Bool
 
 from paint_deposition.files.recordings import message_definitions as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage
@@ -31,8 +31,9 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
-STATE_FIELDS = AtomizerState.get_fields_and_field_types()
-DOUBLES = [name for name, kind in STATE_FIELDS.items() if kind == 'double']
+DOUBLES = [
+    name for name, kind in AtomizerState.get_fields_and_field_types().items() if kind == 'double'
+]
 
 
 class ReplayMessage(NamedTuple):
@@ -82,34 +83,28 @@ def pose_messages(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawM
 
 
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
-    if states is None or states.type == BOOL_TYPE:
-        return _bool_as_state
-    if bag.type_hash(states) == definitions.installed(STATE_TYPE).type_hash:
+    """What makes the bytes of an AtomizerState from a recorded Bool or state."""
+    is_bool = states is None or states.type == BOOL_TYPE
+    own_hash = definitions.installed(STATE_TYPE).type_hash
+    if states is not None and not is_bool and bag.type_hash(states) == own_hash:
         return lambda message: message.cdr
-    # Recorded with another version of the message: fields of the same name are copied.
-    return lambda message: _converted_state(bag.decode(message))
 
+    def as_state(message: RawMessage) -> bytes:
+        state = AtomizerState(**dict.fromkeys(DOUBLES, math.nan))  # unknown
+        if is_bool:
+            state.header = header('', message.log_time_ns)
+            state.spraying = deserialize_message(message.cdr, Bool).data
+            state.flow = relative_flow(state.spraying)
+        else:  # another version of the message: fields of the same name are copied
+            recorded = bag.decode(message)
+            state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
+            state.spraying = bool(recorded.spraying)
+            state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
+            for name in DOUBLES:
+                setattr(state, name, float(getattr(recorded, name, math.nan)))
+        return serialize_message(state)
 
-def _bool_as_state(message: RawMessage) -> bytes:
-    spraying = deserialize_message(message.cdr, Bool).data
-    return _serialised_state(
-        header('', message.log_time_ns), spraying, {'flow': relative_flow(spraying)}
-    )
-
-
-def _converted_state(recorded: Any) -> bytes:
-    known = {name: float(getattr(recorded, name)) for name in DOUBLES if hasattr(recorded, name)}
-    at = header(recorded.header.frame_id, stamp_ns(recorded.header))
-    brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
-    return _serialised_state(at, bool(recorded.spraying), known, brush)
-
-
-def _serialised_state(
-    at: Header, spraying: bool, known: Mapping[str, float], brush: int = ONLY_BRUSH
-) -> bytes:
-    """A serialised state; unknown fields are NaN."""
-    doubles = dict.fromkeys(DOUBLES, math.nan) | dict(known)
-    return serialize_message(AtomizerState(header=at, spraying=spraying, brush=brush, **doubles))
+    return as_state
 
 
 class ReplayedTransforms:
@@ -130,10 +125,13 @@ class ReplayedTransforms:
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            self.topics = []
+            self.topics, where = [], ''
+            if placed := read_frames(bag).placed('part'):
+                values = ', '.join(f'{value:.9g}' for value in placed[1].values)
+                where = f": '{placed[0]}' and [{values}]"
             node.get_logger().warning(
                 f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
-                f'replayed{_part_pose_hint(bag)}'
+                f"replayed; set the simulator's part_parent_frame and part_pose{where}"
             )
             return
         self._message = TFMessage
@@ -151,12 +149,3 @@ class ReplayedTransforms:
             cdr = serialize_message(self._message(transforms=[placed]))
         static = message.type == PART_POSE_TYPE or message.topic.endswith(STATIC)
         self._publishers[static].publish(cdr)
-
-
-def _part_pose_hint(bag: Bag) -> str:
-    """The parameters of the simulator that replace the transforms, for a warning."""
-    if placed := read_frames(bag).placed('part'):
-        parent, place = placed
-        values = ', '.join(f'{value:.9g}' for value in place.values)
-        return f"; set part_parent_frame: '{parent}' and part_pose: [{values}] of the simulator"
-    return "; set the simulator's part_parent_frame and part_pose"

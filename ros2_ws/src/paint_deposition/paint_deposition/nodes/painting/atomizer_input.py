@@ -4,7 +4,6 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -92,11 +91,17 @@ class AtomizerInput:
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
         depth = node.values['pose_queue_depth']
-        subscribe = partial(AdaptiveSubscription, node, depth=depth)
+
+        def subscribe(kind: type, topic: str, new: list, latched: bool) -> AdaptiveSubscription:
+            def note(message: Any, info: Mapping[str, Any]) -> None:
+                new.append((message, info['source_timestamp']))
+
+            return AdaptiveSubscription(node, kind, topic, note, depth=depth, latched=latched)
+
+        # A latched state from before the node started is still in effect.
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, self._note_pose),
-            # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, self._note_state, latched=True),
+            subscribe(PoseStamped, self._pose_topic, self._new_poses, False),
+            subscribe(AtomizerState, self._state_topic, self._new_states, True),
         ]
         self.reset_counts()
         self._progress = node.create_publisher(
@@ -196,8 +201,9 @@ class AtomizerInput:
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
-        poses, self._new_poses = self._new_poses, []
-        states, self._new_states = deque(self._new_states), []
+        poses, states = [*self._new_poses], deque(self._new_states)
+        self._new_poses.clear()
+        self._new_states.clear()
         for pose, sent_ns in poses:
             while states and states[0][1] < sent_ns:
                 self._take_state(*states.popleft())
@@ -233,12 +239,6 @@ class AtomizerInput:
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
         self._on_poses(batch)
-
-    def _note_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
-        self._new_poses.append((message, info['source_timestamp']))
-
-    def _note_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
-        self._new_states.append((message, info['source_timestamp']))
 
     # --- poses
 
