@@ -8,7 +8,6 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
 from nav_msgs.msg import Path
 from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
@@ -25,7 +24,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
     model_parameters,
 )
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -264,11 +263,9 @@ def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
     kept = np.append(True, np.diff(travelled) > 0.0)
     kept[-1] = True
     stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]
+    poses = np.hstack([trajectory.positions_m, trajectory.quaternions_xyzw])
     message = Path(header=header(trajectory.frame_id, start_ns))
     for row in np.flatnonzero(kept):
-        pose = PoseStamped(header=header(trajectory.frame_id, int(stamps_ns[row])))
-        p, q = pose.pose.position, pose.pose.orientation
-        p.x, p.y, p.z = trajectory.positions_m[row].tolist()
-        q.x, q.y, q.z, q.w = trajectory.quaternions_xyzw[row].tolist()
+        pose = pose_message(trajectory.frame_id, int(stamps_ns[row]), poses[row])
         message.poses.append(pose)
     return message

@@ -102,27 +102,17 @@ class BagPlayer(PaintNode):
             self.create_steady_timer(0.01, self._publish_clock)
         self.create_trigger_service('~/pause', partial(self._set_running, False))
         self.create_trigger_service('~/resume', partial(self._set_running, True))
-        self._stopped = threading.Event()
         self._subscribers_to_await = self.values['wait_for_subscribers']
         window = self.values['window']
-        self._flow_control = FlowControl(self, self._pose_publisher, window, self._stopped)
+        self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
         self.poses_published = self.states_published = 0
         self._diagnostics = Diagnostics(self, {'replay': self._status})
-        self._thread = threading.Thread(target=self._replay, name='replay', daemon=True)
-        self._thread.start()
+        self.start_thread(self._replay)
 
     def close(self) -> None:
-        self._stop_thread()
+        super().close()
         replayed = f'replayed {self.poses_published} poses, {self.states_published} states'
         self.get_logger().info(replayed)
-
-    def destroy_node(self) -> None:
-        self._stop_thread()
-        super().destroy_node()
-
-    def _stop_thread(self) -> None:
-        self._stopped.set()
-        self._thread.join()
 
     def _load_files(self) -> None:
         values = self.values
@@ -184,7 +174,7 @@ class BagPlayer(PaintNode):
 
     def _replay(self) -> None:
         try:
-            while not self._stopped.is_set():
+            while not self.stopped.is_set():
                 self._play_once()
                 self._flow_control.wait_until_taken()
                 if not self.values['loop']:
@@ -207,7 +197,7 @@ class BagPlayer(PaintNode):
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
                 self._wait_until_due(message.log_time_ns)
-                if self._stopped.is_set():
+                if self.stopped.is_set():
                     return
                 self._time.jump_to(message.log_time_ns)
                 self._publish(message)
@@ -216,7 +206,7 @@ class BagPlayer(PaintNode):
 
     def _wait_until_due(self, log_time_ns: int) -> None:
         """Wait for the end of a pause, the time of a message, and the flow control."""
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             if self._time.wait_for(log_time_ns, timeout_s=0.05):
                 break
         if self.values['rate'] == 0.0:

@@ -8,7 +8,7 @@ from operator import attrgetter
 from typing import NamedTuple
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped, TransformStamped
+from geometry_msgs.msg import TransformStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.node import Node
 from rclpy.publisher import Publisher
@@ -29,7 +29,7 @@ from paint_deposition.files.recordings.transforms import (
 from paint_deposition.files.recordings.triggers import BOOL_TYPE
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.motion.trigger import ONLY_BRUSH, relative_flow
-from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
+from paint_deposition.nodes.runtime.messages import header, header_stamp_ns, pose_message
 
 DOUBLES = [
     name for name, kind in AtomizerState.get_fields_and_field_types().items() if kind == 'double'
@@ -76,10 +76,9 @@ def pose_messages(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawM
     logged_ns = np.maximum.accumulate(log_times_ns).tolist()
     poses = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
     for stamp, at_ns, values in zip(motion.stamps_ns.tolist(), logged_ns, poses, strict=True):
-        pose = PoseStamped(header=header(motion.frame_id, stamp))
-        p, q = pose.pose.position, pose.pose.orientation
-        p.x, p.y, p.z, q.x, q.y, q.z, q.w = values
-        yield RawMessage('', '', at_ns, serialize_message(pose))
+        yield RawMessage(
+            '', '', at_ns, serialize_message(pose_message(motion.frame_id, stamp, values))
+        )
 
 
 def _state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:

@@ -25,7 +25,7 @@ from paint_deposition.nodes.robot.robot_poses import (
     PublishedPoses,
     TfPoses,
 )
-from paint_deposition.nodes.runtime.messages import header, message_class
+from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
@@ -168,9 +168,7 @@ class AtomizerSource(PaintNode):
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
             self._compare_clocks(stamp, sent_ns)
-        pose = PoseStamped(header=header(self._motion.base, stamp))
-        p, q = pose.pose.position, pose.pose.orientation
-        p.x, p.y, p.z, q.x, q.y, q.z, q.w = (tip @ self._tcp).values
+        pose = pose_message(self._motion.base, stamp, (tip @ self._tcp).values)
         self._pose_publisher.publish(pose)
         self._poses += 1
 

@@ -1,7 +1,6 @@
 """Node `egm_source`: poses and joints that an ABB robot streams by EGM (UDP, protobuf)."""
 
 import socket
-import threading
 import time
 from collections import deque
 from dataclasses import dataclass
@@ -14,7 +13,7 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH
@@ -230,9 +229,7 @@ class EgmSource(PaintNode):
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s = time.monotonic()
         Diagnostics(self, {'robot': self._status})
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._listen, name='egm', daemon=True)
-        self._thread.start()
+        self.start_thread(self._listen)
 
     def _validate(self, values: Any) -> None:
         egm_message()
@@ -256,23 +253,18 @@ class EgmSource(PaintNode):
         self._socket.settimeout(POLL_S)
 
     def close(self) -> None:
-        self._stop()
+        super().close()
         heard = self.stream
         self.get_logger().info(
             f'{heard.received} packets, {heard.lost} lost, {heard.repeated} repeated'
         )
 
     def destroy_node(self) -> None:
-        self._stop()
         super().destroy_node()
-
-    def _stop(self) -> None:
-        self._stopped.set()
-        self._thread.join()
         self._socket.close()
 
     def _listen(self) -> None:
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             try:
                 packet, (sender, _) = self._socket.recvfrom(65_536)
             except TimeoutError:
@@ -285,18 +277,15 @@ class EgmSource(PaintNode):
                 self._publish(sample)
 
     def _publish(self, sample: EgmSample) -> None:
-        at = header(self.values['frame_id'], sample.stamp_ns)
+        frame_id, stamp = self.values['frame_id'], sample.stamp_ns
         if sample.pose is not None:
-            pose = PoseStamped(header=at)
-            p, q = pose.pose.position, pose.pose.orientation
-            p.x, p.y, p.z, q.x, q.y, q.z, q.w = sample.pose
-            self._poses.publish(pose)
+            self._poses.publish(pose_message(frame_id, stamp, sample.pose))
         names, external = self.values['joint_names'], self.values['external_joints']
         if len(sample.joints_rad) >= len(names) and len(sample.external) >= len(external):
             scaled = sample.external[: len(external)] * self.values['external_scales']
             positions = [*sample.joints_rad[: len(names)].tolist(), *scaled.tolist()]
-            state = JointState(header=at, name=[*names, *external], position=positions)
-            self._joints.publish(state)
+            at, joints = header(frame_id, stamp), [*names, *external]
+            self._joints.publish(JointState(header=at, name=joints, position=positions))
 
     def _status(self) -> Status:
         stream, values = self.stream, self.values

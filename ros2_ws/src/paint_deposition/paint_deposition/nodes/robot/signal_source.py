@@ -112,9 +112,7 @@ class SignalSource(PaintNode):
         self._starts = StartsOfMotion()
         self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
         Diagnostics(self, {'signals': self._status})
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._keep_following, name=name, daemon=True)
-        self._thread.start()
+        self.start_thread(self._keep_following)
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         if urlsplit(values['url']).username is not None:
@@ -128,30 +126,19 @@ class SignalSource(PaintNode):
         if len(set(named)) < len(named):
             raise PaintError(f'{self.get_name()}: a signal is named twice: {" ".join(named)}')
 
-    def destroy_node(self) -> None:
-        self._stop()
-        super().destroy_node()
-
-    def close(self) -> None:
-        self._stop()
-
-    def _stop(self) -> None:
-        self._stopped.set()
-        self._thread.join()
-
     def follow(self, stopped: Callable[[], bool]) -> None:
         """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
         raise NotImplementedError
 
     def _keep_following(self) -> None:
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             self._silent = {*self.signals}
             try:
-                self.follow(self._stopped.is_set)
+                self.follow(self.stopped.is_set)
             except Exception as error:  # whatever a network and its libraries bring
                 text = ' '.join(str(error).split()) or type(error).__name__
                 self._problem = f'{self.values["url"]}: {text}'
-            self._stopped.wait(1.0)
+            self.stopped.wait(1.0)
 
     def connected(self) -> None:
         """All signals are subscribed to."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import os
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -42,15 +43,18 @@ class PaintNode(Node):
         loading: whether a node of this process is reading its files.
         stopping: whether this process was asked to end.
         values: current values of the parameters, by name.
+        stopped: whether the thread of this node is to end.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
     PARAMETERS: ParameterTable = MappingProxyType({})
     loading = stopping = False
+    _thread: threading.Thread | None = None
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.finished: Future = Future()
+        self.stopped = threading.Event()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
@@ -101,6 +105,11 @@ class PaintNode(Node):
 
     def close(self) -> None:
         """Close files and the like. Called once, after the last callback; signals are ignored."""
+        self._end_thread()
+
+    def destroy_node(self) -> None:
+        self._end_thread()
+        super().destroy_node()
 
     # --- for all users
 
@@ -108,6 +117,16 @@ class PaintNode(Node):
     def configured(self) -> bool:
         """Whether the files have been read."""
         return True
+
+    def start_thread(self, work: Callable[[], None]) -> None:
+        """Do work that ends soon once ``stopped`` is set, which closing the node does."""
+        self._thread = threading.Thread(target=work, name=self.get_name(), daemon=True)
+        self._thread.start()
+
+    def _end_thread(self) -> None:
+        self.stopped.set()
+        if self._thread is not None:
+            self._thread.join()
 
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
