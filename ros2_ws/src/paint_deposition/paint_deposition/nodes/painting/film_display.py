@@ -88,9 +88,12 @@ class LargeTopic:
         """Publish a version if a subscriber lacks it and the link is free; else call it again."""
         # Not the publisher's own count, which grows before the event of a new subscriber.
         wanted = version, self._new_subscribers
-        if not self._subscribers or wanted == self._sent or not self._is_free():
-            return
         began_s = time.monotonic()
+        if not self._subscribers or wanted == self._sent or began_s < self._next_allowed_s:
+            return
+        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
+        if not acknowledged and began_s < self._sent_s + ACKNOWLEDGE_TIMEOUT_S:
+            return
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
         self._next_allowed_s = began_s + (self._sent_s - began_s) / MAX_CORE_SHARE
@@ -98,13 +101,6 @@ class LargeTopic:
     def _count_subscribers(self, event: Any) -> None:
         self._subscribers = event.current_count
         self._new_subscribers += event.total_count_change
-
-    def _is_free(self) -> bool:
-        now_s = time.monotonic()
-        if now_s < self._next_allowed_s:
-            return False
-        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
-        return acknowledged or now_s > self._sent_s + ACKNOWLEDGE_TIMEOUT_S
 
 
 class FilmDisplay:

@@ -2,7 +2,6 @@
 
 import tempfile
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -102,16 +101,14 @@ def film_writer(
     return write
 
 
-@dataclass(frozen=True)
-class RecordedPart:
-    """The motion of each gun in the frame of the part, and the part as it was announced."""
+def read_recorded_part(
+    run: Path, guns: Sequence[str], frame_id: str
+) -> tuple[list[Trajectory], Part | None]:
+    """The motion of each gun in the frame of the part, and the part as it was announced.
 
-    motions: list[Trajectory]
-    part: Part | None
-
-
-def read_recorded_part(run: Path, guns: Sequence[str], frame_id: str) -> RecordedPart:
-    """Read a run, also one that is still written, for guns by their names.
+    Args:
+        run: may still be written.
+        guns: their names.
 
     Raises:
         RecordingError: nothing of it can be read.
@@ -130,4 +127,4 @@ def read_recorded_part(run: Path, guns: Sequence[str], frame_id: str) -> Recorde
             source |= {'state_topic': STATE_TOPIC} if STATE_TOPIC in named else {}
         atomizers = [gun for gun in guns if gun]
         motions = read_gun_motions([copy], MotionSource(**source), atomizers)
-        return RecordedPart([motion.trajectory for motion in motions], told[-1] if told else None)
+        return [motion.trajectory for motion in motions], told[-1] if told else None

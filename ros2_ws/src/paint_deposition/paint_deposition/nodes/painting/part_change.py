@@ -18,8 +18,8 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.painting.film_files import (
-    RecordedPart,
     film_writer,
     read_recorded_part,
 )
@@ -162,46 +162,38 @@ class PartChange:
         unplaced = ''
         self.waiting = True
         try:
-            if len(node.inputs) > 1:
-                node.hold(following.last_sent_ns)
-                await self._settled()
-            node.hold()
-            # So do those that wait for their transform, which comes or is given up.
-            while any(len(source.tf_queue) for source in node.inputs):
-                await self._settled()
-            # The message of the part is latched, and the next one takes its place.
-            heard_s = time.monotonic() + HEARD_S
-            while not self._is_heard() and time.monotonic() < heard_s:
-                await self._settled()
-            if not self._is_heard():
-                notes.append('a subscriber of part has stalled, and may miss a part')
-            node.catch_up()
+            notes += await self._receive_all(following.last_sent_ns)
             since_ns = self._newest_ns()
             version = mesh_version(following.mesh_file)
-            ready = None if request.coat else await self._ready(version)
-            run = await self._recorded(request.resume) if request.resume else None
+            ready = None
+            if not request.coat:
+                read = self._prepared(version)
+                ready = read.result() if read.done() else await node.result_of(read)
+            motions, told = None, None
+            if request.resume:
+                motions, told = await self._recorded(request.resume)
             # What was painted since a crash is of the part that is resumed, and saved with it.
-            is_resumed = run is not None and not self.part.serial
+            is_resumed = motions is not None and not self.part.serial
             if node.film.counts.received and not is_resumed:
                 self._unsaved.append(self._film_writer())
             if ready is not None:
                 log = [[*gun.log.events()] if is_resumed else [] for gun in node.film.guns]
                 node.change_part(version[0], ready)
                 self._version = version
-                if run is not None:
-                    notes.append(self._resume(run, log))
-            if run is not None and run.part is not None and run.part.run == following.run:
-                following = run.part  # as it was announced: its recorder goes on with its run
-                since_ns = stamp_ns(run.part.header)
+                if motions is not None:
+                    notes.append(self._resume(motions, log))
+            if told is not None and told.run == following.run:
+                following = told  # as it was announced: its recorder goes on with its run
+                since_ns = stamp_ns(told.header)
             self.part, self._since = following, datetime.now(timezone.utc)
             self._run, self._resets = following.run, 0
             self._publish(since_ns, request.part_pose)
             # After the part, so that a recorder knows whose pose it is.
             if len(request.part_pose):
                 kind, pose = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
-                told = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
-                if not told.successful:
-                    unplaced = f'it stands where the part before did: {told.reason}'
+                placed = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
+                if not placed.successful:
+                    unplaced = f'it stands where the part before did: {placed.reason}'
         finally:
             self.waiting = False
             node.release()
@@ -215,6 +207,29 @@ class PartChange:
         response.message = '; '.join(filter(None, [self._sentence(), *notes]))
         node.get_logger().info(response.message)
         return unplaced
+
+    async def _receive_all(self, last_sent_ns: int) -> list[str]:
+        """Paint what was sent until then, and keep what was sent later.
+
+        Returns:
+            A note, if a subscriber of the part has stalled.
+        """
+        node = self._node
+        if len(node.inputs) > 1:
+            node.hold(last_sent_ns)
+            await self._settled()
+        node.hold()
+        # So do those that wait for their transform, which comes or is given up.
+        while any(len(source.tf_queue) for source in node.inputs):
+            await self._settled()
+        # The message of the part is latched, and the next one takes its place.
+        heard_s = time.monotonic() + HEARD_S
+        while not self._is_heard() and time.monotonic() < heard_s:
+            await self._settled()
+        node.catch_up()
+        if self._is_heard():
+            return []
+        return ['a subscriber of part has stalled, and may miss a part']
 
     def _requested(self, request: ChangePart.Request) -> Part:
         """The part that the request describes.
@@ -262,7 +277,7 @@ class PartChange:
             self._node.require_named_folder(request.resume)
         return following
 
-    async def _recorded(self, path: str) -> RecordedPart:
+    async def _recorded(self, path: str) -> tuple[list[Trajectory], Part | None]:
         """What a run holds of the part so far, once all that was received is in its file."""
         # What a recorder took before is on its disk.
         await self._settled(1.2)
@@ -271,11 +286,13 @@ class PartChange:
             self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
         )
 
-    def _resume(self, run: RecordedPart, log: list[list[TriggerChange | PoseBatch]]) -> str:
+    def _resume(
+        self, motions: list[Trajectory], log: list[list[TriggerChange | PoseBatch]]
+    ) -> str:
         """Paint what a run holds, and what came since if it ends before that."""
         node = self._node
         for motion, film, source, later in zip(
-            run.motions, node.film.guns, node.inputs, log, strict=True
+            motions, node.film.guns, node.inputs, log, strict=True
         ):
             film.forget_trigger()
             film.replay(events_of(without_refused_states(motion, film.model)))
@@ -285,13 +302,8 @@ class PartChange:
                 source.drop_held(int(stamps[-1]) if len(stamps) else 0)
             else:
                 film.replay(later)
-        poses = sum(map(len, run.motions))
+        poses = sum(map(len, motions))
         return f'{poses} poses of its recording are painted'
-
-    async def _ready(self, version: Version) -> PreparedPart:
-        """The part of this mesh, once it is read."""
-        read = self._prepared(version)
-        return read.result() if read.done() else await self._node.result_of(read)
 
     async def _settled(self, duration_s: float = 0.03) -> None:
         """Wait for messages that were sent before now."""

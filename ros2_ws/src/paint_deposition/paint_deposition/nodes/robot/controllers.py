@@ -4,6 +4,8 @@ import asyncio
 import os
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
+from datetime import timezone
+from types import SimpleNamespace
 from typing import Any
 from urllib import request
 from urllib.parse import urlencode, urlsplit
@@ -170,7 +172,11 @@ class OpcuaSource(SignalSource):
                 else:
                     node = await client.nodes.objects.get_child(signal.split('/'))
                 found[node.nodeid] = signal
-            handler = _Values(self, found)
+
+            def notify(node: Any, value: Any, data: Any) -> None:
+                self._take_value(found[node.nodeid], value, data.monitored_item.Value)
+
+            handler = SimpleNamespace(datachange_notification=notify)
             period_ms = 1e3 * self.values['period_s']
             subscription = await client.create_subscription(period_ms, handler)
             nodes = [client.get_node(each) for each in found]
@@ -180,26 +186,16 @@ class OpcuaSource(SignalSource):
                 await asyncio.sleep(POLL_S)
                 await client.check_connection()
 
-
-class _Values:
-    """Takes what a subscription brings."""
-
-    def __init__(self, source: OpcuaSource, signals: dict[Any, str]) -> None:
-        self._source, self._signals = source, signals
-
-    def datachange_notification(self, node: Any, value: Any, data: Any) -> None:
-        own = data.monitored_item.Value.SourceTimestamp
-        own_ns = None
+    def _take_value(self, signal: str, value: Any, told: Any) -> None:
+        """Take what a subscription brings of a signal."""
+        own, own_ns = told.SourceTimestamp, None
         if own is not None:
-            from datetime import timezone
-
             since = own.replace(tzinfo=own.tzinfo or timezone.utc)
             own_ns = round(since.timestamp() * 1e6) * 1000
-        signal, status = self._signals[node.nodeid], data.monitored_item.Value.StatusCode
-        if status is not None and not status.is_good():
-            self._source.refuse(signal, f'is {status.name}')
+        if told.StatusCode is not None and not told.StatusCode.is_good():
+            self.refuse(signal, f'is {told.StatusCode.name}')
             return
         try:
-            self._source.take(signal, float(value), own_ns)
+            self.take(signal, float(value), own_ns)
         except (TypeError, ValueError):
-            self._source.refuse(signal, f'is no number but {value!s:.60}')
+            self.refuse(signal, f'is no number but {value!s:.60}')
