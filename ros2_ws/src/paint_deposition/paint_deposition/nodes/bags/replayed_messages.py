@@ -124,13 +124,13 @@ class ReplayedTransforms:
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
-            self.topics, where = [], ''
+            self.topics, place = [], 'part_parent_frame and part_pose'
             if placed := read_frames(bag).placed('part'):
                 values = ', '.join(f'{value:.9g}' for value in placed[1].values)
-                where = f": '{placed[0]}' and [{values}]"
+                place = f"part_parent_frame: '{placed[0]}' and part_pose: [{values}]"
             node.get_logger().warning(
                 f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
-                f"replayed; set the simulator's part_parent_frame and part_pose{where}"
+                f'replayed; set {place} of the simulator'
             )
             return
         self._message = TFMessage
