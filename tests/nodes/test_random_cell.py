@@ -11,6 +11,7 @@ import itertools
 import os
 import socket
 import time
+from collections import Counter
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -29,7 +30,7 @@ from hypothesis.stateful import (
     run_state_machine_as_test,
 )
 from lifecycle_msgs.srv import ChangeState
-from paint_msgs.msg import AtomizerState
+from paint_msgs.msg import AtomizerState, PoseProgress
 from paint_msgs.srv import ChangePart
 from rcl_interfaces.srv import SetParameters
 from rclpy.qos import DurabilityPolicy, QoSProfile
@@ -57,8 +58,8 @@ SEED = os.environ.get('PAINT_SEED')
 STEPS_OF_A_CELL = min(60, STEPS)
 STEP_NS = 4_000_000
 SPEED_M_PER_S = 0.8
-# A killed recorder loses what came in the last half second.
-WRITTEN_S = 0.8
+# A killed recorder loses what came in the last half second; it reports five times a second.
+WRITTEN_REPORTS = 5
 POSES = {False: [], True: [0.1, 0.0, 0.05, 0.0, 0.0, np.sqrt(0.5), np.sqrt(0.5)]}
 BRUSHES = {1, 2}
 # The simulator and the page, and the recorder.
@@ -120,6 +121,10 @@ class Cell(RuleBasedStateMachine):
         }  # fmt: skip
         self.simulator = Simulator(context=self.context, parameter_overrides=parameters(**chosen))
         self.robot, self.operator = Robot(self.context), Onlooker(self.context, {})
+        self.reports: Counter[str] = Counter()
+        self.operator.create_subscription(
+            PoseProgress, 'atomizer/progress', lambda p: self.reports.update([p.reporter]), 100
+        )
         latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.robot.destroy_publisher(self.robot.state_publisher)
         self.robot.state_publisher = self.robot.create_publisher(
@@ -387,8 +392,8 @@ class Cell(RuleBasedStateMachine):
         run, of = self.folder / 'runs' / self.run, self.simulator.left
         of.stamps_ns = self.of_part
         # What was sent is with the recorder, and in its file.
-        until_s = time.monotonic() + WRITTEN_S
-        self.wait_until(lambda: time.monotonic() > until_s)
+        so_far = self.reports[RECORDER]
+        self.wait_until(lambda: self.reports[RECORDER] >= so_far + WRITTEN_REPORTS, what='reports')
         if signal == 'cycle':
             for label in ('deactivate', 'activate'):
                 request = ChangeState.Request()
