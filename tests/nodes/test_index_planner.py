@@ -84,7 +84,7 @@ def test_impossible_requests_say_why(planner, ask):
         assert not answer.success
         assert words in answer.message
         assert '\n' not in answer.message
-        assert node._status().level == DiagnosticStatus.WARN
+        assert node.status().level == DiagnosticStatus.WARN
 
 
 def test_model_can_be_exchanged_and_a_bad_one_is_refused(planner, ask, tmp_path):

@@ -92,7 +92,7 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
         )
         errors.append(viewer.newest('comparison/stats').rmse_um)
     before_any = viewer.decoded('comparison/stats', 0)
-    measured = node._readings.thickness_um
+    measured = node.readings.thickness_um
     assert before_any.rmse_um == pytest.approx(np.sqrt(np.mean(measured**2)))
     assert before_any.readings_painted == 0
     assert before_any.rmse_um > errors[0] > errors[1] > errors[2]
@@ -119,7 +119,7 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     offline = offline_um(node, MOTION, precision='double')
     found = node.residuals()
     assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
-    readings_um = node._readings.thickness_um
+    readings_um = node.readings.thickness_um
     assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
     answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
     assert answer.success
@@ -144,7 +144,7 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     mesh = viewer.newest('comparison/mesh')
     colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
     corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
-    places = node._readings.positions_m
+    places = node.readings.positions_m
     distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
     grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
     assert grey[distance > 0.0601].all()
@@ -160,10 +160,10 @@ def test_a_zero_is_warned_of_once_film_is_expected_there(
     x, y, z, _, *rest = table[1].split(',')
     readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))
     node = comparison()
-    assert node._status().level == OK
+    assert node.status().level == OK
     robot(node).send(MOTION)
-    wait_until(lambda: node._status().level == WARN, what='the warning')
-    assert '; 1 of 40 readings are 0 where the model expects' in node._status().message
+    wait_until(lambda: node.status().level == WARN, what='the warning')
+    assert '; 1 of 40 readings are 0 where the model expects' in node.status().message
 
 
 def test_bad_input_is_one_line(comparison):

@@ -97,7 +97,7 @@ def test_no_message_of_the_right_type_ends_a_node(
         wait_until(lambda: all(s.get_subscription_count() for s in signals), what='signals')
     if name == 'recorder':
         poses.publish(PoseStamped())
-        wait_until(lambda: len(node._topics) > 0, what='a recorded topic')
+        wait_until(lambda: len(node.recorded) > 0, what='a recorded topic')
     peer = Peer(peer_node)
     others = [made('web_view')] if name == 'recorder' else []
     peer.send([node, *others], rng)
@@ -109,7 +109,7 @@ def test_no_message_of_the_right_type_ends_a_node(
     until_s = time.monotonic() + 1.5  # diagnostics, statistics and all other timers
     wait_until(lambda: time.monotonic() > until_s)
     for _ in range(3):  # what timers and services show of it
-        node._diagnostics.publish() if hasattr(node, '_diagnostics') else None
+        node.diagnostics.publish() if hasattr(node, 'diagnostics') else None
     assert not node.finished.done(), node.finished.exception()
 
 

@@ -76,11 +76,11 @@ def test_what_is_sent_before_its_publisher_is_heard_is_counted(record, cell, wai
         send()
     wait_until(lambda: counts.get('/new/atomizer/pose', 0) >= 60, what='poses of both')
     recorder.close()
-    unheard = sent['new'] - counts['/new/atomizer/pose']
-    assert unheard >= 20
-    assert recorder._topics['/new/atomizer/pose'].losses == (
-        f'0 missed, {unheard} sent before the recorder heard their publisher'
+    before_discovery = sent['new'] - counts['/new/atomizer/pose']
+    assert before_discovery >= 20
+    assert recorder.recorded['/new/atomizer/pose'].losses == (
+        f'0 missed, {before_discovery} sent before the recorder heard their publisher'
     )
-    of_old = recorder._topics['/old/atomizer/pose'].unheard
+    of_old = recorder.recorded['/old/atomizer/pose'].before_discovery
     assert 0 < of_old < sent_before, 'by its rate, those since the recording began'
-    assert f'{unheard} of /new/atomizer/pose sent before the' in recorder.summary()
+    assert f'{before_discovery} of /new/atomizer/pose sent before the' in recorder.summary()

@@ -208,7 +208,7 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     for k in range(1, 10):
         robot.send_pose(START_NS + k, *place)
     robot.send_state(START_NS + 5, 0.5)
-    wait_until(lambda: recorder._leaving.counts.get('/atomizer/pose') == 10, what='late ones')
+    wait_until(lambda: recorder.leaving.counts.get('/atomizer/pose') == 10, what='late ones')
     wait_until(lambda: time.time_ns() > until_ns)
     robot.send_pose(START_NS + 10, *place)
     wait_until((tmp_path / 'run/metadata.yaml').is_file, what='the end of the first run')

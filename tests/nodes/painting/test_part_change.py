@@ -400,7 +400,7 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.
-    node.frame._topics.append(
+    node.frame.tf_topics.append(
         AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
     )
     source = robot(node)

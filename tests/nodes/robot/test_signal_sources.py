@@ -299,7 +299,7 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
 
     node = Twice(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     while node.connections < 3:
-        status = node._status()
+        status = node.status()
         assert 'after its own time' not in status.message
     node.destroy_node()
 

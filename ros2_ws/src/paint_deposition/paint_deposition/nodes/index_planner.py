@@ -92,7 +92,7 @@ class IndexPlanner(PaintNode):
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )  # fmt: skip
-        self._diagnostics = Diagnostics(self, {'index': self._status})
+        self.diagnostics = Diagnostics(self, {'index': self.status})
 
     def _load_files(self) -> None:
         self._model = model_from_parameters(self.values)
@@ -223,7 +223,7 @@ class IndexPlanner(PaintNode):
         if 'model_file' in names:
             self._model = self._next_model
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         values = {
             'model': self.values['model_file'] or 'a 50 mm bell',
             'effects': ' '.join(effect.id for effect in self._model.effects) or 'none',

@@ -79,7 +79,7 @@ class ModelComparison(PaintingNode):
         self.publish()
 
     def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return painting_tasks(self) | {'comparison': self._status}
+        return painting_tasks(self) | {'comparison': self.status}
 
     # --- the part and its readings
 
@@ -87,9 +87,9 @@ class ModelComparison(PaintingNode):
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
         self._is_read = False
-        self._readings = read_readings(self.values['measurements_file'])
-        self.get_logger().info(self._readings.understood)
-        self._noise = gauge_noise(self._readings)
+        self.readings = read_readings(self.values['measurements_file'])
+        self.get_logger().info(self.readings.understood)
+        self._noise = gauge_noise(self.readings)
 
     def _points_on(self, surface: Surface) -> SurfacePoints:
         return self._experiment.points
@@ -105,14 +105,14 @@ class ModelComparison(PaintingNode):
             self._experiment = self._experiment_on(surface)
         self._is_read = True
         super()._set_surface(surface)
-        for doubt in readings_in_doubt(surface, self._readings, np.zeros(len(self._readings))):
+        for doubt in readings_in_doubt(surface, self.readings, np.zeros(len(self.readings))):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
 
     def _experiment_on(self, surface: Surface) -> Experiment:
-        return Experiment.of('live', surface, SprayPath.empty(), self._readings)
+        return Experiment.of('live', surface, SprayPath.empty(), self.readings)
 
     def _spread_colours(self) -> None:
         at = slice(len(self._experiment))
@@ -125,7 +125,7 @@ class ModelComparison(PaintingNode):
         """The residuals of all readings, with the film of all poses received."""
         predicted = self.film.snapshot().gauge_um[: len(self._experiment)]
         at_readings = predicted[self._experiment.means.owner]
-        return Residuals(self._readings.thickness_um, at_readings, self._noise.sigma_um)
+        return Residuals(self.readings.thickness_um, at_readings, self._noise.sigma_um)
 
     # --- parameters
 
@@ -141,7 +141,7 @@ class ModelComparison(PaintingNode):
 
     @property
     def _scale(self) -> ColourScale:
-        thickest = float(np.abs(self._readings.thickness_um).max())
+        thickest = float(np.abs(self.readings.thickness_um).max())
         return residual_scale(np.array([0.25 * thickest]), self.values['color_max_um'])
 
     @property
@@ -170,7 +170,7 @@ class ModelComparison(PaintingNode):
         self._legend_publisher.publish(bar)
 
     def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
-        x, y, z = self._readings.positions_m[residuals.worst].tolist()
+        x, y, z = self.readings.positions_m[residuals.worst].tolist()
         return ComparisonStats(
             header=header(self.frame.frame_id, stamp_ns),
             model=self._model_name,
@@ -189,7 +189,7 @@ class ModelComparison(PaintingNode):
         """The comparison in one line."""
         self.catch_up()
         found = self.residuals()
-        x, y, z = self._readings.positions_m[found.worst]
+        x, y, z = self.readings.positions_m[found.worst]
         line = (
             f'{self._model_name}: {len(found)} readings, {found.painted.sum()} where '
             f'paint is predicted; residual {found.bias_um:+.2f} µm on average, rms '
@@ -197,12 +197,12 @@ class ModelComparison(PaintingNode):
             f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
             f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
         )
-        if doubt := zeros_in_doubt(self._readings, found.predicted_um):
+        if doubt := zeros_in_doubt(self.readings, found.predicted_um):
             line += f'; {doubt}'
         self.get_logger().info(line)
         return True, line
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         found = self.residuals()
         values = {
             'readings': self.values['measurements_file'],
@@ -211,6 +211,6 @@ class ModelComparison(PaintingNode):
             'noise known from': self._noise.source,
         }
         line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
-        if doubt := zeros_in_doubt(self._readings, found.predicted_um):
+        if doubt := zeros_in_doubt(self.readings, found.predicted_um):
             return Status(WARN, f'{line}; {doubt}', values)
         return Status(OK, line, values)

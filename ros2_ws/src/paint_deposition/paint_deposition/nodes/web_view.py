@@ -111,7 +111,7 @@ class WebView(PaintNode):
         # At 1 kHz fifty poses wait at most.
         self.create_steady_timer(0.05, self._take_motion)
         self.create_steady_timer(TRUST_PERIOD_S, self._show_trust)
-        self._diagnostics = Diagnostics(self, {'page': self._status})
+        self.diagnostics = Diagnostics(self, {'page': self.status})
 
     def _load_files(self) -> None:
         self.scene = Scene()
@@ -246,7 +246,7 @@ class WebView(PaintNode):
             # Without any state the gun is taken to spray, as the simulator does.
             self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         sent, now_s = self.page.bytes_sent, time.monotonic()
         rate = (sent - self._sent[0]) / max(now_s - self._sent[1], 1e-9)
         self._sent = sent, now_s

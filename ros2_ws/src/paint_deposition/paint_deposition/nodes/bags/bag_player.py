@@ -106,7 +106,7 @@ class BagPlayer(PaintNode):
         window = self.values['window']
         self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
         self.poses_published = self.states_published = 0
-        self._diagnostics = Diagnostics(self, {'replay': self._status})
+        self.diagnostics = Diagnostics(self, {'replay': self.status})
         self.start_thread(self._replay)
 
     def close(self) -> None:
@@ -157,7 +157,7 @@ class BagPlayer(PaintNode):
             return changes, 'resumed' if changes else 'not paused'
         return changes, 'paused' if changes else 'already paused'
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         if self._clock_publisher and self.count_publishers('/clock') > 1:
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return Status(WARN, f'{jumps}; set publish_clock to false for one of them')

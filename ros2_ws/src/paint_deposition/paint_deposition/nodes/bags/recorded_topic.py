@@ -91,7 +91,7 @@ RECORDER = dict(
 )
 # (topic, serialised message, log time [ns], time sent [ns])
 TakeMessage = Callable[[str, bytes, int, int], None]
-UNHEARD = 'sent before the recorder heard their publisher'
+MISSED_BEFORE_DISCOVERY = 'sent before the recorder heard their publisher'
 
 
 def default_topics(guns: Sequence[str]) -> list[str]:
@@ -119,7 +119,7 @@ def unused_name(folder: Path, run: str) -> str:
     return next(name for name in names if not (folder / name).exists())
 
 
-class Beginning:
+class FirstMessage:
     """How a publisher was first heard: the number of its message, and after how long [ns]."""
 
     def __init__(self, number: int, sent_ns: int, waited_ns: int) -> None:
@@ -132,7 +132,7 @@ class Beginning:
             self._period_ns = (sent_ns - self._sent_ns) / (number - self._number)
 
     @property
-    def unheard(self) -> int:
+    def before_discovery(self) -> int:
         """Messages sent before the first one, but not those from before the recording."""
         sent_meanwhile = max(self._waited_ns, 0) / max(self._period_ns, 1.0)
         return int(min(self._number - 1, sent_meanwhile))
@@ -177,7 +177,7 @@ class RecordedTopic:
         self._lost_before = self._sequence.lost
         self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
-        self._beginnings: dict[bytes, Beginning] = {}
+        self._first_messages: dict[bytes, FirstMessage] = {}
 
     @property
     def missed(self) -> int:
@@ -185,16 +185,17 @@ class RecordedTopic:
         return self._sequence.lost - self._lost_before
 
     @property
-    def unheard(self) -> int:
+    def before_discovery(self) -> int:
         """Messages sent while this was recording, before the first one of their publisher."""
-        return sum(beginning.unheard for beginning in self._beginnings.values())
+        return sum(first.before_discovery for first in self._first_messages.values())
 
     @property
     def losses(self) -> str:
         """The number of lost messages, as text."""
         if self.unnumbered:
             return 'losses cannot be counted'
-        before = f', {self.unheard} {UNHEARD}' if self.unheard else ''
+        first = self.before_discovery
+        before = f', {first} {MISSED_BEFORE_DISCOVERY}' if first else ''
         return f'{self.missed} missed{before}'
 
     def subscribe(self, depth: int) -> None:
@@ -234,11 +235,11 @@ class RecordedTopic:
             self.unnumbered += 1
             return
         gid, sent_ns = gid['data'], info['source_timestamp']
-        if self._sequence.take(gid, number) and len(self._beginnings) < MOST_PUBLISHERS:
+        if self._sequence.take(gid, number) and len(self._first_messages) < MOST_PUBLISHERS:
             waited_ns = info['received_timestamp'] - self._begun_ns
-            self._beginnings[gid] = Beginning(number, sent_ns, waited_ns)
-        if gid in self._beginnings:
-            self._beginnings[gid].add(number, sent_ns)
+            self._first_messages[gid] = FirstMessage(number, sent_ns, waited_ns)
+        if gid in self._first_messages:
+            self._first_messages[gid].add(number, sent_ns)
 
     def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
         gap_ns = stamp_ns - self.newest_stamp_ns

@@ -19,12 +19,12 @@ from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.bags.recorded_topic import (
+    MISSED_BEFORE_DISCOVERY,
     PARAMETER_EVENTS,
     PART_POSE,
     POSES,
     RECORDER,
     STATES,
-    UNHEARD,
     RecordedTopic,
     bag_qos,
     default_topics,
@@ -76,7 +76,7 @@ class RunRecorder(ManagedNode):
         # Also while no run is recorded, since they stay in force.
         self._motion = {*motion, *motion.values()}
         self._always_heard = {PARAMETER_EVENTS, *motion.values()}
-        self._topics: dict[str, RecordedTopic] = {}
+        self.recorded: dict[str, RecordedTopic] = {}
         self._error: RecordingError | None = None
         self._progress = {
             self.resolve_topic_name(gun_topic(gun, POSES)): self.create_publisher(
@@ -96,7 +96,7 @@ class RunRecorder(ManagedNode):
         self._refused: set[str] = set()
         # The run of the part that has left, while poses of it may come; until when, and when the
         # last of them was sent. Poses that came even later.
-        self._leaving: RunWriter | None = None
+        self.leaving: RunWriter | None = None
         self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
         # Poses of these topics have not come since it left.
         self._behind: set[str] = set()
@@ -123,7 +123,7 @@ class RunRecorder(ManagedNode):
         return RunWriter(folder, custom_data, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
-        for run in (self.run, self._leaving) if self.runs else ():
+        for run in (self.run, self.leaving) if self.runs else ():
             if run is not None and not run.complete:
                 run.abandon()
         super().destroy_node()
@@ -148,14 +148,14 @@ class RunRecorder(ManagedNode):
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
         is_pose = types[0] == POSE_TYPE
         depth = 5000 if is_pose or name == TF else 100
-        topic = self._topics.get(name)
+        topic = self.recorded.get(name)
         if topic is None:
             max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
             offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
             run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
             topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
             self._guarded(self.run.add_topic, run_topic)
-            self._topics[name] = topic
+            self.recorded[name] = topic
         topic.subscribe(depth)
 
     # --- writing
@@ -170,29 +170,29 @@ class RunRecorder(ManagedNode):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
             if name in self._progress:
                 return
-        elif self._leaving is not None and name in self._behind:
+        elif self.leaving is not None and name in self._behind:
             self._behind.discard(name)
             self._leave_soon()
-        elif self._leaving is not None and name == TF in self._leaving.counts:
-            self._guarded(self._leaving.write, name, cdr, log_time_ns, sent_ns)
+        elif self.leaving is not None and name == TF in self.leaving.counts:
+            self._guarded(self.leaving.write, name, cdr, log_time_ns, sent_ns)
         for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
             self._guarded(self.run.write, *first[:4])
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
-        if name in self._progress and self._topics[name].messages % 50 == 0:
+        if name in self._progress and self.recorded[name].messages % 50 == 0:
             self._report_progress()
 
     def _write_late(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
         """Write what was sent for the part that has left into its run, before what was not."""
         if name in self._progress:
             self._initial_messages.add_late(name, cdr, sent_ns)
-        if self._leaving is None:
+        if self.leaving is None:
             self._too_late += 1
             return
-        if name not in self._leaving.counts:
-            self._leaving.add_topic(self._topics[name].run_topic)
+        if name not in self.leaving.counts:
+            self.leaving.add_topic(self.recorded[name].run_topic)
         before_ns = self._initial_messages.begin_ns - 1
-        self._leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
-        self._leaving.keep_another(name)
+        self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
+        self.leaving.keep_another(name)
         self._leaves_s = time.monotonic() + LATE_S
 
     def _leave_soon(self) -> None:
@@ -201,7 +201,7 @@ class RunRecorder(ManagedNode):
 
     def _end_of_leaving(self) -> None:
         """Complete the run of the part that has left."""
-        leaving, self._leaving = self._leaving, None
+        leaving, self.leaving = self.leaving, None
         if leaving is not None:
             leaving.finish()
             self.get_logger().info(_summary(leaving, self._lost_of_leaving))
@@ -218,13 +218,13 @@ class RunRecorder(ManagedNode):
             name = unused_name(self._folder, part.run or self._own_name)
             new_run = self._create_run(name, part_data(part, self.values['model_file']))
             self._end_of_leaving()
-            for recorded in self._topics.values():
+            for recorded in self.recorded.values():
                 if recorded.name != self._part_topic:
                     recorded.drain()
             # Some messages were sent for this part, and are in the run before, too.
             self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
             self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
-            self._leaving, self._lost_of_leaving = self.run, self._losses
+            self.leaving, self._lost_of_leaving = self.run, self._losses
             self._leaves_s = time.monotonic() + LATE_S
             self._behind = {name for name in self._progress if self.run.counts.get(name)}
             self._behind -= early.keys()
@@ -239,7 +239,7 @@ class RunRecorder(ManagedNode):
     def _begin_run(self, run: RunWriter, log_time_ns: int) -> None:
         """Begin with what is in force."""
         self.run, self._begun_ns = run, time.time_ns()
-        for topic in self._topics.values():
+        for topic in self.recorded.values():
             topic.reset_counts(self._begun_ns)
             run.add_topic(topic.run_topic)
         for message in self._initial_messages.begin_run(log_time_ns):
@@ -261,8 +261,8 @@ class RunRecorder(ManagedNode):
 
     def _report_progress(self) -> None:
         reporter = self.get_fully_qualified_name()
-        for name in self._progress.keys() & self._topics.keys():
-            topic = self._topics[name]
+        for name in self._progress.keys() & self.recorded.keys():
+            topic = self.recorded[name]
             report = PoseProgress(reporter=reporter, poses_received=topic.messages)
             report.header = header('', topic.newest_stamp_ns)
             self._progress[name].publish(report)
@@ -279,7 +279,7 @@ class RunRecorder(ManagedNode):
         return self.run.complete, self.summary()
 
     def _deactivate(self) -> None:
-        for topic in self._topics.values():
+        for topic in self.recorded.values():
             if topic.name in self._always_heard:
                 topic.drain()
             else:
@@ -290,7 +290,7 @@ class RunRecorder(ManagedNode):
         self._guarded(self._end_of_leaving)
         self._guarded(self.run.finish)
         self.get_logger().info(self.summary())
-        never = [name for name in self._wanted if name not in self._topics]
+        never = [name for name in self._wanted if name not in self.recorded]
         if never and self.values['topics']:
             self.get_logger().warning(f'never published: {" ".join(never)}')
 
@@ -300,11 +300,11 @@ class RunRecorder(ManagedNode):
 
     @property
     def _losses(self) -> str:
-        topics = self._topics.values()
+        topics = self.recorded.values()
         missed = sum(topic.missed for topic in topics)
         lost = f', {missed} missed' if missed else ''
-        unheard = [f'{topic.unheard} of {topic.name}' for topic in topics if topic.unheard]
-        lost += f', {" and ".join(unheard)} {UNHEARD}' if unheard else ''
+        first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
+        lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
         if any(topic.unnumbered for topic in topics):
             lost += ' (losses cannot be counted: this middleware does not number messages)'
         if self._too_late:
@@ -312,9 +312,9 @@ class RunRecorder(ManagedNode):
         return f'{lost}, {sum(topic.gaps for topic in topics)} gaps'
 
     def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return {'recording': self._status}
+        return {'recording': self.status}
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         if not self.active and self._error is None:
             return Status(OK, f'inactive; {self.summary()}' if self.runs else 'inactive')
         try:
@@ -324,7 +324,7 @@ class RunRecorder(ManagedNode):
             if self._error is None:
                 self._record_failure(RecordingError(reason))
             return Status(ERROR, reason)
-        topics = self._topics.values()
+        topics = self.recorded.values()
         counts, unnumbered = Counter(self.run.counts), sum(t.unnumbered for t in topics)
         values = {
             'run': self.run.folder,

@@ -4,6 +4,7 @@ import math
 import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -80,7 +81,7 @@ class AtomizerInput:
         self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
-        self._early: tuple[int, int] | None = None
+        self._state_ahead: tuple[int, int] | None = None
         self._flushed_s = -math.inf
         # What was taken from the queues, and when it was sent.
         self._new_poses: list[tuple[PoseStamped, int]] = []
@@ -90,18 +91,12 @@ class AtomizerInput:
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
-        depth = node.values['pose_queue_depth']
-
-        def subscribe(kind: type, topic: str, new: list, latched: bool) -> AdaptiveSubscription:
-            def note(message: Any, info: Mapping[str, Any]) -> None:
-                new.append((message, info['source_timestamp']))
-
-            return AdaptiveSubscription(node, kind, topic, note, depth=depth, latched=latched)
-
-        # A latched state from before the node started is still in effect.
+        subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
+        poses, states = (partial(self._note, new) for new in (self._new_poses, self._new_states))
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, self._new_poses, False),
-            subscribe(AtomizerState, self._state_topic, self._new_states, True),
+            subscribe(PoseStamped, self._pose_topic, poses),
+            # A latched state from before the node started is still in effect.
+            subscribe(AtomizerState, self._state_topic, states, latched=True),
         ]
         self.reset_counts()
         self._progress = node.create_publisher(
@@ -240,6 +235,9 @@ class AtomizerInput:
             )
         self._on_poses(batch)
 
+    def _note(self, new: list[tuple[Any, int]], message: Any, info: Mapping[str, Any]) -> None:
+        new.append((message, info['source_timestamp']))
+
     # --- poses
 
     def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
@@ -247,10 +245,10 @@ class AtomizerInput:
         if len(message.header.frame_id) > LONGEST_NAME:
             message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
         self._newest, self.sent_ns = message, sent_ns
-        if self._early and sent_ns > self._early[1]:
-            if self._early[0] - stamp_ns(message.header) > AHEAD_NS:
+        if self._state_ahead and sent_ns > self._state_ahead[1]:
+            if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
                 self.anomalies[AHEAD] += 1
-            self._early = None
+            self._state_ahead = None
         self.pose_s = time.monotonic()
         self._process(message, sent_ns)
         if self.poses_received % POSES_PER_BATCH == 0:
@@ -285,7 +283,7 @@ class AtomizerInput:
         state_ns = stamp_ns(message.header)
         # Before its poses after a pause, too: the next pose tells.
         if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
-            self._early = state_ns, sent_ns
+            self._state_ahead = state_ns, sent_ns
         self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:

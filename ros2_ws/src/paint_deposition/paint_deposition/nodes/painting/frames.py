@@ -38,20 +38,20 @@ class PartFrame:
         self._publisher: Publisher | None = None
         self._tree = FrameTree(live=True)
         # None where the messages of tf are not installed.
-        self._topics: list[AdaptiveSubscription] = []
+        self.tf_topics: list[AdaptiveSubscription] = []
         with contextlib.suppress(ImportError):
             from tf2_msgs.msg import TFMessage
 
             # Deep queues that are emptied before poses are judged: a busy node has its transforms.
             subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=5000)
-            self._topics = [
+            self.tf_topics = [
                 subscribe('/tf_static', self._take_static, latched=True),
                 subscribe('/tf', self._take),
             ]
 
     def take_pending(self) -> None:
         """Take the transforms in the queues."""
-        for topic in self._topics:
+        for topic in self.tf_topics:
             topic.take_pending()
 
     def _take_static(self, message: Any, _info: Any) -> None:
@@ -101,7 +101,7 @@ class PartFrame:
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
             remedy = CLOCK_REMEDY if is_connected else FRAME_REMEDY
-            may_come = missing.may_come and bool(self._topics)
+            may_come = missing.may_come and bool(self.tf_topics)
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
 
 

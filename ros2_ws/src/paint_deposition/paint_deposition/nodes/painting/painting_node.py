@@ -68,7 +68,7 @@ class PaintingNode(ManagedNode, ABC):
         self._shown = None
         self.create_trigger_service('~/reset', self.reset)
         self.create_steady_timer(0.1, self._update)
-        self._show_timer = self._new_show_timer()
+        self.show_timer = self._new_show_timer()
 
     def _activate(self) -> None:
         self.release()
@@ -224,8 +224,8 @@ class PaintingNode(ManagedNode, ABC):
         if names & {*MODEL_PARAMETERS, 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
-            self.destroy_timer(self._show_timer)
-            self._show_timer = self._new_show_timer()
+            self.destroy_timer(self.show_timer)
+            self.show_timer = self._new_show_timer()
         self._shown = None
 
     def _new_show_timer(self) -> Timer:

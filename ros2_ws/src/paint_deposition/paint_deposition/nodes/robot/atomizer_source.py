@@ -115,7 +115,7 @@ class AtomizerSource(PaintNode):
         }
         self._values: dict[str, float] = {}
         self._published = ''
-        self._poses = 0
+        self.poses_published = 0
         self._clock_offset_s = 0.0
         self._motion = self._create_motion()
         self._problems: dict[str, str] = {}  # by topic
@@ -170,7 +170,7 @@ class AtomizerSource(PaintNode):
             self._compare_clocks(stamp, sent_ns)
         pose = pose_message(self._motion.base, stamp, (tip @ self._tcp).values)
         self._pose_publisher.publish(pose)
-        self._poses += 1
+        self.poses_published += 1
 
     def _compare_clocks(self, stamp: int, sent_ns: int) -> None:
         self._clock_offset_s = (sent_ns - stamp) * 1e-9
@@ -246,7 +246,7 @@ class AtomizerSource(PaintNode):
     def _robot_status(self) -> Status:
         found = self._motion.status()
         poses = f"of '{self._motion.tip}' in '{self._motion.base}'"
-        values = {'poses': poses, 'published': self._poses, **found.values}
+        values = {'poses': poses, 'published': self.poses_published, **found.values}
         return Status(found.level, found.message, values)
 
     def _signals_status(self) -> Status:

@@ -228,7 +228,7 @@ class EgmSource(PaintNode):
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s = time.monotonic()
-        Diagnostics(self, {'robot': self._status})
+        Diagnostics(self, {'robot': self.status})
         self.start_thread(self._listen)
 
     def _validate(self, values: Any) -> None:
@@ -287,7 +287,7 @@ class EgmSource(PaintNode):
             at, joints = header(frame_id, stamp), [*names, *external]
             self._joints.publish(JointState(header=at, name=joints, position=positions))
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         stream, values = self.stream, self.values
         own = 'not sent' if stream.own_lag_ns is None else f'{1e-6 * stream.own_lag_ns:.1f}'
         figures = {

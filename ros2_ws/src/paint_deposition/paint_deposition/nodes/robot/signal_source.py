@@ -111,7 +111,7 @@ class SignalSource(PaintNode):
         self._lags_s: deque[float] = deque(maxlen=REMEMBERED)
         self._starts = StartsOfMotion()
         self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
-        Diagnostics(self, {'signals': self._status})
+        Diagnostics(self, {'signals': self.status})
         self.start_thread(self._keep_following)
 
     def _validate(self, values: Mapping[str, Any]) -> None:
@@ -191,7 +191,7 @@ class SignalSource(PaintNode):
         with self._lock:
             self._starts.add_pose(stamp_ns(pose.header), pose_of(pose.pose)[0])
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         with self._lock:
             return self._status_now()
 
