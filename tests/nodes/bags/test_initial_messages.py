@@ -72,3 +72,15 @@ def test_a_latched_state_that_comes_before_older_ones_stays_for_the_next_run():
     memory.begin_run(11 * S)
     (first,) = send(POSE, 11, 11)
     assert deserialize_message(first.cdr, AtomizerState).spraying is False
+
+
+def test_of_two_states_with_one_stamp_the_one_sent_later_holds_whichever_comes_first():
+    memory = InitialMessages({POSE: STATE}, '/part_pose')
+    memory.begin_run(1)
+    for sent_s, flow in ((2, 0.0), (1, 1.0)):
+        state = AtomizerState(header=header('', START_NS), spraying=flow > 0.0, flow=flow)
+        memory.add(STATE, serialize_message(state), sent_s * S, sent_s * S)
+    memory.begin_run(3)
+    pose = serialize_message(PoseStamped(header=header('', START_NS + S)))
+    first = memory.add(POSE, pose, 3 * S, 3 * S)
+    assert [deserialize_message(m.cdr, AtomizerState).flow for m in first] == [1.0, 0.0]

@@ -4,6 +4,7 @@ import math
 from bisect import bisect_right
 from collections import deque
 from collections.abc import Mapping
+from operator import attrgetter
 from typing import NamedTuple
 
 from geometry_msgs.msg import TransformStamped
@@ -151,7 +152,9 @@ class InitialMessages:
         return [m._replace(log_time_ns=self.begin_ns) for m in lasting] + states + early
 
     def _remember_state(self, state: Recorded) -> None:
-        """In the order of the stamps, as a film has them; all anew where a stream restarted."""
+        """By stamp, and of one stamp in the order in which they were sent, as a film has them; all
+        anew where a stream restarted.
+        """
         states = self._motion[state.topic]
         # Before any pose the states themselves tell, which are latched from before the recorder.
         newest_ns = states[-1].stamp_ns if states else state.stamp_ns
@@ -161,8 +164,8 @@ class InitialMessages:
                 self._reached_ns[state.topic] = state.stamp_ns
         if len(states) == REMEMBERED_MESSAGES:
             states.popleft()
-        row = bisect_right(states, state.stamp_ns, key=lambda other: other.stamp_ns)
-        states.insert(row, state)
+        order = attrgetter('stamp_ns', 'sent_ns')
+        states.insert(bisect_right(states, order(state), key=order), state)
 
     def _replace(self, key: object, message: Recorded) -> None:
         self._lasting.pop(key, None)

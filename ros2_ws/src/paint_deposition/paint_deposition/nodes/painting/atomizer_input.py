@@ -5,6 +5,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -196,7 +197,8 @@ class AtomizerInput:
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
-        poses, states = [*self._new_poses], deque(self._new_states)
+        # Latched states may come behind others that were sent later.
+        poses, states = [*self._new_poses], deque(sorted(self._new_states, key=itemgetter(1)))
         self._new_poses.clear()
         self._new_states.clear()
         for pose, sent_ns in poses:

@@ -154,8 +154,11 @@ class AdaptiveSubscription:
     def _on_message(self, heard_by: Quality, message: Any, info: Mapping[str, Any]) -> None:
         publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
         offered = self._offered.get(publisher, heard_by)
-        if offered != heard_by and time.monotonic() - self._made_s[offered] > OVERLAP_S:
-            return  # in its order it comes by the subscription of its own
+        own_made_s = self._made_s[offered]
+        # The subscription of its own keeps its order; what is latched comes by that one later.
+        is_latched = offered[1] != USUAL[1] and own_made_s <= self._made_s[heard_by]
+        if offered != heard_by and (is_latched or time.monotonic() - own_made_s > OVERLAP_S):
+            return
         # Some middleware does not number messages.
         self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
         # Publisher and time identify a message.
