@@ -45,7 +45,7 @@ from paint_deposition.report.live.scene import Scene
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 # The simulator speaks twice a second [s].
-TRUST_PERIOD_S, SILENT_S = 0.5, 2.0
+SILENT_S = 2.0
 
 
 WEB_VIEW = dict(
@@ -110,7 +110,7 @@ class WebView(PaintNode):
         ]  # fmt: skip
         # At 1 kHz fifty poses wait at most.
         self.create_steady_timer(0.05, self._take_motion)
-        self.create_steady_timer(TRUST_PERIOD_S, self._show_trust)
+        self.create_steady_timer(0.5, self._show_trust)
         self.diagnostics = Diagnostics(self, {'page': self.status})
 
     def _load_files(self) -> None:

@@ -21,8 +21,7 @@ from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
 # Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.
 REMEMBERED_MESSAGES = 20_000
-# Transforms last in tf2 for so long.
-TF, REMEMBERED_TF_NS = '/tf', 10_000_000_000
+TF = '/tf'
 CLOSED = -1
 
 
@@ -92,7 +91,7 @@ class InitialMessages:
             self._placed.append(message)
         elif topic == TF:
             self._transforms.append(message)
-            while self._transforms[0].sent_ns < sent_ns - REMEMBERED_TF_NS:
+            while self._transforms[0].sent_ns < sent_ns - 10_000_000_000:  # as in tf2
                 self._transforms.popleft()
         elif topic == PARAMETER_EVENTS:
             event = deserialize_message(cdr, ParameterEvent)

@@ -42,9 +42,8 @@ from paint_deposition.nodes.runtime.topics import (
     gun_topic,
 )
 
-# The run of a part that has left takes poses that were sent for it until none has come so long, or
-# so long after each gun's first pose for the next part: a publisher keeps the order.
-LATE_S, FOLLOWED_S = 2.0, 0.3
+# The run of a part that has left takes poses that were sent for it until none has come so long.
+LATE_S = 2.0
 
 
 class RunRecorder(ManagedNode):
@@ -197,7 +196,8 @@ class RunRecorder(ManagedNode):
 
     def _leave_soon(self) -> None:
         if not self._behind:
-            self._leaves_s = min(self._leaves_s, time.monotonic() + FOLLOWED_S)
+            # A publisher keeps the order: after its first pose for the next part none comes.
+            self._leaves_s = min(self._leaves_s, time.monotonic() + 0.3)
 
     def _end_of_leaving(self) -> None:
         """Complete the run of the part that has left."""

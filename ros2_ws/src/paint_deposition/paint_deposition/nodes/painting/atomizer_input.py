@@ -24,14 +24,12 @@ from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
 POSES_PER_BATCH = 50
-PROGRESS_PERIOD_S = 0.2
 # No robot announces a state so long before the pose at which it holds.
 AHEAD_NS = 1_000_000_000
 AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
 # Of what a peer names: so many different ones are told apart, and so many characters of each.
 MOST_NAMES, LONGEST_NAME = 20, 200
 OTHERS, STATES_REFUSED = 'others', 'states refused'
-NOT_HELD = 'messages dropped, since too many waited for the part'
 NO_FLOW = 'states that spray with flow 0'
 
 
@@ -105,7 +103,7 @@ class AtomizerInput:
         )
         # Polled: waking up for each pose would cost more than painting it.
         node.create_steady_timer(0.02, self._take)
-        node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
+        node.create_steady_timer(0.2, self._report_progress)
 
     @property
     def poses_refused(self) -> int:
@@ -179,7 +177,7 @@ class AtomizerInput:
             if len(self._held) < 2_000_000:
                 self._held.append(message)
             else:
-                self.anomalies[NOT_HELD] += 1
+                self.anomalies['messages dropped, since too many waited for the part'] += 1
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:

@@ -17,8 +17,6 @@ from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
-FRAME_REMEDY = 'set part_pose and part_parent_frame, or frame_id'
-CLOCK_REMEDY = 'publish tf without gaps and by the clock of the poses'
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
@@ -100,7 +98,9 @@ class PartFrame:
             return self._tree.lookup(frame_id, self.frame_id, stamp_ns)
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
-            remedy = CLOCK_REMEDY if is_connected else FRAME_REMEDY
+            remedy = 'set part_pose and part_parent_frame, or frame_id'
+            if is_connected:
+                remedy = 'publish tf without gaps and by the clock of the poses'
             may_come = missing.may_come and bool(self.tf_topics)
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
 

@@ -37,8 +37,6 @@ COUNT_LABELS = {
     'not_unit_quaternions': 'quaternions not of unit length',
     'late_triggers': 'late states',
 }
-# A recorder that reports so much older a pose, or nothing for so long, is behind.
-BEHIND_NS, QUIET_S = 2_000_000_000, 3.0
 
 
 def poses_status(node: PaintingNode, number: int) -> Status:
@@ -217,9 +215,9 @@ class FilmTrust:
         for name, (newest_ns, heard_s) in reports.items():
             if name not in there:  # it has ended
                 del self._reports[source.name, name]
-            elif time.monotonic() - heard_s > QUIET_S:
+            elif time.monotonic() - heard_s > 3.0:
                 doubts.append(f'{name} has stalled')
-            elif source.newest_ns - newest_ns > BEHIND_NS:
+            elif source.newest_ns - newest_ns > 2_000_000_000:
                 doubts.append(f'{name} is {1e-9 * (source.newest_ns - newest_ns):.0f} s behind')
         return doubts
 

@@ -38,10 +38,6 @@ from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
-# For so long a change, and a reset, wait for a subscriber of the part that has stalled.
-HEARD_S, RESET_HEARD_S = 3.0, 1.0
-# Films that cannot be saved are kept, so many at most, and saved again after so long.
-MOST_UNSAVED, SAVE_AGAIN_S = 4, 10.0
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
 Version = tuple[str, int | None, int | None]
 
@@ -89,10 +85,10 @@ class PartChange:
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
         self._gap_s = 0.0
-        # Films of former parts that are not on disk yet, and why.
+        # Films of former parts that are not on disk yet, four at most, and why.
         self._unsaved: list[Callable[[], list[Path]]] = []
         self._save_error = ''
-        node.create_steady_timer(SAVE_AGAIN_S, self._save_again)
+        node.create_steady_timer(10.0, self._save_again)
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
@@ -151,7 +147,7 @@ class PartChange:
         node = self._node
         if self.waiting:
             raise PaintError('another change of the part is under way: call again after it')
-        if len(self._unsaved) >= MOST_UNSAVED:
+        if len(self._unsaved) >= 4:
             raise PaintError(f'{self._save_error}; the part stays until they are saved')
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
@@ -219,11 +215,11 @@ class PartChange:
             node.hold(last_sent_ns)
             await self._settled()
         node.hold()
-        # So do those that wait for their transform, which comes or is given up.
+        # Poses that wait for their transform belong to the former part, too: it comes or is given up.
         while any(len(source.tf_queue) for source in node.inputs):
             await self._settled()
         # The message of the part is latched, and the next one takes its place.
-        heard_s = time.monotonic() + HEARD_S
+        heard_s = time.monotonic() + 3.0
         while not self._is_heard() and time.monotonic() < heard_s:
             await self._settled()
         node.catch_up()
@@ -317,7 +313,7 @@ class PartChange:
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
         self.part.last_sent_ns = self._last_sent_ns
-        self._is_heard(RESET_HEARD_S)
+        self._is_heard(within_s=1.0)
         self._publish(self._newest_ns(), ())
 
     def _is_heard(self, within_s: float = 0.0) -> bool:

@@ -9,8 +9,6 @@ from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.surface import Surface
 
-# After so many poses that point at the part, or so many in all, a gun's poses have decided.
-POSES_FACING = 50
 POSES_CONSIDERED = 2000
 
 
@@ -109,7 +107,8 @@ class OutwardSide:
             positions, axes = poses.finite_axes()
             seen = facing(surface, positions, axes)
             pointing = seen.front + seen.back
-            decided = pointing >= POSES_FACING or len(poses) >= POSES_CONSIDERED
+            # So many that point at the part, or so many in all, have decided.
+            decided = pointing >= 50 or len(poses) >= POSES_CONSIDERED
             if decided:
                 self._undecided.remove(number)
             if pointing:

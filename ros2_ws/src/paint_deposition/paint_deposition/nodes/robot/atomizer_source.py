@@ -32,7 +32,6 @@ from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscripti
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-DISCOVERY_PERIOD_S = 0.1
 POSES = 'atomizer/pose'
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # What a signal must be, where not every number will do.
@@ -120,7 +119,7 @@ class AtomizerSource(PaintNode):
         self._motion = self._create_motion()
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
-        self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
+        self.create_steady_timer(0.1, self._discover_topics)
         Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
 
     def _validate(self, values: Mapping[str, Any]) -> None:

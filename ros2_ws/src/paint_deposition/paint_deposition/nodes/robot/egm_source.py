@@ -35,8 +35,6 @@ MESSAGES = {
 }  # fmt: skip
 # The clock of the controller drifts: only so many packets say what the fastest way takes.
 REMEMBERED = 2500
-# A robot that has sent nothing for so long leaves the port to another [ns].
-SILENT_NS = 2_000_000_000
 SILENT_S = 2.0
 POLL_S = 0.2
 
@@ -124,7 +122,8 @@ class EgmStream:
             self.invalid += 1
             return None
         if sender != self.sender:
-            if self.sender and arrived_ns - self._heard_ns < SILENT_NS:
+            # Silent for so long, it leaves the port to another.
+            if self.sender and arrived_ns - self._heard_ns < 2_000_000_000:
                 self.other, self.other_ns = sender, arrived_ns
                 return None
             self.sender, self._newest = sender, None

@@ -27,9 +27,6 @@ FIELDS = {
     'flow': ('flow_cm3_per_min', 'cm3/min'), 'bell_speed': ('bell_speed_rpm', '1/min'),
     'shaping_air': ('shaping_air_l_per_min', 'l/min'), 'voltage': ('voltage_kv', 'kV'),
 }  # fmt: skip
-# The gun stands and goes [m/s]; the opening of the gun belongs to a start that is so near [s].
-STANDS_M_PER_S, GOES_M_PER_S = 0.005, 0.02
-NEAR_S = 2.0
 REMEMBERED = 50
 
 SIGNALS = {
@@ -67,9 +64,9 @@ class StartsOfMotion:
         """Take a pose."""
         self._speed.add(np.array([stamp]), position_m[np.newaxis])
         speed = self._speed.m_per_s
-        if speed < STANDS_M_PER_S:
+        if speed < 0.005:
             self._stood, self._rest_ns = True, stamp
-        elif self._stood and speed > GOES_M_PER_S:
+        elif self._stood and speed > 0.02:
             self._stood = False
             self._starts.append(self._rest_ns)
 
@@ -82,7 +79,8 @@ class StartsOfMotion:
         starts = np.array(self._starts)
         apart = [1e-9 * (at - starts) for at in self._opened if len(starts)]
         nearest = [float(each[np.argmin(np.abs(each))]) for each in apart]
-        near = [each for each in nearest if abs(each) < NEAR_S]
+        # The opening of the gun belongs to a start that is so near [s].
+        near = [each for each in nearest if abs(each) < 2.0]
         return (float(np.median(near)) if near else math.nan), len(near)
 
 
