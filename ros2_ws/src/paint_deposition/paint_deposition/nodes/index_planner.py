@@ -25,7 +25,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
 )
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header, pose_message
-from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     direction_parameter,
@@ -92,7 +92,7 @@ class IndexPlanner(PaintNode):
             callback_group=ReentrantCallbackGroup(),
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )  # fmt: skip
-        self.diagnostics = Diagnostics(self, {'index': self.status})
+        self.report({'index': self.status})
 
     def _load_files(self) -> None:
         self._model = model_from_parameters(self.values)

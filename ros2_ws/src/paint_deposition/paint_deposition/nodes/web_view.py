@@ -29,7 +29,7 @@ from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizers_parameter,
@@ -111,7 +111,7 @@ class WebView(PaintNode):
         # At 1 kHz fifty poses wait at most.
         self.create_steady_timer(0.05, self._take_motion)
         self.create_steady_timer(0.5, self._show_trust)
-        self.diagnostics = Diagnostics(self, {'page': self.status})
+        self.report({'page': self.status})
 
     def _load_files(self) -> None:
         self.scene = Scene()

@@ -28,7 +28,7 @@ from paint_deposition.nodes.bags.replayed_messages import (
     replay_messages,
 )
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
 PLAYER = fixed_while_running(
@@ -106,7 +106,7 @@ class BagPlayer(PaintNode):
         window = self.values['window']
         self._flow_control = FlowControl(self, self._pose_publisher, window, self.stopped)
         self.poses_published = self.states_published = 0
-        self.diagnostics = Diagnostics(self, {'replay': self.status})
+        self.report({'replay': self.status})
         self.start_thread(self._replay)
 
     def close(self) -> None:

@@ -215,7 +215,7 @@ class PartChange:
             node.hold(last_sent_ns)
             await self._settled()
         node.hold()
-        # Poses that wait for their transform belong to the former part, too: it comes or is given up.
+        # Poses that wait for their transform are of the former part; it comes, or is given up.
         while any(len(source.tf_queue) for source in node.inputs):
             await self._settled()
         # The message of the part is latched, and the next one takes its place.

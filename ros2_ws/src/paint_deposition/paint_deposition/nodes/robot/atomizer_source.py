@@ -26,7 +26,7 @@ from paint_deposition.nodes.robot.robot_poses import (
     TfPoses,
 )
 from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
 
@@ -120,7 +120,7 @@ class AtomizerSource(PaintNode):
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
         self.create_steady_timer(0.1, self._discover_topics)
-        Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
+        self.report({'robot': self._robot_status, 'signals': self._signals_status})
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):

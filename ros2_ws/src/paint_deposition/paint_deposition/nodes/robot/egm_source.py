@@ -14,7 +14,7 @@ from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.messages import header, pose_message
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH
 
@@ -227,7 +227,7 @@ class EgmSource(PaintNode):
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s = time.monotonic()
-        Diagnostics(self, {'robot': self.status})
+        self.report({'robot': self.status})
         self.start_thread(self._listen)
 
     def _validate(self, values: Any) -> None:

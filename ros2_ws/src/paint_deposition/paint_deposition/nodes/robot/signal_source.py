@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.headers import pose_of, stamp_ns
 from paint_deposition.motion.stream_figures import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter
 
 # What a state takes from signals: the field, and its unit.
@@ -109,7 +109,7 @@ class SignalSource(PaintNode):
         self._lags_s: deque[float] = deque(maxlen=REMEMBERED)
         self._starts = StartsOfMotion()
         self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
-        Diagnostics(self, {'signals': self.status})
+        self.report({'signals': self.status})
         self.start_thread(self._keep_following)
 
     def _validate(self, values: Mapping[str, Any]) -> None:

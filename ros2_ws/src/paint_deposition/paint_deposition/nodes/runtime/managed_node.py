@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.node import ERROR, OK, Diagnostics, PaintNode, Status, Task
+from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
@@ -47,7 +47,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def _start(self) -> None:
         LifecycleNodeMixin.__init__(self)
-        self.diagnostics = Diagnostics(self, {'state': self._state_status})
+        self.report({'state': self._state_status})
         self.autostarting = self.values['autostart']
         if not self.autostarting:
             self.get_logger().info('waiting for a lifecycle manager to configure this node')
@@ -123,15 +123,15 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _load_and_configure(self) -> None:
         self._load()
         self._configure()
-        self.diagnostics.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
+        self.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
 
     def _run_cleanup(self) -> None:
         try:
             self._cleanup()
         finally:
             # An aggregator would report a status that is no longer published as stale.
-            for task in self.diagnostics.tasks.keys() - {'state'}:
-                self.diagnostics.tasks[task] = lambda: Status(OK, 'the node is not configured')
+            for task in self.tasks.keys() - {'state'}:
+                self.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
     def _transition_result(
         self, done: str, transition: Callable[[], None]

@@ -34,6 +34,18 @@ WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 
 
+@dataclass(frozen=True)
+class Status:
+    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
+
+    level: bytes
+    message: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+Task = Callable[[], Status]
+
+
 class PaintNode(Node):
     """A node with a table of parameters, which can end its process.
 
@@ -44,6 +56,7 @@ class PaintNode(Node):
         stopping: whether this process was asked to end.
         values: current values of the parameters, by name.
         stopped: whether the thread of this node is to end.
+        tasks: the diagnostic tasks, by name.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
@@ -190,6 +203,37 @@ class PaintNode(Node):
             file for held in paths for file in ([held] if isinstance(held, str) else held) if file
         ]
 
+    # --- diagnostics
+
+    def report(self, tasks: Mapping[str, Task], period_s: float = 1.0) -> None:
+        """Publish the status of each task by name on /diagnostics, once in each period.
+
+        They go on while a simulated clock stands still. ``tasks`` may change later.
+        """
+        self.tasks = dict(tasks)
+        self._reports = self.create_publisher(
+            DiagnosticArray, '/diagnostics', QoSProfile(depth=10)
+        )
+        self.create_steady_timer(period_s, self.publish_diagnostics)
+
+    def publish_diagnostics(self) -> None:
+        """Publish the status of each task now."""
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        full_name = self.get_fully_qualified_name()
+        for name, status_of in self.tasks.items():
+            status = status_of()
+            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            # Aggregators tell two cells apart by the namespace.
+            task = f'{full_name.lstrip("/")}: {name}'
+            message.status.append(
+                DiagnosticStatus(
+                    level=status.level, name=task, message=status.message,
+                    hardware_id=full_name, values=values,
+                )
+            )  # fmt: skip
+        self._reports.publish(message)
+
     # --- changes of parameters
 
     def set_parameters_atomically(
@@ -238,48 +282,3 @@ def real_path(file: str) -> Path:
     Unlike the methods of a path, these functions mind no unknown user and no loop of links.
     """
     return Path(os.path.realpath(os.path.expanduser(file)))
-
-
-@dataclass(frozen=True)
-class Status:
-    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
-
-    level: bytes
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
-
-
-Task = Callable[[], Status]
-
-
-class Diagnostics:
-    """Publishes the status of every task of a node on /diagnostics.
-
-    `tasks`, which may change, maps names to functions that return a `Status`. They are called
-    once in each period of the steady clock, even while a simulated clock stands still.
-    """
-
-    def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
-        self._node = node
-        self.tasks = dict(tasks)
-        self._publisher = node.create_publisher(
-            DiagnosticArray, '/diagnostics', QoSProfile(depth=10)
-        )
-        node.create_steady_timer(period_s, self.publish)
-
-    def publish(self) -> None:
-        message = DiagnosticArray()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        full_name = self._node.get_fully_qualified_name()
-        for name, status_of in self.tasks.items():
-            status = status_of()
-            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
-            # Aggregators tell two cells apart by the namespace.
-            task = f'{full_name.lstrip("/")}: {name}'
-            message.status.append(
-                DiagnosticStatus(
-                    level=status.level, name=task, message=status.message,
-                    hardware_id=full_name, values=values,
-                )
-            )  # fmt: skip
-        self._publisher.publish(message)
