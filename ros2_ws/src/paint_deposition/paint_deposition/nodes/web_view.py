@@ -17,7 +17,6 @@ from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField,
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import (
-    pose_of,
     stamp_ns,
     transforms_of,
     trigger_change,
@@ -237,11 +236,9 @@ class WebView(PaintNode):
         self._waiting[gun].add(message, time.monotonic())
 
     def _move_gun(self, gun: str, message: PoseStamped) -> None:
-        pose = pose_of(message.pose)
-        frame_id, stamp = message.header.frame_id, stamp_ns(message.header)
-        if not self._frame.is_own(frame_id):
-            pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
-        batch = PoseBatch(np.array([stamp]), pose[0][None], pose[1][None])
+        position_m, quaternion = self._frame.on_part(message)
+        stamps = np.array([stamp_ns(message.header)])
+        batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
         for position, z_axis in zip(*batch.finite_axes(), strict=True):
             # Without any state the gun is taken to spray, as the simulator does.
             self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))

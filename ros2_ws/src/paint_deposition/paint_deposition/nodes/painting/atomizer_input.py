@@ -13,7 +13,7 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import pose_of, stamp_ns, trigger_change
+from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_figures import Intervals, Jumps, SpeedNow
@@ -255,14 +255,9 @@ class AtomizerInput:
             self._report_progress()
 
     def _transform(self, message: PoseStamped) -> None:
-        frame_id = message.header.frame_id
-        stamp = stamp_ns(message.header)
-        pose = pose_of(message.pose)
-        if self._frame.is_own(frame_id):
-            self.anomalies['poses without a frame'] += not frame_id
-        else:
-            pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
-        self._poses.append((stamp, *pose))
+        pose = self._frame.on_part(message)
+        self.anomalies['poses without a frame'] += not message.header.frame_id
+        self._poses.append((stamp_ns(message.header), *pose))
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id

@@ -6,10 +6,11 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.publisher import Publisher
 
-from paint_deposition.files.recordings.headers import transforms_of
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns, transforms_of
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
@@ -84,18 +85,25 @@ class PartFrame:
         """The same as another node has published it."""
         self._tree.place(self.frame_id, parent_frame, part_pose)
 
-    def is_own(self, frame_id: str) -> bool:
-        """Whether poses in this frame need no transform."""
-        return is_frame(frame_id, self.frame_id)
+    def on_part(self, message: PoseStamped) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) [m] and quaternion (4,) of a pose, in the frame of the part.
 
-    def lookup_transform(self, frame_id: str, stamp_ns: int) -> Rigid:
+        Raises:
+            NoTransform: there is none from its frame, or none yet.
+        """
+        pose, frame_id = pose_of(message.pose), message.header.frame_id
+        if is_frame(frame_id, self.frame_id):
+            return pose
+        return self.lookup_transform(frame_id, stamp_ns(message.header)).applied(*pose)
+
+    def lookup_transform(self, frame_id: str, at_ns: int) -> Rigid:
         """The transform from another frame into the part's at that time.
 
         Raises:
             NoTransform: there is none, or none yet.
         """
         try:
-            return self._tree.lookup(frame_id, self.frame_id, stamp_ns)
+            return self._tree.lookup(frame_id, self.frame_id, at_ns)
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
             remedy = 'set part_pose and part_parent_frame, or frame_id'
