@@ -8,6 +8,7 @@ from std_srvs.srv import Trigger
 
 from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
 from nodes.bags.listener import recorded
+from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -143,3 +144,45 @@ def test_bad_input_is_reported_at_the_start(play, pass_bag):
     ):
         with pytest.raises((PaintError, RecordingError), match=says):
             play(**{'bag': str(pass_bag)} | values)
+
+
+def test_the_player_stays_within_its_window(play, listen, wait_until, still, pass_bag):
+    """A subscriber that takes poses and never says so gets a window of them, and no more."""
+    listener = listen(reports=False)  # it has the publisher, and is silent
+    player = play(pass_bag, rate=0.0, window=60)
+    wait_until(lambda: player.poses_published == 60, what='a window of poses')
+    still(0.5)
+    assert player.poses_published == 60
+    wait_until(lambda: len(listener.poses) == 60, what='the poses')
+    listener.report()
+    wait_until(lambda: player.poses_published == 120, what='the next window')
+    while not player.finished.done():
+        taken = len(listener.poses)
+        listener.report()
+        wait_until(
+            lambda taken=taken: len(listener.poses) > taken or player.finished.done(),
+            what='more poses',
+        )
+    assert listener.poses == recorded(pass_bag)
+
+
+def test_an_interrupt_ends_a_waiting_player(ros_domain, wait_until, pass_bag, tmp_path):
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=pass_bag) as process:
+        wait_until(lambda: 'waiting for 1 subscribers' in process.err)
+        process.interrupt_as_launch_does()
+        assert process.wait() == 0
+        assert 'replayed 0 poses, 0 states' in process.err
+        assert 'Traceback' not in process.err
+
+
+def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_until, tmp_path):
+    bag = write_pose_bag(tmp_path / 'pass', straight_pass(4_000))
+    path = bag / 'pass_0.mcap'
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+    listen()
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag, rate='0.0') as process:
+        wait_until(lambda: process.exit_code is not None, what='the end')
+        assert process.exit_code == 2
+        assert f'run: paint recover {bag}' in process.err

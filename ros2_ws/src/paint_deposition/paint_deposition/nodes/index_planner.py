@@ -51,7 +51,7 @@ PLANNER = dict(
         'Number of the brush to plan for, of a model with several; 0: the only one [-]',
         (0, MOST),
     ),
-    width_m=requested(IndexRequest, 'width_m', none='that of a request'),
+    width_m=requested(IndexRequest, 'width_m', none='only that of a request'),
     length_m=requested(IndexRequest, 'length_m'),
     standoff_m=requested(PlanRequest, 'standoff_m'),
     travel_rad=requested(PlanRequest, 'travel_rad'),
