@@ -1,5 +1,6 @@
 """Recording over real DDS: byte for byte, what was asked for, and with what."""
 
+import threading
 import time
 
 import numpy as np
@@ -18,6 +19,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
@@ -194,7 +196,10 @@ def test_a_run_begins_with_all_states_since_a_clock_was_set_back_and_none_from_b
 def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     record, ros_context, spin, onlooker, wait_until, tmp_path
 ):
-    """One comes before its part is announced, others after the next part is."""
+    """One comes before its part is announced, others after the next part is.
+
+    They count that are in the queue of a recorder which was stopped for longer than it waits.
+    """
     recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
     spin(robot)
     parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
@@ -208,6 +213,7 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     for k in range(1, 10):
         robot.send_pose(START_NS + k, *place)
     robot.send_state(START_NS + 5, 0.5)
+    threading.Event().wait(LATE_S + 0.1)  # nothing runs meanwhile
     wait_until(lambda: recorder.leaving.counts.get('/atomizer/pose') == 10, what='late ones')
     wait_until(lambda: time.time_ns() > until_ns)
     robot.send_pose(START_NS + 10, *place)

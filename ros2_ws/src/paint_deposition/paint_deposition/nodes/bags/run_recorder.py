@@ -130,8 +130,10 @@ class RunRecorder(ManagedNode):
     # --- discovery
 
     def _discover(self) -> None:
-        if time.monotonic() > self._leaves_s:
-            self._guarded(self._end_of_leaving)
+        if self.leaving is not None and time.monotonic() > self._leaves_s:
+            self._drain()  # what is in the queues may be of that part
+            if time.monotonic() > self._leaves_s:
+                self._guarded(self._end_of_leaving)
         for name in self._wanted:
             publishers = self.get_publishers_info_by_topic(name)
             if publishers and name not in self._refused and self._error is None:
@@ -199,6 +201,12 @@ class RunRecorder(ManagedNode):
             # A publisher keeps the order: after its first pose for the next part none comes.
             self._leaves_s = min(self._leaves_s, time.monotonic() + 0.3)
 
+    def _drain(self) -> None:
+        """Take what is in the queues of all topics but that of the part."""
+        for topic in self.recorded.values():
+            if topic.name != self._part_topic:
+                topic.drain()
+
     def _end_of_leaving(self) -> None:
         """Complete the run of the part that has left."""
         leaving, self.leaving = self.leaving, None
@@ -217,10 +225,8 @@ class RunRecorder(ManagedNode):
         try:
             name = unused_name(self._folder, part.run or self._own_name)
             new_run = self._create_run(name, part_data(part, self.values['model_file']))
+            self._drain()
             self._end_of_leaving()
-            for recorded in self.recorded.values():
-                if recorded.name != self._part_topic:
-                    recorded.drain()
             # Some messages were sent for this part, and are in the run before, too.
             self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
             self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
