@@ -49,8 +49,8 @@ LATE_S = 2.0
 class RunRecorder(ManagedNode):
     """Records serialised messages, byte by byte as they were published.
 
-    Publishers are discovered as they appear, and the subscription to each topic is as reliable
-    and as latched as they allow. If the disk fails or is full, the node ends with an error, and
+    Publishers are discovered as they appear, and each is heard as reliably, and as latched, as it
+    offers. If the disk fails or is full, the node ends with an error, and
     `paint recover` reads the incomplete run.
     """
 
