@@ -50,7 +50,7 @@ def web_view(ros_context, spin, tmp_path):
 
 @pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')
 def test_browsers_see_the_film_of_the_simulator(
-    simulator, web_view, robot, painted, wait_until, tmp_path
+    simulator, web_view, robot, painted, executor, wait_until, tmp_path
 ):
     target = {'target_um': 10.0, 'target_tolerance_um': 2.0}
     painter, viewer = simulator(**target), web_view(**target)
@@ -85,6 +85,16 @@ def test_browsers_see_the_film_of_the_simulator(
         assert early.evaluate('page.view.segments') > 50
         assert early.evaluate('page.state.history.length') >= 1
         assert 'within target' in early.evaluate("document.getElementById('figures').innerText")
+
+        # The simulator is silent, and goes on.
+        executor.remove_node(painter)
+        silent = (
+            "(e => e.classList.contains('off') && e.textContent.includes('no word of'))"
+            "(document.getElementById('link'))"
+        )
+        wait_until(lambda: early.evaluate(silent), what='the doubt in the browser')
+        executor.add_node(painter)
+        wait_until(lambda: not early.evaluate(silent), what='the simulator again')
 
         # The server goes away and comes back; the film went on meanwhile.
         port = int(viewer.page.url.split(':')[2].strip('/'))
