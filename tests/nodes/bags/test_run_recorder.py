@@ -22,7 +22,7 @@ from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -74,6 +74,26 @@ def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until
     second.publish(pose(START_NS + 2))
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 3, what='the poses of both')
     finish(recorder)
+
+
+def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell, wait_until):
+    """Those that are in the queue come before those that a second subscription hears."""
+    recorder = record()
+    first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=500))
+    first.publish(pose(START_NS))
+    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
+    for k in range(1, 200):
+        first.publish(pose(START_NS + k))
+    weak = cell.create_publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
+    until_s = time.monotonic() + 30.0
+    while weak.get_subscription_count() == 0 and time.monotonic() < until_s:
+        recorder.recorded['/atomizer/pose'].subscribe(500)
+    for k in range(200, 300):
+        first.publish(pose(START_NS + k))
+    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == 300, what='all poses')
+    recorder.close()
+    stamps = [header_stamp_ns(cdr) for t, cdr in messages(recorder.run.folder) if 'pose' in t]
+    assert stamps == [START_NS + k for k in range(300)]
 
 
 def test_named_topics_are_recorded_and_no_others(record, publisher, wait_until, cell, tmp_path):

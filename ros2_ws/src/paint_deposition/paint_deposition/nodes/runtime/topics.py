@@ -154,10 +154,10 @@ class AdaptiveSubscription:
     def _on_message(self, heard_by: Quality, message: Any, info: Mapping[str, Any]) -> None:
         publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
         offered = self._offered.get(publisher, heard_by)
-        own_made_s = self._made_s[offered]
-        # The subscription of its own keeps its order; what is latched comes by that one later.
-        is_latched = offered[1] != USUAL[1] and own_made_s <= self._made_s[heard_by]
-        if offered != heard_by and (is_latched or time.monotonic() - own_made_s > OVERLAP_S):
+        own_s, now_s = self._made_s[offered], time.monotonic()
+        # Its own subscription, unless it is newer, has all and keeps the order.
+        is_newer = self._made_s[heard_by] < own_s and now_s - own_s < OVERLAP_S
+        if offered != heard_by and not is_newer:
             return
         # Some middleware does not number messages.
         self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
