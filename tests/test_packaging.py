@@ -43,8 +43,8 @@ def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
 
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
-    _, folder, node_class = getattr(executables, node).args
-    module = importlib.import_module(f'{PACKAGE}.nodes.{folder}.{node}')
+    _, place, node_class = getattr(executables, node).args
+    module = importlib.import_module(f'{PACKAGE}.nodes.{place}')
     return getattr(module, node_class).PARAMETERS
 
 

@@ -37,12 +37,17 @@ def bag(tmp_path, *changes):
 
 @pytest.mark.slow
 def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
-    run = bag(tmp_path, (0.5, 1.0, 1), (1.5, 1.0, 2), (2.5, 0.0, 0))
-    done = paint(
+    """A state of a brush that the model lacks is left out, as by the nodes."""
+    run = bag(tmp_path, (0.5, 1.0, 1), (0.8, 1.0, 9), (1.5, 1.0, 2), (2.5, 0.0, 0))
+    given = (
         'simulate', '--mesh', panel, '--trajectory', run, '--model', model, '--state-topic',
         '/atomizer/state', '--max-edge-length-m', 0.05, '--json', '-o', tmp_path / 'film',
     )  # fmt: skip
+    refusal = 'brush 9 is not in the model; its brushes: 1, 2, 3'
+    assert_refused(paint(*given, '--strict'), refusal)
+    done = paint(*given)
     assert done.returncode == 0, done.stderr
+    assert f'1 states left out: {refusal}' in done.stderr
     told = json.loads(done.stdout)
     assert told['emitted_volume_cm3'] == pytest.approx(0.7 + 1.4, rel=1e-6)
     used = told['paint']

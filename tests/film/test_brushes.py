@@ -1,19 +1,19 @@
 """Brushes: each lays its own paint, and together they lay the sum."""
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from brushes import NARROW, WIDE, switched, two_brushes
-from paint_deposition.api.simulation import require_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
 from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
-from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.live_film import LiveFilm, without_refused_states
 from paint_deposition.film.paint_used import seconds_by_pattern
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
@@ -107,7 +107,7 @@ def test_terms_are_kept_apart_by_brush():
 def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
     motion = replace(weaving(TIMES_S), **switched(stamps_ns([0.5]), (1.0, 3)), source='run')
     with pytest.raises(ModelError, match=r'^run: brush 3 is not in the model; its brushes: 1, 2$'):
-        require_brushes(motion, MODEL)
+        without_refused_states(motion, MODEL)
     film = LiveFilm(lying_plane(), MODEL)
     film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 2))
     with pytest.raises(ModelError, match=r'^brush 3 is not in the model; its brushes: 1, 2$'):
@@ -119,14 +119,32 @@ def test_an_unknown_brush_is_refused_and_the_known_ones_are_named():
     assert [event.brush for event in film.log.events()] == [2, 3]
 
 
-def test_one_pattern_does_not_stand_for_several_brushes():
-    motion = replace(weaving(TIMES_S), **CHANGES, source='run')
-    with pytest.raises(ModelError, match='brushes 1, 2 are used and the model has the pattern of'):
-        require_brushes(motion, DepositionModel())
-    film = LiveFilm(lying_plane(), DepositionModel())
-    film.add_trigger(TriggerChange(int(stamps_ns(0.1)), 1.0, 1))
-    with pytest.raises(ModelError, match='brushes 1, 2 are used'):
-        film.add_trigger(TriggerChange(int(stamps_ns(0.2)), 1.0, 2))
+@pytest.mark.parametrize(
+    ('model', 'others', 'warning'),
+    [
+        (MODEL, ((1.0, 7), (0.5, 2)), '2 states left out: brush 7 is not in the model'),
+        (DepositionModel(), ((1.0, 1),), '4 states left out: brushes 1, 2 are used and the model'),
+    ],
+)
+def test_states_that_a_model_refuses_are_left_out_as_a_live_film_leaves_them_out(
+    model, others, warning
+):
+    """Of one pattern without a number the first brush is the only one."""
+    told = [(1.0, 1) if len(model.brushes) else (0.4, 1), *others, (1.0, 2), (0.8, 7), (0.0, 2),
+            (1.0, 2), (1.0, 1), (0.6, 2), (0.7, 2)]  # fmt: skip
+    motion = replace(
+        weaving(TIMES_S), **switched(stamps_ns(0.2 + 0.3 * np.arange(len(told))), *told),
+        source='run',
+    )  # fmt: skip
+    film = LiveFilm(lying_plane(), model)
+    for event in events(motion, 20):
+        with contextlib.suppress(ModelError):
+            film.replay([event])
+    taken = without_refused_states(motion, model)
+    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), taken, model).film_um)
+    assert taken.warnings[0].startswith(f'run: {warning}')
+    with pytest.raises(ModelError, match=r'^run: brush'):
+        without_refused_states(motion, model, strict=True)
 
 
 def test_brushes_are_in_the_order_of_their_numbers_each_once():

@@ -155,6 +155,24 @@ def test_states_after_a_clock_was_set_back_count_though_the_film_is_reset_before
     assert film.snapshot().emitted_cm3 == pytest.approx(emitted_cm3, rel=0.01)
 
 
+@pytest.mark.parametrize('before', [0, 10])
+def test_a_state_that_is_told_ahead_holds_though_the_film_is_reset_before_its_pose(before):
+    """As it would without the reset; a pose without a time tells nothing of that."""
+    motion = straight_pass(TIMES_S, **TRIGGERS)
+    film = followed([poses(motion, slice(0, before))])
+    film.replay(TriggerChange(*change) for change in motion.triggers)
+    film.reset()
+    film.reset()
+    nowhen = poses(motion, slice(before, before + 1))
+    film.add_poses(replace(nowhen, stamps_ns=np.zeros(1, np.int64)))
+    film.add_poses(poses(motion, slice(before, None)))
+    rest = replace(
+        motion, stamps_ns=motion.stamps_ns[before:], positions_m=motion.positions_m[before:],
+        quaternions_xyzw=motion.quaternions_xyzw[before:],
+    )  # fmt: skip
+    assert np.array_equal(film.snapshot().film_um, painted(lying_plane(), rest).film_um)
+
+
 def test_a_motion_that_begins_again_paints_a_second_coat():
     motion = straight_pass(TIMES_S, **TRIGGERS)
     film = LiveFilm(lying_plane(), MODEL)

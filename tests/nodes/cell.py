@@ -132,6 +132,24 @@ class Robot(Node):
             for publisher in (self.pose_publisher, self.state_publisher)
         )
 
+    def hearers(self) -> tuple[int, int]:
+        """How many listen to poses and to states as reliably as they are sent: in this process,
+        and in others.
+        """
+        counts = []
+        for publisher in (self.pose_publisher, self.state_publisher):
+            topic = publisher.topic_name
+            processes = [
+                bytes(info.endpoint_gid[:12])
+                for info in self.get_subscriptions_info_by_topic(topic)
+                if info.qos_profile.reliability == publisher.qos_profile.reliability
+            ]
+            own = {bytes(i.endpoint_gid[:12]) for i in self.get_publishers_info_by_topic(topic)}
+            here = sum(process in own for process in processes)
+            counts.append((here, len(processes) - here))
+        (poses_here, poses), (states_here, states) = counts
+        return min(poses_here, states_here), min(poses, states)
+
     def send_pose(self, stamp_ns, position, quaternion, frame_id: str = 'part') -> None:
         message = PoseStamped()
         message.header.frame_id = frame_id

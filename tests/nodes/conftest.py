@@ -87,7 +87,7 @@ def painted(wait_until):
 def record(ros_context, spin, tmp_path):
     """`record(**parameters)`: a recorder of the run `run`, running."""
     from nodes.cell import parameters
-    from paint_deposition.nodes.recording.run_recorder import RunRecorder
+    from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
     def record(namespace='', **chosen) -> RunRecorder:
         values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen

@@ -16,8 +16,8 @@ from rclpy.qos import QoSProfile
 from booth import SAMPLES
 from nodes.cell import Robot, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.topics import LATCHED
 
@@ -235,6 +235,15 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_conte
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
     assert managed.shutdown() == (True, 'finalized')
+
+
+def test_a_node_that_is_destroyed_has_no_services(ros_context, viewer, wait_until):
+    """Whoever holds on to it."""
+    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
+    service = '/faulty/change_state'
+    wait_until(lambda: viewer.count_services(service) == 1, what='the service')
+    node.destroy_node()
+    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
 
 
 def of_this_process() -> tuple[int, int]:

@@ -14,14 +14,14 @@ from std_srvs.srv import Trigger
 from nodes.cell import offline_um, parameters, two_passes, write_panel
 from nodes.odd_messages import Peer, odd_message
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
-from paint_deposition.nodes.replay.bag_player import BagPlayer
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.rws_source import SOURCE
+from paint_deposition.nodes.robot.controllers import RwsSource
 from paint_deposition.nodes.robot.signal_source import SignalSource
-from paint_deposition.nodes.viewing.web_view import WebView
+from paint_deposition.nodes.web_view import WebView
 from robot_arm import urdf
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
@@ -31,7 +31,7 @@ MOTION = two_passes()
 class IdleSource(SignalSource):
     """A source of signals whose controller says nothing."""
 
-    PARAMETERS = SOURCE
+    PARAMETERS = RwsSource.PARAMETERS
 
     def follow(self, stopped) -> None:
         while not stopped():
@@ -97,7 +97,7 @@ def test_no_message_of_the_right_type_ends_a_node(
         wait_until(lambda: all(s.get_subscription_count() for s in signals), what='signals')
     if name == 'recorder':
         poses.publish(PoseStamped())
-        wait_until(lambda: len(node._topics) > 0, what='a recorded topic')
+        wait_until(lambda: len(node.recorded) > 0, what='a recorded topic')
     peer = Peer(peer_node)
     others = [made('web_view')] if name == 'recorder' else []
     peer.send([node, *others], rng)
@@ -109,7 +109,7 @@ def test_no_message_of_the_right_type_ends_a_node(
     until_s = time.monotonic() + 1.5  # diagnostics, statistics and all other timers
     wait_until(lambda: time.monotonic() > until_s)
     for _ in range(3):  # what timers and services show of it
-        node._diagnostics.publish() if hasattr(node, '_diagnostics') else None
+        node.publish_diagnostics()
     assert not node.finished.done(), node.finished.exception()
 
 

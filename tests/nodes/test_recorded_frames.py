@@ -13,8 +13,8 @@ from nodes.cell import offline_um, parameters, two_passes
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
-from paint_deposition.nodes.replay.bag_player import BagPlayer
+from paint_deposition.nodes.bags.bag_player import BagPlayer
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.

@@ -50,8 +50,8 @@ def text() -> str:
 
 
 def _section(name: str, run: partial, context: Context) -> str:
-    _, folder, class_name = run.args
-    module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
+    _, place, class_name = run.args
+    module = importlib.import_module(f'paint_deposition.nodes.{place}')
     node_class: type[PaintNode] = getattr(module, class_name)
     with TemporaryDirectory() as written:
         needed = NEEDED.get(name, {}) | (

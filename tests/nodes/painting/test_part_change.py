@@ -24,10 +24,10 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.recording.run_recorder import RunRecorder
+from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import ERROR, OK
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
 LATER_NS = 60_000_000_000
 SERVICE = '/deposition_simulator/change_part'
@@ -400,7 +400,7 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     """The change waits for them; without a transform they are refused on their own part."""
     node = simulator()
     # A cell in which transforms may come.
-    node.frame._topics.append(
+    node.frame.tf_topics.append(
         AdaptiveSubscription(node, PoseStamped, 'tf_of_another_kind', print, depth=1)
     )
     source = robot(node)

@@ -126,8 +126,8 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
             'atomizers and model_file another: give model_file',
         ),
         ({'model_files': [thin, sagging]}, one_film),
-        ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*must be different names'),
-        ({'atomizers': ['../robot']}, r'atomizers is .*must be different names'),
+        ({'atomizers': ['robot_1', 'robot_1']}, r'atomizers is .*give different names'),
+        ({'atomizers': ['../robot']}, r'atomizers is .*give different names'),
     ):
         with pytest.raises(PaintError, match=words):
             simulator(**{'atomizers': GUNS} | values)

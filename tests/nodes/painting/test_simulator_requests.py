@@ -139,4 +139,4 @@ def test_colours_target_and_rate_change_at_run_time(simulator, robot, painted, o
     wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.within_target == 1.0))
     wait_until(lambda: viewer.shows('thickness/legend', lambda m: m.markers[-1].text == '25 µm'))
     assert node.set_parameters(parameters(publish_rate_hz=1.0))[0].successful
-    assert node._show_timer.timer_period_ns == 1_000_000_000
+    assert node.show_timer.timer_period_ns == 1_000_000_000

@@ -12,6 +12,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
 from nodes.cell import Robot, offline_um, two_passes
+from paint_deposition.nodes.runtime.messages import header
 
 POSES = 'deposition_simulator: poses'
 UNTRIGGERED = two_passes(trigger=False)
@@ -84,11 +85,9 @@ def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, pai
     wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
 
 
-def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, painted, wait_until):
-    """A best-effort robot joins a reliable one, which has been heard from its first pose on.
-
-    Once it has left, no pose of the other may be lost again.
-    """
+def test_each_robot_is_heard_as_reliably_as_it_sends(simulator, ros_context, spin, painted,
+                                                     wait_until):  # fmt: skip
+    """A best-effort robot beside a reliable one, of which no pose may be lost for that."""
     node = simulator(pose_queue_depth=5000)
     first = Robot(ros_context)
     spin(first)
@@ -105,9 +104,9 @@ def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, pai
         inputs = [s for s in node.subscriptions if s.topic_name == '/atomizer/pose']
         return [each.qos_profile.reliability for each in inputs]
 
-    wait_until(lambda: reliability() == [ReliabilityPolicy.BEST_EFFORT], what='one subscription')
+    assert reliability() == [ReliabilityPolicy.RELIABLE, ReliabilityPolicy.BEST_EFFORT]
     second.destroy_node()
-    # Poses go on while it is replaced, and each of them counts once.
+    # Poses go on while it leaves, and each of them counts once.
     row = 310
     while reliability() != [ReliabilityPolicy.RELIABLE]:
         first.send(UNTRIGGERED, slice(row, row + 1))
@@ -118,6 +117,23 @@ def test_poses_of_any_reliability_are_received(simulator, ros_context, spin, pai
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')
     assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
+
+
+def test_a_latched_state_is_heard_beside_a_robot_that_keeps_none(
+    simulator, ros_context, spin, wait_until
+):
+    """A node that starts later hears the one, and the other as well."""
+    latched = Robot(ros_context)
+    profile = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+    states = latched.create_publisher(AtomizerState, 'atomizer/state', profile)
+    weak = Robot(ros_context, reliable=False)
+    spin(latched, weak)
+    states.publish(AtomizerState(header=header('', 1), spraying=True, flow=0.5))
+    node = simulator()
+    wait_until(lambda: node.film.guns[0].flow == 0.5, what='the latched state')
+    wait_until(lambda: weak.has_subscribers(1), what='best effort')
+    weak.send_state(2, 0.0)
+    wait_until(lambda: node.film.guns[0].flow == 0.0, what='the other')
 
 
 def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(

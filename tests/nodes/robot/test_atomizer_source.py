@@ -62,7 +62,7 @@ def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
         joints.publish(message)
         wait_until(lambda n=heard: len(viewer.heard['atomizer/pose']) > n, what='its pose')
         driver.destroy_node()
-    assert node._poses == 2
+    assert node.poses_published == 2
 
 
 @pytest.fixture

@@ -13,8 +13,7 @@ from sensor_msgs.msg import JointState
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.nodes.robot.egm_source import EgmSource
-from paint_deposition.nodes.robot.egm_stream import EgmStream
+from paint_deposition.nodes.robot.egm_source import EgmSource, EgmStream
 
 MM = (812.5, -240.25, 955.0)
 WXYZ = (0.5, 0.5, -0.5, 0.5)

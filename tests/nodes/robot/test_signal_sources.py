@@ -24,8 +24,7 @@ from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.robot.opcua_source import OpcuaSource
-from paint_deposition.nodes.robot.rws_source import RwsSource
+from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
 from paint_deposition.nodes.robot.signal_source import StartsOfMotion
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
@@ -300,7 +299,7 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
 
     node = Twice(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     while node.connections < 3:
-        status = node._status()
+        status = node.status()
         assert 'after its own time' not in status.message
     node.destroy_node()
 

@@ -1,6 +1,6 @@
 """Diagnostics over real DDS."""
 
-from paint_deposition.nodes.runtime.node import OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 
 
 def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until):
@@ -11,7 +11,7 @@ def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until)
         calls.append(1)
         return Status(WARN, f'call {len(calls)}', {'poses': 3, 'gap s': 0.5})
 
-    Diagnostics(node, {'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
+    node.report({'gun': gun, 'mesh': lambda: Status(OK, 'loaded')}, period_s=0.05)
     viewer = onlooker()
     spin(node)
     wait_until(lambda: len(viewer.heard['/diagnostics']) >= 3, what='diagnostics')

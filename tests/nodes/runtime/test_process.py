@@ -6,9 +6,9 @@ import time
 import domain_coordinator
 import pytest
 
+from nodes.bags.runs import NUMBERED
 from nodes.cell import write_panel
 from nodes.processes import NodeProcess
-from nodes.recording.runs import NUMBERED
 
 NODE = """
 import os, signal, sys, time

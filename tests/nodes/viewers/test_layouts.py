@@ -52,10 +52,10 @@ LAYERS = {
 def publishers(ros_context, spin):
     """The publishers of all nodes that a viewer looks at, by topic."""
     from nodes.cell import parameters
-    from paint_deposition.nodes.comparison.model_comparison import ModelComparison
+    from paint_deposition.nodes.bags.bag_player import BagPlayer
+    from paint_deposition.nodes.index_planner import IndexPlanner
+    from paint_deposition.nodes.model_comparison import ModelComparison
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-    from paint_deposition.nodes.planning.index_planner import IndexPlanner
-    from paint_deposition.nodes.replay.bag_player import BagPlayer
 
     panel = SAMPLES / 'panel_study'
     part = {'mesh_file': str(panel / 'panel.stl'), 'max_edge_length_m': 0.1}

@@ -13,8 +13,8 @@ import pytest
 from paint_msgs.msg import ThicknessField
 from rclpy.serialization import deserialize_message
 
+from nodes.bags.runs import finish, messages
 from nodes.cell import two_passes, write_panel
-from nodes.recording.runs import finish, messages
 
 HERE = Path(__file__).parent
 POSES = 100

@@ -4,13 +4,14 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import replace
 from typing import Any
 
-from paint_deposition.api.simulation import look_at, require_brushes
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
 from paint_deposition.files.model_text import needs_file, source_of
+from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
 from paint_deposition.inference.diagnosis.model_space import discrepancy_of
@@ -230,7 +231,7 @@ def choose_readings(
         ReadingsError: the part has no room for so many points.
     """
     request, model = MeasureRequest(**wanted), model or DepositionModel()
-    require_brushes(trajectory, model)
+    without_refused_states(trajectory, model, strict=True)
     model = model.of_numbers(trajectory.brushes).single('a choice of points')
     seen = look_at(surface, trajectory, model, max_pose_gap_s=max_pose_gap_s)
     library = dict(EFFECTS) | {effect.id: effect for effect in own_effects}

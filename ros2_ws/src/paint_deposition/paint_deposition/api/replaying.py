@@ -2,16 +2,17 @@
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from threading import Event
 
 import numpy as np
 
-from paint_deposition.api.simulation import look_at_guns, require_brushes
+from paint_deposition.api.simulation import look_at_guns
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.motion_files import GunMotion
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import LiveFilms
-from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.film.live_film import LiveFilm, without_refused_states
 from paint_deposition.film.statistics import (
     DEFAULT_PAINTED_ABOVE_UM,
     film_statistics,
@@ -57,9 +58,11 @@ class Replay:
         tolerance_um: float = 0.0,
     ) -> None:
         require_band(target_um, tolerance_um)
+        motions = [
+            replace(motion, trajectory=without_refused_states(motion.trajectory, model))
+            for motion, model in zip(motions, models, strict=True)
+        ]
         trajectories = [motion.trajectory for motion in motions]
-        for pair in zip(trajectories, models, strict=True):
-            require_brushes(*pair)
         seen = look_at_guns(surface, trajectories, models, max_pose_gap_s=max_pose_gap_s)
         self.warnings = tuple(
             w for gun in seen for w in (*gun.trajectory.warnings, *gun.geometry.warnings)

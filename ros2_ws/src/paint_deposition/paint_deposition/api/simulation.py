@@ -18,6 +18,7 @@ from paint_deposition.film.common_film import (
 )
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
+from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.film.statistics import film_statistics, require_band
 from paint_deposition.inference.readings.campaign import Experiment
@@ -89,7 +90,7 @@ def look_at(
         RecordingError: the poses make no motion, or the gun never sprays.
     """
     if model is not None:
-        require_brushes(trajectory, model)
+        without_refused_states(trajectory, model, strict=True)
     model = model or DepositionModel()
     return look_at_guns(surface, [trajectory], [model], max_pose_gap_s=max_pose_gap_s)[0]
 
@@ -120,18 +121,6 @@ def look_at_guns(
     ]  # fmt: skip
 
 
-def require_brushes(trajectory: Trajectory, model: DepositionModel) -> None:
-    """Refuse a motion with brushes that the model does not have.
-
-    Raises:
-        ModelError: naming the motion and the brushes there are.
-    """
-    try:
-        model.require_brushes(trajectory.brushes)
-    except ModelError as error:
-        raise ModelError(f'{trajectory.source}: {error}') from None
-
-
 def simulate(
     surface: Surface,
     trajectory: Trajectory | Sequence[Trajectory],
@@ -145,6 +134,7 @@ def simulate(
     target_um: float = 0.0,
     tolerance_um: float = 0.0,
     zones: Zones | None = None,
+    strict: bool = False,
     progress: Progress = lambda what, share: None,
 ) -> Film:
     """Compute the film on a part from a recorded motion, or from those of several guns.
@@ -164,6 +154,8 @@ def simulate(
         max_pose_gap_s: a longer time between two poses counts as gun off [s].
         target_um, tolerance_um: the film wanted and what it may differ, for the figures [um].
         zones: regions of the part with targets of their own, from ``read_zones``.
+        strict: whether to refuse states whose brush the model lacks; else they are left out with
+            a warning, as in the cell.
         progress: called with what is being done and the share of it that is done, 0 to 1.
 
     Raises:
@@ -192,8 +184,7 @@ def simulate(
         for _, rows in laid.films_of(TOTAL):
             require_same_film_effects(dict(named[rows]))
         require_same_film_effects(dict(named), ['on_gauge'])
-    for pair in zip(motions, models, strict=True):
-        require_brushes(*pair)
+    motions = [without_refused_states(*gun, strict) for gun in zip(motions, models, strict=True)]
     seen = look_at_guns(surface, motions, models, max_pose_gap_s=max_pose_gap_s)
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None

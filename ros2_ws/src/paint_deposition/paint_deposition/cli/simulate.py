@@ -101,7 +101,7 @@ def simulate_command(
         film = pd.simulate(
             surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
             names=[gun.name for gun in guns], coats=coats, wet_on_wet=wet_on_wet,
-            readings=readings, zones=zones, progress=show, **wanted,
+            readings=readings, zones=zones, strict=source.strict, progress=show, **wanted,
         )  # fmt: skip
         made_from = {
             'mesh_file': str(part['path']),

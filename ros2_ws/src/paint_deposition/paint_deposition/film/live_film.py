@@ -2,13 +2,15 @@
 
 import copy
 from bisect import bisect_right, insort
+from collections import Counter
 from collections.abc import Iterable
+from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import RecordingError
+from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.film.integrator import FilmIntegrator, Precision
 from paint_deposition.motion.path_builder import PathBuilder
 from paint_deposition.motion.pose_stream import (
@@ -22,12 +24,14 @@ from paint_deposition.motion.trajectory import (
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
     PoseCounts,
+    Trajectory,
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
 DEFAULT_TRIGGER_LATENCY_S = 0.1
-# A trigger change that is older than the newest pose by more is from a restarted stream [ns].
+# A trigger change that is older than the newest pose by more is from a restarted stream, and none
+# is told so long ahead of its pose [ns].
 STREAM_RESTART_NS = 1_000_000_000
 # That wait for poses; no gun is switched so often within the time that poses may be missing.
 MOST_CHANGES = 100_000
@@ -181,7 +185,9 @@ class LiveFilm:
         """Add poses, and paint those that no longer wait for the trigger."""
         if not len(batch):
             return
-        self._restore_carried_trigger(int(batch.stamps_ns[0]))
+        stamped = batch.stamps_ns[batch.stamps_ns > 0]
+        if len(stamped):
+            self._restore_carried_trigger(int(stamped[0]))
         self.log.add(batch)
         before_ns = self.newest_ns
         self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
@@ -231,9 +237,12 @@ class LiveFilm:
         _ = unpainted.gauge_um
 
     def _restore_carried_trigger(self, stamp_ns: int) -> None:
-        """After a reset, add the trigger changes from before it, unless the stream restarted."""
+        """After a reset, add the trigger changes from before it, unless the stream restarted.
+
+        They may be told ahead of the first pose after it.
+        """
         carried, self._carried = self._carried, []
-        if carried and stamp_ns >= carried[0].stamp_ns:
+        if carried and carried[0].stamp_ns - stamp_ns <= STREAM_RESTART_NS:
             for change in carried:
                 self.add_trigger(change)
 
@@ -245,3 +254,43 @@ class LiveFilm:
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         del self._changes[: max(0, passed - 1)]
         self._snapshot = None
+
+
+def without_refused_states(
+    motion: Trajectory, model: DepositionModel, strict: bool = False
+) -> Trajectory:
+    """A recorded motion without the states that ``LiveFilm`` refuses, with a warning for each
+    brush.
+
+    Raises:
+        ModelError: the model has none of the brushes that spray, or, if ``strict``, not all.
+    """
+    taken: set[int] = set()
+    refused: dict[int, str] = {}
+    for brush in (brush for _, flow, brush in motion.triggers if flow > 0.0):
+        if brush not in taken | refused.keys():
+            try:
+                model.require_brushes({*taken, brush})
+                taken.add(brush)
+            except ModelError as error:
+                refused[brush] = str(error)
+    if strict or not taken:
+        try:
+            model.require_brushes(motion.brushes)
+        except ModelError as error:
+            raise ModelError(f'{motion.source}: {error}') from None
+    if not refused:
+        return motion
+    states = motion.triggers
+    kept = np.array([flow == 0.0 or brush in taken for _, flow, brush in states])
+    counts = Counter(brush for _, flow, brush in states if flow > 0.0)
+    warnings = (
+        f'{motion.source}: {counts[brush]} states left out: {reason}'
+        for brush, reason in refused.items()
+    )
+    rows = motion.trigger_rows
+    return replace(
+        motion, trigger_stamps_ns=motion.trigger_stamps_ns[kept],
+        trigger_flow=motion.trigger_flow[kept], trigger_brush=motion.trigger_brush[kept],
+        trigger_rows=rows[kept] if len(rows) else rows, warnings=(*motion.warnings, *warnings),
+    )  # fmt: skip

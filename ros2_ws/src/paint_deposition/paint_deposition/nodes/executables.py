@@ -22,8 +22,8 @@ if not any(name in os.environ for name in FAST_DDS_FILES):
     os.environ[FAST_DDS_FILES[os.environ.get('ROS_DISTRO') == 'jazzy']] = announced_often
 
 
-def _run(name: str, folder: str, node_class: str) -> int:
-    """Load a node's module and run it; returns the process's exit code."""
+def _run(name: str, place: str, node_class: str) -> int:
+    """Load the module of a node, by its place among the nodes, and run it; the exit code."""
     # Libraries may swallow an exception while they are imported, so a signal is only recorded.
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -32,18 +32,20 @@ def _run(name: str, folder: str, node_class: str) -> int:
         if find_spec(needed) is None:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
-    module = importlib.import_module(f'paint_deposition.nodes.{folder}.{name}')
+    module = importlib.import_module(f'paint_deposition.nodes.{place}')
     process = importlib.import_module('paint_deposition.nodes.runtime.process')
     return process.run_node(getattr(module, node_class), signals)
 
 
-atomizer_source = partial(_run, 'atomizer_source', 'robot', 'AtomizerSource')
-bag_player = partial(_run, 'bag_player', 'replay', 'BagPlayer')
-deposition_simulator = partial(_run, 'deposition_simulator', 'painting', 'DepositionSimulator')
-egm_source = partial(_run, 'egm_source', 'robot', 'EgmSource')
-index_planner = partial(_run, 'index_planner', 'planning', 'IndexPlanner')
-model_comparison = partial(_run, 'model_comparison', 'comparison', 'ModelComparison')
-opcua_source = partial(_run, 'opcua_source', 'robot', 'OpcuaSource')
-run_recorder = partial(_run, 'run_recorder', 'recording', 'RunRecorder')
-rws_source = partial(_run, 'rws_source', 'robot', 'RwsSource')
-web_view = partial(_run, 'web_view', 'viewing', 'WebView')
+atomizer_source = partial(_run, 'atomizer_source', 'robot.atomizer_source', 'AtomizerSource')
+bag_player = partial(_run, 'bag_player', 'bags.bag_player', 'BagPlayer')
+deposition_simulator = partial(
+    _run, 'deposition_simulator', 'painting.deposition_simulator', 'DepositionSimulator'
+)
+egm_source = partial(_run, 'egm_source', 'robot.egm_source', 'EgmSource')
+index_planner = partial(_run, 'index_planner', 'index_planner', 'IndexPlanner')
+model_comparison = partial(_run, 'model_comparison', 'model_comparison', 'ModelComparison')
+opcua_source = partial(_run, 'opcua_source', 'robot.controllers', 'OpcuaSource')
+run_recorder = partial(_run, 'run_recorder', 'bags.run_recorder', 'RunRecorder')
+rws_source = partial(_run, 'rws_source', 'robot.controllers', 'RwsSource')
+web_view = partial(_run, 'web_view', 'web_view', 'WebView')

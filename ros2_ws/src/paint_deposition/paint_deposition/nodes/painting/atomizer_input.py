@@ -5,6 +5,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -12,31 +13,23 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import pose_of, stamp_ns, trigger_change
+from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
 
-# Messages are polled: waking up for each pose would cost more than painting it.
-TAKE_PERIOD_S = 0.02
-BATCH_PERIOD_S = 0.05
 POSES_PER_BATCH = 50
-PROGRESS_PERIOD_S = 0.2
 # No robot announces a state so long before the pose at which it holds.
 AHEAD_NS = 1_000_000_000
 AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
 # Of what a peer names: so many different ones are told apart, and so many characters of each.
 MOST_NAMES, LONGEST_NAME = 20, 200
 OTHERS, STATES_REFUSED = 'others', 'states refused'
-# Hours of poses: more do not wait for a part.
-MOST_HELD = 2_000_000
-NOT_HELD = 'messages dropped, since too many waited for the part'
 NO_FLOW = 'states that spray with flow 0'
 
 
@@ -87,7 +80,7 @@ class AtomizerInput:
         self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
-        self._early: tuple[int, int] | None = None
+        self._state_ahead: tuple[int, int] | None = None
         self._flushed_s = -math.inf
         # What was taken from the queues, and when it was sent.
         self._new_poses: list[tuple[PoseStamped, int]] = []
@@ -97,19 +90,20 @@ class AtomizerInput:
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
-        depth = node.values['pose_queue_depth']
-        subscribe = partial(AdaptiveSubscription, node, depth=depth)
+        subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
+        poses, states = (partial(self._note, new) for new in (self._new_poses, self._new_states))
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, self._note_pose),
+            subscribe(PoseStamped, self._pose_topic, poses),
             # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, self._note_state, latched=True),
+            subscribe(AtomizerState, self._state_topic, states, latched=True),
         ]
         self.reset_counts()
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
-        node.create_steady_timer(TAKE_PERIOD_S, self._take)
-        node.create_steady_timer(PROGRESS_PERIOD_S, self._report_progress)
+        # Polled: waking up for each pose would cost more than painting it.
+        node.create_steady_timer(0.02, self._take)
+        node.create_steady_timer(0.2, self._report_progress)
 
     @property
     def poses_refused(self) -> int:
@@ -179,10 +173,11 @@ class AtomizerInput:
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
-            if len(self._held) < MOST_HELD:
+            # Hours of poses.
+            if len(self._held) < 2_000_000:
                 self._held.append(message)
             else:
-                self.anomalies[NOT_HELD] += 1
+                self.anomalies['messages dropped, since too many waited for the part'] += 1
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:
@@ -200,8 +195,10 @@ class AtomizerInput:
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
-        poses, self._new_poses = self._new_poses, []
-        states, self._new_states = deque(self._new_states), []
+        # Latched states may come behind others that were sent later.
+        poses, states = [*self._new_poses], deque(sorted(self._new_states, key=itemgetter(1)))
+        self._new_poses.clear()
+        self._new_states.clear()
         for pose, sent_ns in poses:
             while states and states[0][1] < sent_ns:
                 self._take_state(*states.popleft())
@@ -211,7 +208,7 @@ class AtomizerInput:
 
     def _take(self) -> None:
         self._drain()
-        waited = time.monotonic() - self._flushed_s >= BATCH_PERIOD_S
+        waited = time.monotonic() - self._flushed_s >= 0.05
         if waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
 
@@ -238,11 +235,8 @@ class AtomizerInput:
             )
         self._on_poses(batch)
 
-    def _note_pose(self, message: PoseStamped, info: Mapping[str, Any]) -> None:
-        self._new_poses.append((message, info['source_timestamp']))
-
-    def _note_state(self, message: AtomizerState, info: Mapping[str, Any]) -> None:
-        self._new_states.append((message, info['source_timestamp']))
+    def _note(self, new: list[tuple[Any, int]], message: Any, info: Mapping[str, Any]) -> None:
+        new.append((message, info['source_timestamp']))
 
     # --- poses
 
@@ -251,24 +245,19 @@ class AtomizerInput:
         if len(message.header.frame_id) > LONGEST_NAME:
             message.header.frame_id = f'{message.header.frame_id[:LONGEST_NAME]}...'
         self._newest, self.sent_ns = message, sent_ns
-        if self._early and sent_ns > self._early[1]:
-            if self._early[0] - stamp_ns(message.header) > AHEAD_NS:
+        if self._state_ahead and sent_ns > self._state_ahead[1]:
+            if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
                 self.anomalies[AHEAD] += 1
-            self._early = None
+            self._state_ahead = None
         self.pose_s = time.monotonic()
         self._process(message, sent_ns)
         if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
     def _transform(self, message: PoseStamped) -> None:
-        frame_id = message.header.frame_id
-        stamp = stamp_ns(message.header)
-        pose = pose_of(message.pose)
-        if self._frame.is_own(frame_id):
-            self.anomalies['poses without a frame'] += not frame_id
-        else:
-            pose = self._frame.lookup_transform(frame_id, stamp).applied(*pose)
-        self._poses.append((stamp, *pose))
+        pose = self._frame.on_part(message)
+        self.anomalies['poses without a frame'] += not message.header.frame_id
+        self._poses.append((stamp_ns(message.header), *pose))
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id
@@ -289,7 +278,7 @@ class AtomizerInput:
         state_ns = stamp_ns(message.header)
         # Before its poses after a pause, too: the next pose tells.
         if self._newest is None or state_ns - stamp_ns(self._newest.header) > AHEAD_NS:
-            self._early = state_ns, sent_ns
+            self._state_ahead = state_ns, sent_ns
         self._process(message, sent_ns)
 
     def _process_state(self, message: AtomizerState) -> None:

@@ -13,8 +13,7 @@ from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_writer
-from paint_deposition.nodes.painting.film_trust import FilmTrust
-from paint_deposition.nodes.painting.painting_diagnostics import painting_tasks
+from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
@@ -69,8 +68,6 @@ SIMULATOR = PAINTING | {
         fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
 }
-# Less paint may fly past before the part.
-ENOUGH_CM3 = 5.0
 
 
 class DepositionSimulator(PaintingNode):
@@ -111,7 +108,8 @@ class DepositionSimulator(PaintingNode):
     def _part_status(self) -> Status:
         """The status of the part, and whether any of the paint lands on it."""
         status, film = self.parts.status(), self.film.snapshot()
-        if status.level != OK or film.emitted_cm3 < ENOUGH_CM3 or film.raw_um.max() > NO_PAINT_UM:
+        # Less paint may fly past before the part.
+        if status.level != OK or film.emitted_cm3 < 5.0 or film.raw_um.max() > NO_PAINT_UM:
             return status
         beside = (
             f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '

@@ -38,7 +38,6 @@ STATS_FIELDS = (
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
 BAR_STEPS = 64
-BAR_LABELS = 5
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -89,9 +88,12 @@ class LargeTopic:
         """Publish a version if a subscriber lacks it and the link is free; else call it again."""
         # Not the publisher's own count, which grows before the event of a new subscriber.
         wanted = version, self._new_subscribers
-        if not self._subscribers or wanted == self._sent or not self._is_free():
-            return
         began_s = time.monotonic()
+        if not self._subscribers or wanted == self._sent or began_s < self._next_allowed_s:
+            return
+        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
+        if not acknowledged and began_s < self._sent_s + ACKNOWLEDGE_TIMEOUT_S:
+            return
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
         self._next_allowed_s = began_s + (self._sent_s - began_s) / MAX_CORE_SHARE
@@ -99,13 +101,6 @@ class LargeTopic:
     def _count_subscribers(self, event: Any) -> None:
         self._subscribers = event.current_count
         self._new_subscribers += event.total_count_change
-
-    def _is_free(self) -> bool:
-        now_s = time.monotonic()
-        if now_s < self._next_allowed_s:
-            return False
-        acknowledged = self._publisher.wait_for_all_acked(Duration(nanoseconds=0))
-        return acknowledged or now_s > self._sent_s + ACKNOWLEDGE_TIMEOUT_S
 
 
 class FilmDisplay:
@@ -236,7 +231,7 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
             bar.points.append(_point(place))
             bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
     markers = [bar]
-    for number, share in enumerate(np.linspace(0.0, 1.0, BAR_LABELS), start=1):
+    for number, share in enumerate(np.linspace(0.0, 1.0, 5), start=1):
         label = white_marker(Marker.TEXT_VIEW_FACING, 'legend', number, frame_id)
         label.text = f'{scale.low + (scale.high - scale.low) * share:g} {unit}'
         label.scale = Vector3(z=0.04 * size)

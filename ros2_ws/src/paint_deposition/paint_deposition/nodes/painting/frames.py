@@ -6,19 +6,18 @@ from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped, TransformStamped
 from rclpy.publisher import Publisher
 
-from paint_deposition.files.recordings.headers import transforms_of
+from paint_deposition.files.recordings.headers import pose_of, stamp_ns, transforms_of
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
 
-FRAME_REMEDY = 'set part_pose and part_parent_frame, or frame_id'
-CLOCK_REMEDY = 'publish tf without gaps and by the clock of the poses'
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
@@ -38,20 +37,20 @@ class PartFrame:
         self._publisher: Publisher | None = None
         self._tree = FrameTree(live=True)
         # None where the messages of tf are not installed.
-        self._topics: list[AdaptiveSubscription] = []
+        self.tf_topics: list[AdaptiveSubscription] = []
         with contextlib.suppress(ImportError):
             from tf2_msgs.msg import TFMessage
 
             # Deep queues that are emptied before poses are judged: a busy node has its transforms.
             subscribe = partial(AdaptiveSubscription, node, TFMessage, depth=5000)
-            self._topics = [
+            self.tf_topics = [
                 subscribe('/tf_static', self._take_static, latched=True),
                 subscribe('/tf', self._take),
             ]
 
     def take_pending(self) -> None:
         """Take the transforms in the queues."""
-        for topic in self._topics:
+        for topic in self.tf_topics:
             topic.take_pending()
 
     def _take_static(self, message: Any, _info: Any) -> None:
@@ -86,22 +85,31 @@ class PartFrame:
         """The same as another node has published it."""
         self._tree.place(self.frame_id, parent_frame, part_pose)
 
-    def is_own(self, frame_id: str) -> bool:
-        """Whether poses in this frame need no transform."""
-        return is_frame(frame_id, self.frame_id)
+    def on_part(self, message: PoseStamped) -> tuple[np.ndarray, np.ndarray]:
+        """Position (3,) [m] and quaternion (4,) of a pose, in the frame of the part.
 
-    def lookup_transform(self, frame_id: str, stamp_ns: int) -> Rigid:
+        Raises:
+            NoTransform: there is none from its frame, or none yet.
+        """
+        pose, frame_id = pose_of(message.pose), message.header.frame_id
+        if is_frame(frame_id, self.frame_id):
+            return pose
+        return self.lookup_transform(frame_id, stamp_ns(message.header)).applied(*pose)
+
+    def lookup_transform(self, frame_id: str, at_ns: int) -> Rigid:
         """The transform from another frame into the part's at that time.
 
         Raises:
             NoTransform: there is none, or none yet.
         """
         try:
-            return self._tree.lookup(frame_id, self.frame_id, stamp_ns)
+            return self._tree.lookup(frame_id, self.frame_id, at_ns)
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
-            remedy = CLOCK_REMEDY if is_connected else FRAME_REMEDY
-            may_come = missing.may_come and bool(self._topics)
+            remedy = 'set part_pose and part_parent_frame, or frame_id'
+            if is_connected:
+                remedy = 'publish tf without gaps and by the clock of the poses'
+            may_come = missing.may_come and bool(self.tf_topics)
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
 
 

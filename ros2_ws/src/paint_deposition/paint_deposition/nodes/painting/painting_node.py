@@ -17,22 +17,19 @@ from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
-from paint_deposition.nodes.painting.outward_side import OutwardSide
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
+    models_from_parameters,
     read_part,
     unpainted_films,
     warm_up,
     zones_on,
 )
-from paint_deposition.nodes.painting.repainting import Repainting
+from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.model_parameters import models_from_parameters
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-# Batches over which the real-time factor is averaged.
-AVERAGED_BATCHES = 100
 MODEL_PARAMETERS = {'model_file', 'model_files'}
 
 
@@ -71,7 +68,7 @@ class PaintingNode(ManagedNode, ABC):
         self._shown = None
         self.create_trigger_service('~/reset', self.reset)
         self.create_steady_timer(0.1, self._update)
-        self._show_timer = self._new_show_timer()
+        self.show_timer = self._new_show_timer()
 
     def _activate(self) -> None:
         self.release()
@@ -88,7 +85,7 @@ class PaintingNode(ManagedNode, ABC):
         self.mesh_file: str = self.values['mesh_file']
         # (computing time, duration of the motion) of the last batches of each gun.
         self._times_s: list[deque[tuple[float, float]]] = [
-            deque(maxlen=AVERAGED_BATCHES) for _ in self.gun_names
+            deque(maxlen=100) for _ in self.gun_names
         ]
         self.model_problem, self._notes_logged = '', 0
         self.frame = PartFrame(self, self.values['frame_id'])
@@ -227,8 +224,8 @@ class PaintingNode(ManagedNode, ABC):
         if names & {*MODEL_PARAMETERS, 'max_pose_gap_s'}:
             self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
         if 'publish_rate_hz' in names:
-            self.destroy_timer(self._show_timer)
-            self._show_timer = self._new_show_timer()
+            self.destroy_timer(self.show_timer)
+            self.show_timer = self._new_show_timer()
         self._shown = None
 
     def _new_show_timer(self) -> Timer:

@@ -1,23 +1,27 @@
-"""The parameters that all painting nodes share, and the parts and films built from them."""
+"""The parameters that nodes with a film share, and the models, parts and films built from them."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.files.zones_file import read_zones
-from paint_deposition.film.common_film import LiveFilms
+from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.model_parameters import model_parameters
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
+    ParameterTable,
     atomizers_parameter,
     direction_parameter,
     fixed_while_configured,
@@ -27,6 +31,25 @@ from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+
+
+def model_parameters(use: str) -> ParameterTable:
+    """The rows `model_file` and `allow_user_effects`; `use` completes "Setting it reads it"."""
+    return {
+        'model_file': NodeParameter(
+            '',
+            'Deposition model, model.yaml; empty: a 50 mm bell. Setting it, to the same file too, '
+            f'reads it{use} [path]',
+        ),
+        'allow_user_effects': NodeParameter(
+            False,
+            'Allow a model to name effect files, whose Python code this node then runs '
+            '[true/false]',
+            fixed_because='whoever can set parameters could otherwise run code on this machine; '
+            'restart the node with the new value',
+        ),
+    }
+
 
 PAINTING = dict(
     **MANAGED,
@@ -91,6 +114,50 @@ PAINTING = dict(
         2.0, 'Rate of the messages while the film changes [Hz]', (0.1, 30.0)
     ),
 )
+
+
+def model_from_parameters(
+    values: Mapping[str, Any], load: LoadEffect = load_effect_file
+) -> DepositionModel:
+    """The model that a node's parameters select; `load` reads the effect files it names.
+
+    Raises:
+        ModelError: the model is invalid, or names an effect file without `allow_user_effects`.
+    """
+    if not values['model_file']:
+        return DepositionModel()
+    return read_model(
+        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
+    )
+
+
+def models_from_parameters(
+    values: Mapping[str, Any], load: LoadEffect = load_effect_file
+) -> tuple[DepositionModel, ...]:
+    """The model of each gun, from `model_files` or `model_file`; one model without `atomizers`.
+
+    Raises:
+        PaintError: as above, or the number of models is not that of the guns.
+    """
+    guns, files = values['atomizers'] or [''], values['model_files']
+    if not files:
+        return (model_from_parameters(values, load),) * len(guns)
+    if len(files) != len(guns) or values['model_file']:
+        another = ' and model_file another' if values['model_file'] else ''
+        raise PaintError(
+            f'model_files names {len(files)} models for {len(guns)} atomizers{another}: give '
+            'model_file for all, or model_files one for each of atomizers'
+        )
+    models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
+    require_same_film_effects(dict(zip(guns, models, strict=True)))
+    return models
+
+
+def _refuse_effect_file(path: Path) -> type[Effect]:
+    raise ModelError(
+        f'effect file {path} is not run, because it is Python code; if you trust it, start the '
+        'node with allow_user_effects:=true'
+    )
 
 
 @dataclass(frozen=True)

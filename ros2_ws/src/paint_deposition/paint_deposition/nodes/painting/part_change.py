@@ -16,8 +16,13 @@ from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
-from paint_deposition.nodes.painting.film_files import film_writer
+from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.nodes.painting.film_files import (
+    film_writer,
+    read_recorded_part,
+)
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
@@ -26,7 +31,6 @@ from paint_deposition.nodes.painting.painting_parameters import (
     warm_up,
     zones_on,
 )
-from paint_deposition.nodes.painting.recorded_part import RecordedPart, read_recorded_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, real_path
@@ -34,16 +38,6 @@ from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
-# With several guns, poses of the others may still be on their way when those of one are there.
-SETTLE_S = 0.03
-# For so long a change, and a reset, wait for a subscriber of the part that has stalled.
-HEARD_S, RESET_HEARD_S = 3.0, 1.0
-# A recorder has on the disk what it took before this time.
-RECORDED_S = 1.2
-# Prepared parts beside the one in the cell; a large one takes some 100 MB.
-MAX_KEPT_PARTS = 4
-# Films that cannot be saved are kept, so many at most, and saved again after so long.
-MOST_UNSAVED, SAVE_AGAIN_S = 4, 10.0
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
 Version = tuple[str, int | None, int | None]
 
@@ -91,10 +85,10 @@ class PartChange:
         self._reading = ThreadPoolExecutor(max_workers=1, thread_name_prefix='parts')
         self.waiting = False
         self._gap_s = 0.0
-        # Films of former parts that are not on disk yet, and why.
+        # Films of former parts that are not on disk yet, four at most, and why.
         self._unsaved: list[Callable[[], list[Path]]] = []
         self._save_error = ''
-        node.create_steady_timer(SAVE_AGAIN_S, self._save_again)
+        node.create_steady_timer(10.0, self._save_again)
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
@@ -153,7 +147,7 @@ class PartChange:
         node = self._node
         if self.waiting:
             raise PaintError('another change of the part is under way: call again after it')
-        if len(self._unsaved) >= MOST_UNSAVED:
+        if len(self._unsaved) >= 4:
             raise PaintError(f'{self._save_error}; the part stays until they are saved')
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
@@ -164,46 +158,38 @@ class PartChange:
         unplaced = ''
         self.waiting = True
         try:
-            if len(node.inputs) > 1:
-                node.hold(following.last_sent_ns)
-                await self._settled()
-            node.hold()
-            # So do those that wait for their transform, which comes or is given up.
-            while any(len(source.tf_queue) for source in node.inputs):
-                await self._settled()
-            # The message of the part is latched, and the next one takes its place.
-            heard_s = time.monotonic() + HEARD_S
-            while not self._is_heard() and time.monotonic() < heard_s:
-                await self._settled()
-            if not self._is_heard():
-                notes.append('a subscriber of part has stalled, and may miss a part')
-            node.catch_up()
+            notes += await self._receive_all(following.last_sent_ns)
             since_ns = self._newest_ns()
             version = mesh_version(following.mesh_file)
-            ready = None if request.coat else await self._ready(version)
-            run = await self._recorded(request.resume) if request.resume else None
+            ready = None
+            if not request.coat:
+                read = self._prepared(version)
+                ready = read.result() if read.done() else await node.result_of(read)
+            motions, told = None, None
+            if request.resume:
+                motions, told = await self._recorded(request.resume)
             # What was painted since a crash is of the part that is resumed, and saved with it.
-            is_resumed = run is not None and not self.part.serial
+            is_resumed = motions is not None and not self.part.serial
             if node.film.counts.received and not is_resumed:
                 self._unsaved.append(self._film_writer())
             if ready is not None:
                 log = [[*gun.log.events()] if is_resumed else [] for gun in node.film.guns]
                 node.change_part(version[0], ready)
                 self._version = version
-                if run is not None:
-                    notes.append(self._resume(run, log))
-            if run is not None and run.part is not None and run.part.run == following.run:
-                following = run.part  # as it was announced: its recorder goes on with its run
-                since_ns = stamp_ns(run.part.header)
+                if motions is not None:
+                    notes.append(self._resume(motions, log))
+            if told is not None and told.run == following.run:
+                following = told  # as it was announced: its recorder goes on with its run
+                since_ns = stamp_ns(told.header)
             self.part, self._since = following, datetime.now(timezone.utc)
             self._run, self._resets = following.run, 0
             self._publish(since_ns, request.part_pose)
             # After the part, so that a recorder knows whose pose it is.
             if len(request.part_pose):
                 kind, pose = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
-                told = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
-                if not told.successful:
-                    unplaced = f'it stands where the part before did: {told.reason}'
+                placed = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
+                if not placed.successful:
+                    unplaced = f'it stands where the part before did: {placed.reason}'
         finally:
             self.waiting = False
             node.release()
@@ -218,6 +204,29 @@ class PartChange:
         node.get_logger().info(response.message)
         return unplaced
 
+    async def _receive_all(self, last_sent_ns: int) -> list[str]:
+        """Paint what was sent until then, and keep what was sent later.
+
+        Returns:
+            A note, if a subscriber of the part has stalled.
+        """
+        node = self._node
+        if len(node.inputs) > 1:
+            node.hold(last_sent_ns)
+            await self._settled()
+        node.hold()
+        # Poses that wait for their transform are of the former part; it comes, or is given up.
+        while any(len(source.tf_queue) for source in node.inputs):
+            await self._settled()
+        # The message of the part is latched, and the next one takes its place.
+        heard_s = time.monotonic() + 3.0
+        while not self._is_heard() and time.monotonic() < heard_s:
+            await self._settled()
+        node.catch_up()
+        if self._is_heard():
+            return []
+        return ['a subscriber of part has stalled, and may miss a part']
+
     def _requested(self, request: ChangePart.Request) -> Part:
         """The part that the request describes.
 
@@ -228,8 +237,7 @@ class PartChange:
         if request.resume and (request.coat or not request.serial):
             raise PaintError('resume: give the serial number of the part, and its first coat')
         pose = list(request.part_pose)
-        if wrong := self._node.PARAMETERS['part_pose'].error_for(pose):
-            raise PaintError(f'part_pose {wrong}')
+        self._node.PARAMETERS['part_pose'].checked('part_pose', pose)
         if pose and not self._node.values['part_parent_frame']:
             raise PaintError('part_pose is given, and the parameter part_parent_frame is empty')
         part, mesh_file = self.part, os.path.expanduser(request.mesh_file) or self.part.mesh_file
@@ -265,36 +273,35 @@ class PartChange:
             self._node.require_named_folder(request.resume)
         return following
 
-    async def _recorded(self, path: str) -> RecordedPart:
+    async def _recorded(self, path: str) -> tuple[list[Trajectory], Part | None]:
         """What a run holds of the part so far, once all that was received is in its file."""
-        await self._settled(RECORDED_S)
+        # What a recorder took before is on its disk.
+        await self._settled(1.2)
         names, frame_id = self._node.gun_names, self._node.frame.frame_id
         return await self._node.result_of(
             self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
         )
 
-    def _resume(self, run: RecordedPart, log: list[list[TriggerChange | PoseBatch]]) -> str:
+    def _resume(
+        self, motions: list[Trajectory], log: list[list[TriggerChange | PoseBatch]]
+    ) -> str:
         """Paint what a run holds, and what came since if it ends before that."""
         node = self._node
         for motion, film, source, later in zip(
-            run.motions, node.film.guns, node.inputs, log, strict=True
+            motions, node.film.guns, node.inputs, log, strict=True
         ):
             film.forget_trigger()
-            film.replay(events_of(motion))
+            film.replay(events_of(without_refused_states(motion, film.model)))
             stamps = motion.stamps_ns
+            source.take_pending()  # a recorder may have taken them before
             if not source.received_ns or source.received_ns in stamps:
                 source.drop_held(int(stamps[-1]) if len(stamps) else 0)
             else:
                 film.replay(later)
-        poses = sum(map(len, run.motions))
+        poses = sum(map(len, motions))
         return f'{poses} poses of its recording are painted'
 
-    async def _ready(self, version: Version) -> PreparedPart:
-        """The part of this mesh, once it is read."""
-        read = self._prepared(version)
-        return read.result() if read.done() else await self._node.result_of(read)
-
-    async def _settled(self, duration_s: float = SETTLE_S) -> None:
+    async def _settled(self, duration_s: float = 0.03) -> None:
         """Wait for messages that were sent before now."""
         settled: Future[None] = Future()
         threading.Timer(duration_s, settled.set_result, [None]).start()
@@ -306,7 +313,7 @@ class PartChange:
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
         self.part.last_sent_ns = self._last_sent_ns
-        self._is_heard(RESET_HEARD_S)
+        self._is_heard(within_s=1.0)
         self._publish(self._newest_ns(), ())
 
     def _is_heard(self, within_s: float = 0.0) -> bool:
@@ -340,7 +347,8 @@ class PartChange:
             part = self._reading.submit(self._prepare, version[0])
         self._parts[version] = part
         others = [kept for kept in self._parts if kept not in (version, self._version)]
-        for kept in others[: max(len(others) - MAX_KEPT_PARTS, 0)]:
+        # A large one takes some 100 MB.
+        for kept in others[: max(len(others) - 4, 0)]:
             del self._parts[kept]
         return part
 

@@ -25,15 +25,13 @@ from paint_deposition.nodes.robot.robot_poses import (
     PublishedPoses,
     TfPoses,
 )
-from paint_deposition.nodes.runtime.adaptive_subscription import AdaptiveSubscription
-from paint_deposition.nodes.runtime.messages import header, message_class
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-DISCOVERY_PERIOD_S = 0.1
 POSES = 'atomizer/pose'
 SIGNALS = ('trigger', 'flow', 'brush', 'speed')
 # What a signal must be, where not every number will do.
@@ -44,6 +42,7 @@ USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
 # (topic, message, message info of the middleware)
 TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
+
 
 SOURCE = fixed_while_running(
     'the subscriptions are made with it when the node starts; restart the node',
@@ -58,7 +57,8 @@ SOURCE = fixed_while_running(
     base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
     joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
     joint_prefix=NodeParameter(
-        '', "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]"
+        '',
+        "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]",
     ),
     angle_unit=NodeParameter(
         '',
@@ -74,7 +74,8 @@ SOURCE = fixed_while_running(
         element=float,
     ),
     trigger=NodeParameter(
-        '', f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]'
+        '',
+        f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
     ),
     flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
     brush=NodeParameter(
@@ -113,13 +114,13 @@ class AtomizerSource(PaintNode):
         }
         self._values: dict[str, float] = {}
         self._published = ''
-        self._poses = 0
+        self.poses_published = 0
         self._clock_offset_s = 0.0
         self._motion = self._create_motion()
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
-        self.create_steady_timer(DISCOVERY_PERIOD_S, self._discover_topics)
-        Diagnostics(self, {'robot': self._robot_status, 'signals': self._signals_status})
+        self.create_steady_timer(0.1, self._discover_topics)
+        self.report({'robot': self._robot_status, 'signals': self._signals_status})
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
@@ -166,11 +167,9 @@ class AtomizerSource(PaintNode):
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
             self._compare_clocks(stamp, sent_ns)
-        pose = PoseStamped(header=header(self._motion.base, stamp))
-        p, q = pose.pose.position, pose.pose.orientation
-        p.x, p.y, p.z, q.x, q.y, q.z, q.w = (tip @ self._tcp).values
+        pose = pose_message(self._motion.base, stamp, (tip @ self._tcp).values)
         self._pose_publisher.publish(pose)
-        self._poses += 1
+        self.poses_published += 1
 
     def _compare_clocks(self, stamp: int, sent_ns: int) -> None:
         self._clock_offset_s = (sent_ns - stamp) * 1e-9
@@ -246,7 +245,7 @@ class AtomizerSource(PaintNode):
     def _robot_status(self) -> Status:
         found = self._motion.status()
         poses = f"of '{self._motion.tip}' in '{self._motion.base}'"
-        values = {'poses': poses, 'published': self._poses, **found.values}
+        values = {'poses': poses, 'published': self.poses_published, **found.values}
         return Status(found.level, found.message, values)
 
     def _signals_status(self) -> Status:

@@ -1,27 +1,186 @@
-"""Node `egm_source`: poses and joints that an ABB robot streams by EGM."""
+"""Node `egm_source`: poses and joints that an ABB robot streams by EGM (UDP, protobuf)."""
 
 import socket
-import threading
 import time
+from collections import deque
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.robot.egm_stream import EgmSample, EgmStream, egm_message
-from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.messages import header, pose_message
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH
 
+# What is read of EGM's messages: field, number and type of the wire format that ABB documents in
+# 3HAC073319 (EGM, sensor protocol); others are passed over.
+MESSAGES = {
+    'Header': {'seqno': (1, 'uint32'), 'tm': (2, 'uint32')},
+    'Cartesian': {axis: (k, 'double') for k, axis in enumerate('xyz', start=1)},
+    'Quaternion': {f'u{k}': (k + 1, 'double') for k in range(4)},
+    'Pose': {'pos': (1, 'Cartesian'), 'orient': (2, 'Quaternion')},
+    'Joints': {'joints': (1, 'doubles')},
+    'Clock': {'sec': (1, 'uint64'), 'usec': (2, 'uint64')},
+    'FeedBack': {
+        'joints': (1, 'Joints'), 'cartesian': (2, 'Pose'), 'externalJoints': (3, 'Joints'),
+        'time': (4, 'Clock'),
+    },
+    'Robot': {'header': (1, 'Header'), 'feedBack': (2, 'FeedBack')},
+}  # fmt: skip
+# The clock of the controller drifts: only so many packets say what the fastest way takes.
+REMEMBERED = 2500
 SILENT_S = 2.0
 POLL_S = 0.2
-# Another sender is reported for so long [ns].
-OTHER_NS = 10_000_000_000
 
-SOURCE = fixed_while_running(
+
+@cache
+def egm_message(name: str = 'Robot') -> Any:
+    """The class of a message in ``MESSAGES``, for all of EgmRobot that is read.
+
+    Raises PaintError where protobuf is not installed.
+    """
+    try:
+        from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
+    except ImportError:
+        raise PaintError(
+            'egm_source needs protobuf, which is not installed; run: pip install protobuf'
+        ) from None
+    file = descriptor_pb2.FileDescriptorProto(name='egm_read.proto', package='egm_read')
+    kinds = descriptor_pb2.FieldDescriptorProto
+    for message, fields in MESSAGES.items():
+        described = file.message_type.add(name=message)
+        for field, (number, kind) in fields.items():
+            many = kinds.LABEL_REPEATED if kind == 'doubles' else kinds.LABEL_OPTIONAL
+            made = described.field.add(name=field, number=number, label=many)
+            if kind in MESSAGES:
+                made.type, made.type_name = kinds.TYPE_MESSAGE, f'.egm_read.{kind}'
+            else:
+                made.type = getattr(kinds, f'TYPE_{kind.rstrip("s").upper()}')
+    pool = descriptor_pool.DescriptorPool()
+    pool.Add(file)
+    return message_factory.GetMessageClass(pool.FindMessageTypeByName(f'egm_read.{name}'))
+
+
+@dataclass(frozen=True)
+class EgmSample:
+    """A measured position: stamp [ns], TCP in the correction frame, and the joints.
+
+    ``pose`` is x y z [m] qx qy qz qw, None if none was sent; ``joints_rad`` are the robot's,
+    ``external`` as sent, deg or mm.
+    """
+
+    stamp_ns: int
+    pose: tuple[float, ...] | None
+    joints_rad: np.ndarray
+    external: np.ndarray
+
+
+class EgmStream:
+    """Decodes the packets of one robot, counts those lost and repeated, and stamps positions.
+
+    The controller's milliseconds are brought to this machine's clock by the packets that were
+    fastest of late, so that a late packet does not delay its position; ``lag_ns`` is the age of a
+    position when its packet leaves.
+
+    The first to send a whole EgmRobot is the robot, until it is silent.
+
+    Attributes:
+        received, lost, repeated, invalid: packets; lost ones by the gaps of their numbers.
+        sender: address of the robot, '' before the first packet; other: of another that sends,
+            too, the last of them at ``other_ns``.
+        late_ns: how much later than the fastest way the last packet came.
+        own_lag_ns: from the controller's own time of the last position to its arrival; None where
+            it was not sent. It is a lag only if both clocks are set.
+    """
+
+    def __init__(self, lag_ns: int) -> None:
+        self.lag_ns = lag_ns
+        self.received = self.lost = self.repeated = self.invalid = self.late_ns = 0
+        self.own_lag_ns: int | None = None
+        self.sender = self.other = ''
+        self.other_ns = self._heard_ns = self._sent_ns = 0
+        self._newest: int | None = None
+        self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
+
+    def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> EgmSample | None:
+        """The position in a packet; None for one that is not the robot's, invalid, repeated or
+        out of order.
+        """
+        from google.protobuf.message import DecodeError
+
+        try:
+            robot = egm_message().FromString(packet)
+        except DecodeError:
+            robot = None
+        if robot is None or not _is_whole(robot):
+            self.invalid += 1
+            return None
+        if sender != self.sender:
+            # Silent for so long, it leaves the port to another.
+            if self.sender and arrived_ns - self._heard_ns < 2_000_000_000:
+                self.other, self.other_ns = sender, arrived_ns
+                return None
+            self.sender, self._newest = sender, None
+            self._ways_ns.clear()
+        self._heard_ns = arrived_ns
+        self.received += 1
+        if not self._is_next(robot.header.seqno):
+            self.repeated += 1
+            return None
+        sent_ns = robot.header.tm * 1_000_000
+        if sent_ns < self._sent_ns:  # the clock was set back, or its 32 bits have run over
+            self._ways_ns.clear()
+        self._sent_ns = sent_ns
+        self._ways_ns.append(arrived_ns - sent_ns)
+        fastest_ns = min(self._ways_ns)
+        self.late_ns = arrived_ns - sent_ns - fastest_ns
+        measured = robot.feedBack
+        self.own_lag_ns = None
+        if measured.HasField('time'):
+            own_ns = measured.time.sec * 1_000_000_000 + measured.time.usec * 1000
+            self.own_lag_ns = arrived_ns - own_ns
+        pose = None
+        if measured.cartesian.HasField('orient'):
+            p, q = measured.cartesian.pos, measured.cartesian.orient
+            pose = (1e-3 * p.x, 1e-3 * p.y, 1e-3 * p.z, q.u1, q.u2, q.u3, q.u0)
+        return EgmSample(
+            sent_ns + fastest_ns - self.lag_ns, pose, np.radians(measured.joints.joints),
+            np.array(measured.externalJoints.joints),
+        )  # fmt: skip
+
+    def _is_next(self, number: int) -> bool:
+        """Whether a packet is newer than those before; counts what is missing between."""
+        step = 1 if self._newest is None else number - self._newest
+        # A stream that was started again.
+        if step < -1000 or (step < 0 and number <= 1):
+            self._ways_ns.clear()
+            step = 1
+        if step <= 0:
+            return False
+        self.lost += step - 1
+        self._newest = number
+        return True
+
+
+def _is_whole(robot: Any) -> bool:
+    """Whether a packet has number and time, and a place or joints that are finite."""
+    if not (robot.header.HasField('seqno') and robot.header.HasField('tm')):
+        return False
+    place, joints = robot.feedBack.cartesian, [*robot.feedBack.joints.joints]
+    of_place = [(place.pos, axis) for axis in 'xyz'] + [(place.orient, f'u{k}') for k in range(4)]
+    has_place = all(kind.HasField(name) for kind, name in of_place)
+    numbers = [*joints, *robot.feedBack.externalJoints.joints]
+    numbers += [getattr(kind, name) for kind, name in of_place]
+    return (has_place or len(joints) > 0) and bool(np.isfinite(numbers).all())
+
+
+EGM = fixed_while_running(
     'the stream is read with it; restart the node',
     address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
     robot_address=NodeParameter(
@@ -40,7 +199,7 @@ SOURCE = fixed_while_running(
     ),
     external_scales=NodeParameter(
         [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
-        constraints='above 0, one for each external axis',
+        constraints='numbers above 0, one for each external axis',
         allows=lambda value: all(scale > 0.0 for scale in value or ()),
         element=float,
     ),
@@ -59,7 +218,7 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
-    PARAMETERS = SOURCE
+    PARAMETERS = EGM
 
     def __init__(self, **kwargs: Any):
         super().__init__('egm_source', **kwargs)
@@ -68,10 +227,8 @@ class EgmSource(PaintNode):
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
         self.stream = EgmStream(round(1e9 * self.values['lag_s']))
         self._heard_s = time.monotonic()
-        Diagnostics(self, {'robot': self._status})
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._listen, name='egm', daemon=True)
-        self._thread.start()
+        self.report({'robot': self.status})
+        self.start_thread(self._listen)
 
     def _validate(self, values: Any) -> None:
         egm_message()
@@ -95,23 +252,18 @@ class EgmSource(PaintNode):
         self._socket.settimeout(POLL_S)
 
     def close(self) -> None:
-        self._stop()
+        super().close()
         heard = self.stream
         self.get_logger().info(
             f'{heard.received} packets, {heard.lost} lost, {heard.repeated} repeated'
         )
 
     def destroy_node(self) -> None:
-        self._stop()
         super().destroy_node()
-
-    def _stop(self) -> None:
-        self._stopped.set()
-        self._thread.join()
         self._socket.close()
 
     def _listen(self) -> None:
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             try:
                 packet, (sender, _) = self._socket.recvfrom(65_536)
             except TimeoutError:
@@ -124,20 +276,17 @@ class EgmSource(PaintNode):
                 self._publish(sample)
 
     def _publish(self, sample: EgmSample) -> None:
-        at = header(self.values['frame_id'], sample.stamp_ns)
+        frame_id, stamp = self.values['frame_id'], sample.stamp_ns
         if sample.pose is not None:
-            pose = PoseStamped(header=at)
-            p, q = pose.pose.position, pose.pose.orientation
-            p.x, p.y, p.z, q.x, q.y, q.z, q.w = sample.pose
-            self._poses.publish(pose)
+            self._poses.publish(pose_message(frame_id, stamp, sample.pose))
         names, external = self.values['joint_names'], self.values['external_joints']
         if len(sample.joints_rad) >= len(names) and len(sample.external) >= len(external):
             scaled = sample.external[: len(external)] * self.values['external_scales']
             positions = [*sample.joints_rad[: len(names)].tolist(), *scaled.tolist()]
-            state = JointState(header=at, name=[*names, *external], position=positions)
-            self._joints.publish(state)
+            at, joints = header(frame_id, stamp), [*names, *external]
+            self._joints.publish(JointState(header=at, name=joints, position=positions))
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         stream, values = self.stream, self.values
         own = 'not sent' if stream.own_lag_ns is None else f'{1e-6 * stream.own_lag_ns:.1f}'
         figures = {
@@ -148,7 +297,7 @@ class EgmSource(PaintNode):
             'last packet later than the fastest [ms]': f'{1e-6 * stream.late_ns:.1f}',
             "from the controller's own time to arrival [ms]": own,
         }  # fmt: skip
-        if time.time_ns() - stream.other_ns < OTHER_NS:
+        if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
             return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
         if time.monotonic() - self._heard_s > SILENT_S:

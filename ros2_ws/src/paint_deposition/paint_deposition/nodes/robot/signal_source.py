@@ -19,7 +19,7 @@ from paint_deposition.files.recordings.headers import pose_of, stamp_ns
 from paint_deposition.motion.stream_quality import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Diagnostics, PaintNode, Status
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter
 
 # What a state takes from signals: the field, and its unit.
@@ -27,9 +27,6 @@ FIELDS = {
     'flow': ('flow_cm3_per_min', 'cm3/min'), 'bell_speed': ('bell_speed_rpm', '1/min'),
     'shaping_air': ('shaping_air_l_per_min', 'l/min'), 'voltage': ('voltage_kv', 'kV'),
 }  # fmt: skip
-# The gun stands and goes [m/s]; the opening of the gun belongs to a start that is so near [s].
-STANDS_M_PER_S, GOES_M_PER_S = 0.005, 0.02
-NEAR_S = 2.0
 REMEMBERED = 50
 
 SIGNALS = {
@@ -67,9 +64,9 @@ class StartsOfMotion:
         """Take a pose."""
         self._speed.add(np.array([stamp]), position_m[np.newaxis])
         speed = self._speed.m_per_s
-        if speed < STANDS_M_PER_S:
+        if speed < 0.005:
             self._stood, self._rest_ns = True, stamp
-        elif self._stood and speed > GOES_M_PER_S:
+        elif self._stood and speed > 0.02:
             self._stood = False
             self._starts.append(self._rest_ns)
 
@@ -82,7 +79,8 @@ class StartsOfMotion:
         starts = np.array(self._starts)
         apart = [1e-9 * (at - starts) for at in self._opened if len(starts)]
         nearest = [float(each[np.argmin(np.abs(each))]) for each in apart]
-        near = [each for each in nearest if abs(each) < NEAR_S]
+        # The opening of the gun belongs to a start that is so near [s].
+        near = [each for each in nearest if abs(each) < 2.0]
         return (float(np.median(near)) if near else math.nan), len(near)
 
 
@@ -111,10 +109,8 @@ class SignalSource(PaintNode):
         self._lags_s: deque[float] = deque(maxlen=REMEMBERED)
         self._starts = StartsOfMotion()
         self.create_subscription(PoseStamped, POSES, self._take_pose, qos_profile_sensor_data)
-        Diagnostics(self, {'signals': self._status})
-        self._stopped = threading.Event()
-        self._thread = threading.Thread(target=self._keep_following, name=name, daemon=True)
-        self._thread.start()
+        self.report({'signals': self.status})
+        self.start_thread(self._keep_following)
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         if urlsplit(values['url']).username is not None:
@@ -128,30 +124,19 @@ class SignalSource(PaintNode):
         if len(set(named)) < len(named):
             raise PaintError(f'{self.get_name()}: a signal is named twice: {" ".join(named)}')
 
-    def destroy_node(self) -> None:
-        self._stop()
-        super().destroy_node()
-
-    def close(self) -> None:
-        self._stop()
-
-    def _stop(self) -> None:
-        self._stopped.set()
-        self._thread.join()
-
     def follow(self, stopped: Callable[[], bool]) -> None:
         """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
         raise NotImplementedError
 
     def _keep_following(self) -> None:
-        while not self._stopped.is_set():
+        while not self.stopped.is_set():
             self._silent = {*self.signals}
             try:
-                self.follow(self._stopped.is_set)
+                self.follow(self.stopped.is_set)
             except Exception as error:  # whatever a network and its libraries bring
                 text = ' '.join(str(error).split()) or type(error).__name__
                 self._problem = f'{self.values["url"]}: {text}'
-            self._stopped.wait(1.0)
+            self.stopped.wait(1.0)
 
     def connected(self) -> None:
         """All signals are subscribed to."""
@@ -204,7 +189,7 @@ class SignalSource(PaintNode):
         with self._lock:
             self._starts.add_pose(stamp_ns(pose.header), pose_of(pose.pose)[0])
 
-    def _status(self) -> Status:
+    def status(self) -> Status:
         with self._lock:
             return self._status_now()
 

@@ -6,7 +6,7 @@ from typing import Any
 from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallbackReturn
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.node import ERROR, OK, Diagnostics, PaintNode, Status, Task
+from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
@@ -47,7 +47,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def _start(self) -> None:
         LifecycleNodeMixin.__init__(self)
-        self._diagnostics = Diagnostics(self, {'state': self._state_status})
+        self.report({'state': self._state_status})
         self.autostarting = self.values['autostart']
         if not self.autostarting:
             self.get_logger().info('waiting for a lifecycle manager to configure this node')
@@ -92,6 +92,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
         if self.configured:
             self._leave(self._run_cleanup)
 
+    def destroy_node(self) -> None:
+        super().destroy_node()
+        # rclpy leaves the services of the lifecycle to the garbage collector. Meanwhile they are
+        # counted by whoever looks for those of the next node of this name.
+        if hasattr(self, '_state_machine'):
+            self._state_machine.destroy_when_not_in_use()
+
     # --- transitions
 
     def on_configure(self, state: LifecycleState) -> TransitionCallbackReturn:
@@ -116,15 +123,15 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _load_and_configure(self) -> None:
         self._load()
         self._configure()
-        self._diagnostics.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
+        self.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
 
     def _run_cleanup(self) -> None:
         try:
             self._cleanup()
         finally:
             # An aggregator would report a status that is no longer published as stale.
-            for task in self._diagnostics.tasks.keys() - {'state'}:
-                self._diagnostics.tasks[task] = lambda: Status(OK, 'the node is not configured')
+            for task in self.tasks.keys() - {'state'}:
+                self.tasks[task] = lambda: Status(OK, 'the node is not configured')
 
     def _transition_result(
         self, done: str, transition: Callable[[], None]

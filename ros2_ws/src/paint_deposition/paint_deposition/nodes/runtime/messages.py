@@ -6,9 +6,10 @@ once, and for each publication only its stamp and colours are rewritten in the b
 
 import importlib
 import struct
+from collections.abc import Iterable
 
 import numpy as np
-from geometry_msgs.msg import Point, Vector3
+from geometry_msgs.msg import Point, PoseStamped, Vector3
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
@@ -29,6 +30,14 @@ SAMPLE_COLOURS = np.array(
 
 def header(frame_id: str, stamp_ns: int) -> Header:
     return Header(frame_id=frame_id, stamp=Time(nanoseconds=stamp_ns).to_msg())
+
+
+def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseStamped:
+    """A pose x y z qx qy qz qw in a frame at a time."""
+    pose = PoseStamped(header=header(frame_id, stamp_ns))
+    p, q = pose.pose.position, pose.pose.orientation
+    p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
+    return pose
 
 
 def message_class(type_name: str) -> type:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import concurrent.futures
 import os
+import threading
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,12 +17,12 @@ from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
 from rclpy.node import Node
 from rclpy.parameter import Parameter
+from rclpy.qos import QoSProfile
 from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
@@ -33,6 +34,18 @@ WARN = DiagnosticStatus.WARN
 ERROR = DiagnosticStatus.ERROR
 
 
+@dataclass(frozen=True)
+class Status:
+    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
+
+    level: bytes
+    message: str
+    values: Mapping[str, object] = field(default_factory=dict)
+
+
+Task = Callable[[], Status]
+
+
 class PaintNode(Node):
     """A node with a table of parameters, which can end its process.
 
@@ -42,15 +55,19 @@ class PaintNode(Node):
         loading: whether a node of this process is reading its files.
         stopping: whether this process was asked to end.
         values: current values of the parameters, by name.
+        stopped: whether the thread of this node is to end.
+        tasks: the diagnostic tasks, by name.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
     PARAMETERS: ParameterTable = MappingProxyType({})
     loading = stopping = False
+    _thread: threading.Thread | None = None
 
     def __init__(self, name: str, **kwargs: Any):
         super().__init__(name, **kwargs)
         self.finished: Future = Future()
+        self.stopped = threading.Event()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
@@ -101,6 +118,11 @@ class PaintNode(Node):
 
     def close(self) -> None:
         """Close files and the like. Called once, after the last callback; signals are ignored."""
+        self._end_thread()
+
+    def destroy_node(self) -> None:
+        self._end_thread()
+        super().destroy_node()
 
     # --- for all users
 
@@ -108,6 +130,16 @@ class PaintNode(Node):
     def configured(self) -> bool:
         """Whether the files have been read."""
         return True
+
+    def start_thread(self, work: Callable[[], None]) -> None:
+        """Do work that ends soon once ``stopped`` is set, which closing the node does."""
+        self._thread = threading.Thread(target=work, name=self.get_name(), daemon=True)
+        self._thread.start()
+
+    def _end_thread(self) -> None:
+        self.stopped.set()
+        if self._thread is not None:
+            self._thread.join()
 
     def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
@@ -171,6 +203,37 @@ class PaintNode(Node):
             file for held in paths for file in ([held] if isinstance(held, str) else held) if file
         ]
 
+    # --- diagnostics
+
+    def report(self, tasks: Mapping[str, Task], period_s: float = 1.0) -> None:
+        """Publish the status of each task by name on /diagnostics, once in each period.
+
+        They go on while a simulated clock stands still. ``tasks`` may change later.
+        """
+        self.tasks = dict(tasks)
+        self._reports = self.create_publisher(
+            DiagnosticArray, '/diagnostics', QoSProfile(depth=10)
+        )
+        self.create_steady_timer(period_s, self.publish_diagnostics)
+
+    def publish_diagnostics(self) -> None:
+        """Publish the status of each task now."""
+        message = DiagnosticArray()
+        message.header.stamp = self.get_clock().now().to_msg()
+        full_name = self.get_fully_qualified_name()
+        for name, status_of in self.tasks.items():
+            status = status_of()
+            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
+            # Aggregators tell two cells apart by the namespace.
+            task = f'{full_name.lstrip("/")}: {name}'
+            message.status.append(
+                DiagnosticStatus(
+                    level=status.level, name=task, message=status.message,
+                    hardware_id=full_name, values=values,
+                )
+            )  # fmt: skip
+        self._reports.publish(message)
+
     # --- changes of parameters
 
     def set_parameters_atomically(
@@ -219,48 +282,3 @@ def real_path(file: str) -> Path:
     Unlike the methods of a path, these functions mind no unknown user and no loop of links.
     """
     return Path(os.path.realpath(os.path.expanduser(file)))
-
-
-@dataclass(frozen=True)
-class Status:
-    """The status of one diagnostic task; `level` is OK, WARN or ERROR (single bytes)."""
-
-    level: bytes
-    message: str
-    values: Mapping[str, object] = field(default_factory=dict)
-
-
-Task = Callable[[], Status]
-
-
-class Diagnostics:
-    """Publishes the status of every task of a node on /diagnostics.
-
-    `tasks`, which may change, maps names to functions that return a `Status`. They are called
-    once in each period of the steady clock, even while a simulated clock stands still.
-    """
-
-    def __init__(self, node: PaintNode, tasks: Mapping[str, Task], period_s: float = 1.0):
-        self._node = node
-        self.tasks = dict(tasks)
-        self._publisher = node.create_publisher(
-            DiagnosticArray, '/diagnostics', topics.DIAGNOSTICS
-        )
-        node.create_steady_timer(period_s, self.publish)
-
-    def publish(self) -> None:
-        message = DiagnosticArray()
-        message.header.stamp = self._node.get_clock().now().to_msg()
-        full_name = self._node.get_fully_qualified_name()
-        for name, status_of in self.tasks.items():
-            status = status_of()
-            values = [KeyValue(key=key, value=str(value)) for key, value in status.values.items()]
-            # Aggregators tell two cells apart by the namespace.
-            task = f'{full_name.lstrip("/")}: {name}'
-            message.status.append(
-                DiagnosticStatus(
-                    level=status.level, name=task, message=status.message,
-                    hardware_id=full_name, values=values,
-                )
-            )  # fmt: skip
-        self._publisher.publish(message)

@@ -1,12 +1,15 @@
 """Tables of node parameters, from which they are declared, described and validated."""
 
+import contextlib
 import math
 import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from functools import cached_property
+from typing import Annotated, Any, Literal, get_args
 
+from pydantic import AfterValidator, BaseModel, Field, TypeAdapter, ValidationError
 from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
@@ -18,9 +21,15 @@ from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError, did_you_mean, quoted
 
-INT64_MAX = 2**63 - 1
-# Declared by rclpy itself, or read by it when publishers and subscriptions are created.
-RESERVED_NAMES = frozenset({'use_sim_time', 'start_type_description_service'})
+# How bounds are said.
+BOUNDS = {
+    'greater than or equal to': 'at least',
+    'less than or equal to': 'at most',
+    'greater than': 'a number above',
+    'less than': 'a number below',
+}
+# By the endings of names.
+UNITS = {'_m_per_s': 'm/s', '_m_per_s2': 'm/s2', '_um': 'µm', '_rad': 'rad', '_m': 'm'}
 GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
 LONGEST_SHOWN = 40  # letters of a name that is refused
 RUNS = 'runs'  # `fixed_while`: in every state
@@ -29,21 +38,13 @@ FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9._-]{0,199}')
 FILE_NAME_RULE = (
     "at most 200 letters, digits, '-', '_' and '.', the first a letter, a digit or '_'"
 )
-TYPE_DESCRIPTIONS = {
-    Parameter.Type.BOOL: 'true or false',
-    Parameter.Type.INTEGER: 'a whole number',
-    Parameter.Type.DOUBLE: 'a number',
-    Parameter.Type.STRING: 'text',
-    Parameter.Type.DOUBLE_ARRAY: 'a list of numbers',
-    Parameter.Type.STRING_ARRAY: 'a list of texts',
-}
 
 
 @dataclass(frozen=True)
 class NodeParameter:
     """One row of a node's parameter table.
 
-    `default` determines the type; an empty list needs its `element` type (str or float) as well.
+    `default` determines the type; a list needs its `element` type (str or float) as well.
     `description` ends with the unit; with `[path]`, a leading `~` of the value is expanded.
     `bounds` are inclusive, and the upper one may be infinite. `allows` (value -> bool) is a
     further check, and `constraints` describes it. `fixed_because` is the reason why the parameter
@@ -67,10 +68,8 @@ class NodeParameter:
 
     @property
     def ros_type(self) -> Parameter.Type:
-        if isinstance(self.default, list):
-            element = self.element or type(self.default[0])
-            return Parameter.Type.from_parameter_value([element()])
-        return Parameter.Type.from_parameter_value(self.default)
+        value = [self.element()] if self.element else self.default
+        return Parameter.Type.from_parameter_value(value)
 
     def descriptor(self) -> ParameterDescriptor:
         texts = ['one of ' + ', '.join(self.choices) if self.choices else self.constraints]
@@ -84,43 +83,75 @@ class NodeParameter:
         )
         low, high = self.bounds or (0, 0)
         if self.bounds and self.ros_type == Parameter.Type.INTEGER:
-            most = int(min(high, INT64_MAX))
+            most = int(min(high, 2**63 - 1))
             descriptor.integer_range = [IntegerRange(from_value=int(low), to_value=most)]
         elif self.bounds:
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         return descriptor
 
-    def coerced(self, value: Any) -> Any:
-        """`value` in the parameter's type: YAML may have 2 for 2.0, and ROS None for [].
-
-        A leading `~` of a path is expanded: no shell does so in parameter files or after `:=`.
-        """
-        if isinstance(self.default, list) and not isinstance(value, (str, int, float)):
-            return [self._coerced_item(item) for item in value or []]
-        return self._coerced_item(value)
-
-    def _coerced_item(self, value: Any) -> Any:
-        if isinstance(value, str) and self.description.endswith('[path]'):
-            return os.path.expanduser(value)
-        is_double = self.ros_type in (Parameter.Type.DOUBLE, Parameter.Type.DOUBLE_ARRAY)
-        return float(value) if is_double and type(value) is int else value
-
-    def error_for(self, value: Any) -> str | None:
-        """Why a value of the right type is invalid, or None."""
-        if isinstance(value, float) and not math.isfinite(value):
-            return f'is {value}: give a finite number'
-        if self.bounds and not self.bounds[0] <= value <= self.bounds[1]:
+    @cached_property
+    def _adapter(self) -> TypeAdapter[Any]:
+        """What checks a value: the same as checks the requests of commands."""
+        kind: Any = self.element or type(self.default)
+        limits: dict[str, Any] = {'strict': True}
+        if kind is float:
+            limits['allow_inf_nan'] = False
+        if self.bounds:
             low, high = self.bounds
-            upper = f' and at most {high}' if math.isfinite(high) else ''
-            return f'is {value}: must be at least {low}{upper}'
-        if self.choices and value not in self.choices:
-            return f'is {quoted(value)}: choose one of {", ".join(self.choices)}'
+            limits |= {'ge': low} | ({'le': high} if math.isfinite(high) else {})
+        kind = Literal[self.choices] if self.choices else Annotated[kind, Field(**limits)]
+        if self.description.endswith('[path]'):
+            # No shell expands a leading ~ in parameter files or after :=.
+            kind = Annotated[kind, AfterValidator(os.path.expanduser)]
+        return TypeAdapter(list[kind] if self.element else kind)
+
+    def checked(self, name: str, value: Any) -> Any:
+        """A value for the parameter of this name, in its type.
+
+        YAML may have 2 for 2.0, and ROS None for []. Raises PaintError.
+        """
+        if self.element and not isinstance(value, (str, int, float)):
+            value = list(value or [])
+        try:
+            value = self._adapter.validate_python(value)
+        except ValidationError as error:
+            remedy = error.errors()[0]['msg'].removeprefix('Input should be ')
+            for long, short in BOUNDS.items():
+                remedy = remedy.replace(long, short)
+            shown = f'{value:g}' if isinstance(value, float) else quoted(value)
+            raise PaintError(f'{name} is {shown}; give {remedy}') from None
         if self.allows is not None and not self.allows(value):
-            return f'is {quoted(value)}: must be {self.constraints}'
-        return None
+            raise PaintError(f'{name} is {quoted(value)}; give {self.constraints}')
+        return value
 
 
 ParameterTable = Mapping[str, NodeParameter]
+
+
+def requested(
+    request: type[BaseModel], name: str, default: Any = 0.0, none: str = ''
+) -> NodeParameter:
+    """The row for a field of a request, described as its option.
+
+    A field that may be left out is 0 for that, and `none` says what is then where its text does
+    not.
+    """
+    field = request.model_fields[name]
+    text = str(field.description).rstrip('.')
+    if isinstance(default, bool):
+        return NodeParameter(default, f'{text.replace("default:", "false:")} [true/false]')
+    if isinstance(default, str):
+        return NodeParameter(default, f'{text} [name]', choices=get_args(field.annotation))
+    unit = next(unit for ending, unit in UNITS.items() if name.endswith(ending))
+    text = text.replace(f' [{unit}]', '').replace('default:', '0:')
+    low, high = -math.inf, math.inf
+    for bound in field.metadata:
+        low = getattr(bound, 'ge', getattr(bound, 'gt', low))
+        high = getattr(bound, 'le', getattr(bound, 'lt', high))
+    low = low if field.default is not None else 0.0
+    text += f'; 0: {none}' if none else ''
+    bounds = None if (low, high) == (-math.inf, math.inf) else (low, high)
+    return NodeParameter(default, f'{text} [{unit}]', bounds)
 
 
 def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter:
@@ -143,7 +174,7 @@ def direction_parameter(description: str) -> NodeParameter:
         [],
         description,
         constraints='three numbers that are not all zero, or none',
-        allows=_is_direction,
+        allows=lambda value: not value or (len(value) == 3 and any(value)),
         element=float,
     )
 
@@ -204,10 +235,6 @@ def fixed_while_configured(because: str, **rows: NodeParameter) -> ParameterTabl
     return fixed_while_running(because, 'is configured', **rows)
 
 
-def _is_direction(value: list[float]) -> bool:
-    return not value or (len(value) == 3 and all(map(math.isfinite, value)) and any(value))
-
-
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     """Declare every row on `node`, validate all later changes, and return the values.
 
@@ -215,51 +242,48 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     """
     # rclpy has no public access to overrides that are not declared, such as misspelt names.
     overrides = {name: parameter.value for name, parameter in node._parameter_overrides.items()}
-    for name in overrides:
-        if name not in {*table, *RESERVED_NAMES} and not name.startswith('qos_overrides.'):
+    of_rclpy = {'use_sim_time', 'start_type_description_service'}
+    for name in overrides.keys() - table.keys() - of_rclpy:
+        if not name.startswith('qos_overrides.'):
             remedy = did_you_mean(name, table)
             raise PaintError(f'{node.get_name()} has no parameter {name}; {remedy}')
     node.add_pre_set_parameters_callback(
-        lambda changes: [_coerced_change(table.get(change.name), change) for change in changes]
+        lambda changes: [_typed(table.get(change.name), change) for change in changes]
     )
     node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
     for name, row in table.items():
-        _declare(node, name, row, row.coerced(overrides.get(name, row.default)))
+        try:
+            value = row.checked(name, overrides.get(name, row.default))
+        except PaintError as error:
+            raise PaintError(f'{node.get_name()}: {error}') from None
+        if value != []:
+            node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
+            continue
+        # rclpy takes an empty list for bytes unless the type is declared before the value is set.
+        writable = row.descriptor()
+        writable.read_only = False
+        node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
+        node.set_parameters([Parameter(name, row.ros_type, [])])
+        node.set_descriptor(name, row.descriptor())
     return {name: node.get_parameter(name).value for name in table}
 
 
-def _declare(node: Node, name: str, row: NodeParameter, value: Any) -> None:
-    reason = None
-    if value != [] and Parameter.Type.from_parameter_value(value) != row.ros_type:
-        reason = f'is {quoted(value)}: give {TYPE_DESCRIPTIONS[row.ros_type]}'
-    if reason := reason or row.error_for(value):
-        raise PaintError(f'{node.get_name()}: {name} {reason}')
-    if value != []:
-        node.declare_parameter(name, value, row.descriptor(), ignore_override=True)
-        return
-    # rclpy takes an empty list for bytes unless the type is declared before the value is set.
-    writable = row.descriptor()
-    writable.read_only = False
-    node.declare_parameter(name, row.ros_type, writable, ignore_override=True)
-    node.set_parameters([Parameter(name, row.ros_type, [])])
-    node.set_descriptor(name, row.descriptor())
-
-
-def _coerced_change(row: NodeParameter | None, change: Parameter) -> Parameter:
-    """The change with its value in the type of the row, also for an empty list."""
-    if row is None:
-        return change
-    value = row.coerced(change.value)
-    if value == []:
-        return Parameter(change.name, row.ros_type, [])
-    return Parameter(change.name, value=value)
+def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
+    """The change with its value in the type of the row; one that is invalid as it is."""
+    with contextlib.suppress(PaintError):
+        if row is not None:
+            value = row.checked(change.name, change.value)
+            return Parameter(change.name, row.ros_type, value)
+    return change
 
 
 def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:
-    for change in changes:
-        reason = table[change.name].error_for(change.value) if change.name in table else None
-        if reason:
-            return SetParametersResult(successful=False, reason=f'{change.name} {reason}')
+    try:
+        for change in changes:
+            if change.name in table:
+                table[change.name].checked(change.name, change.value)
+    except PaintError as error:
+        return SetParametersResult(successful=False, reason=str(error))
     return SetParametersResult(successful=True)
 
 

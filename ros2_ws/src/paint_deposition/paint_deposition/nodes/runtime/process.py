@@ -12,11 +12,6 @@ from rclpy.signals import SignalHandlerOptions
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import PaintNode
 
-EXIT_BAD_INPUT = 2
-EXIT_CRASH = 1
-# Signals do not reach the main thread while it waits in the middleware.
-SPIN_TIMEOUT_S = 0.1
-
 
 def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = None) -> int:
     """Run one node until it finishes or the process gets a signal; return the exit code.
@@ -85,7 +80,8 @@ def _spin(node: PaintNode, signals: list[int]) -> int:
     if not signals:
         node.get_logger().info('ready')
     while not (signals or node.finished.done()):
-        executor.spin_once(timeout_sec=SPIN_TIMEOUT_S)
+        # Signals do not reach the main thread while it waits in the middleware.
+        executor.spin_once(timeout_sec=0.1)
     executor.remove_node(node)
     executor.shutdown(timeout_sec=5.0)
     return (node.finished.result() or 0) if node.finished.done() else 0
@@ -94,6 +90,6 @@ def _spin(node: PaintNode, signals: list[int]) -> int:
 def _report_error(error: Exception) -> int:
     if isinstance(error, PaintError | MemoryError):
         sys.stderr.write(f'error: {str(error) or "not enough memory"}\n')
-        return EXIT_BAD_INPUT
+        return 2
     traceback.print_exception(error)
-    return EXIT_CRASH
+    return 1

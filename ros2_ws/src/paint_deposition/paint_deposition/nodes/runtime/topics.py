@@ -1,9 +1,17 @@
-"""Names and quality of service of the topics."""
+"""Topics: their names and quality of service, and subscriptions that fit their publishers."""
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+from typing import Any
 
+from rclpy.callback_groups import CallbackGroup
+from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from paint_deposition.nodes.runtime.messages import SequenceNumbers
 
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
@@ -18,8 +26,13 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 # Clouds, fields and other results that are drawn or recorded as they arrive.
 RESULTS = QoSProfile(depth=10)
 PROGRESS = QoSProfile(depth=100)
-DIAGNOSTICS = QoSProfile(depth=10)
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
+# More than a publisher keeps for late subscribers, or sends while a subscription is new.
+REMEMBERED_MESSAGES = 2000
+# Both ends of a new subscription know of each other after less; meanwhile others count, too.
+OVERLAP_S = 1.0
+Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
+USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
 
 def gun_topic(name: str, topic: str) -> str:
@@ -27,17 +40,137 @@ def gun_topic(name: str, topic: str) -> str:
     return f'{name}/{topic}' if name else topic
 
 
-def compatible_qos(offered: Sequence[QoSProfile], depth: int) -> QoSProfile:
-    """The strictest QoS of a subscription that is compatible with all these publishers."""
-    all_reliable = all(p.reliability == ReliabilityPolicy.RELIABLE for p in offered)
-    all_latched = all(p.durability == DurabilityPolicy.TRANSIENT_LOCAL for p in offered)
-    return QoSProfile(
-        depth=depth,
-        reliability=ReliabilityPolicy.RELIABLE if all_reliable else ReliabilityPolicy.BEST_EFFORT,
-        durability=DurabilityPolicy.TRANSIENT_LOCAL if all_latched else DurabilityPolicy.VOLATILE,
-    )
-
-
 def node_name(info: TopicEndpointInfo) -> str:
     """The fully qualified name of the node of an endpoint."""
     return f'{info.node_namespace.rstrip("/")}/{info.node_name}'
+
+
+class PolledCallbackGroup(CallbackGroup):
+    """A callback group that never runs: its subscriptions are polled and do not wake the node."""
+
+    def can_execute(self, _entity: Any) -> bool:
+        return False
+
+    def beginning_execution(self, _entity: Any) -> bool:
+        return False
+
+    def ending_execution(self, _entity: Any) -> None:
+        """Nothing is ever executed."""
+
+
+class AdaptiveSubscription:
+    """Hears each publisher of a topic as reliably, and with `latched` as latched, as it offers.
+
+    There is one subscription for each quality of service among the publishers: one that fits all
+    would lose messages of the reliable ones, and what the latched ones keep, because of a weaker
+    one. A message that several of them receive counts once.
+
+    Args:
+        take: called with each message and what the middleware says of it.
+        depth: of the queue.
+        raw: whether messages are taken serialised.
+        polled: whether `take` is called by `take_pending` alone, which matches the quality of
+            service as well; else by the executor, and `match_qos` is called now and then.
+    """
+
+    def __init__(
+        self,
+        node: Node,
+        message: type,
+        topic: str,
+        take: Callable[[Any, Mapping[str, Any]], None],
+        *,
+        depth: int,
+        latched: bool = False,
+        raw: bool = False,
+        polled: bool = True,
+    ) -> None:
+        self._node, self._message, self._topic, self._take = node, message, topic, take
+        self._depth, self._latched, self._raw, self._polled = depth, latched, raw, polled
+        self._group = PolledCallbackGroup() if polled else None
+        self._numbers = SequenceNumbers()
+        # Times and publishers of messages that may come again, the newest last.
+        self._taken: dict[tuple[int, bytes], None] = {}
+        # The subscriptions, and when each was made and was last wanted.
+        self._subscriptions: dict[Quality, Subscription] = {}
+        self._made_s: dict[Quality, float] = {}
+        self._wanted_s: dict[Quality, float] = {}
+        self._offered: dict[bytes, Quality] = {}
+        self.match_qos()
+
+    @property
+    def lost(self) -> int:
+        """Messages missing after the first of each publisher."""
+        return self._numbers.lost
+
+    def take_pending(self) -> None:
+        """Take all messages in the queues."""
+        if self._polled and time.monotonic() - self._matched_s > 0.1:
+            self.match_qos()
+        for quality in sorted(self._subscriptions, key=_strictest_first):
+            self._drain(quality)
+
+    def match_qos(self) -> None:
+        """Subscribe by each quality of service that a publisher offers, and by no other."""
+        self._matched_s = time.monotonic()
+        topic = self._node.resolve_topic_name(self._topic)
+        publishers = self._node.get_publishers_info_by_topic(topic)
+        self._offered = {
+            bytes(info.endpoint_gid): (
+                info.qos_profile.reliability,
+                info.qos_profile.durability if self._latched else USUAL[1],
+            )
+            for info in publishers
+        }
+        wanted = {*self._offered.values()} or {*self._subscriptions} or {USUAL}
+        for quality in sorted(wanted - self._subscriptions.keys(), key=_strictest_first):
+            self._made_s[quality] = self._matched_s
+            reliability, durability = quality
+            self._subscriptions[quality] = self._node.create_subscription(
+                self._message, self._topic, partial(self._on_message, quality),
+                QoSProfile(depth=self._depth, reliability=reliability, durability=durability),
+                callback_group=self._group, raw=self._raw,
+            )  # fmt: skip
+        self._wanted_s |= dict.fromkeys(wanted, self._matched_s)
+        for quality in [*self._subscriptions]:
+            if self._matched_s - self._wanted_s[quality] > OVERLAP_S:
+                self._unsubscribe(quality)
+
+    def destroy(self) -> None:
+        """Take what is in the queues, and unsubscribe."""
+        for quality in [*self._subscriptions]:
+            self._unsubscribe(quality)
+
+    def _unsubscribe(self, quality: Quality) -> None:
+        self._drain(quality)
+        self._node.destroy_subscription(self._subscriptions.pop(quality))
+
+    def _drain(self, quality: Quality) -> None:
+        handle = self._subscriptions[quality].handle
+        with handle:
+            while taken := handle.take_message(self._message, self._raw):
+                self._on_message(quality, *taken)
+
+    def _on_message(self, heard_by: Quality, message: Any, info: Mapping[str, Any]) -> None:
+        publisher = bytes((info.get('publisher_gid') or {'data': b''})['data'])
+        offered = self._offered.get(publisher, heard_by)
+        own_s, now_s = self._made_s[offered], time.monotonic()
+        # Its own subscription, unless it is newer, has all and keeps the order.
+        is_newer = self._made_s[heard_by] < own_s and now_s - own_s < OVERLAP_S
+        if offered != heard_by and not is_newer:
+            return
+        # Some middleware does not number messages.
+        self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
+        # Publisher and time identify a message.
+        identity = info['source_timestamp'], publisher
+        if identity in self._taken:
+            return
+        if identity[0]:
+            self._taken[identity] = None
+            if len(self._taken) > REMEMBERED_MESSAGES:
+                del self._taken[next(iter(self._taken))]
+        self._take(message, info)
+
+
+def _strictest_first(quality: Quality) -> tuple[bool, bool]:
+    return quality[0] != ReliabilityPolicy.RELIABLE, quality[1] == DurabilityPolicy.VOLATILE

@@ -1,0 +1,1 @@
+"""The nodes that record bags and replay them."""

@@ -1,0 +1,282 @@
+"""The pace of a replay: the time in the bag, and how far it may be ahead of its subscribers."""
+
+import math
+import threading
+import time
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from paint_msgs.msg import PoseProgress
+from rclpy.duration import Duration
+from rclpy.node import Node
+from rclpy.publisher import Publisher
+
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
+
+GRAPH_PERIOD_S = 0.1
+LOG_PERIOD_S = 5.0
+ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
+# If a subscriber reports the same pose for so long while none is sent, later poses are lost to it.
+LOST_TIMEOUT_S = 5.0
+# A subscriber that has not reported at all is waited for no longer than this.
+NO_REPORT_TIMEOUT_S = 20.0
+
+
+class ReplayClock:
+    """Bag time as a function of the steady clock; thread-safe.
+
+    It does not advance before it is started and while it is paused. `rate` is bag seconds per
+    second; at 0, time jumps from message to message. `running` is False while paused.
+    """
+
+    def __init__(self, rate: float, running: bool = True) -> None:
+        self._rate = rate
+        self._changed = threading.Condition()
+        self._time_ns: int | None = None
+        self._since_s: float | None = None  # steady time at _time_ns; None while stopped
+        self._started = False
+        self.running = running
+
+    @property
+    def time_ns(self) -> int | None:
+        """Current time in the bag [ns], None before it was set."""
+        with self._changed:
+            if self._since_s is None or self._time_ns is None:
+                return self._time_ns
+            passed_s = time.monotonic() - self._since_s
+            return self._time_ns + round(passed_s * self._rate * 1e9)
+
+    def change(
+        self, *, started: bool | None = None, running: bool | None = None,
+        time_ns: int | None = None,
+    ) -> None:  # fmt: skip
+        """Start or stop, pause or go on; from now, or from that time on."""
+        with self._changed:
+            self._time_ns = self.time_ns if time_ns is None else time_ns
+            self._started = self._started if started is None else started
+            self.running = self.running if running is None else running
+            goes = self._started and self.running and self._rate
+            self._since_s = time.monotonic() if goes else None
+            self._changed.notify_all()
+
+    def jump_to(self, time_ns: int) -> None:
+        """At rate 0: jump to the time of a message."""
+        with self._changed:
+            if self._rate == 0.0:
+                self._time_ns = time_ns
+
+    def wait_for(self, time_ns: int, timeout_s: float) -> bool:
+        """Wait for that time, at rate 0 only for the end of a pause.
+
+        Returns:
+            False after the timeout.
+        """
+        with self._changed:
+            left_s = self._remaining_s(time_ns)
+            if left_s > 0.0:
+                self._changed.wait(min(left_s, timeout_s))
+            return self._remaining_s(time_ns) <= 0.0
+
+    def _remaining_s(self, time_ns: int) -> float:
+        if self._rate == 0.0:
+            return 0.0 if self.running else math.inf
+        if self._since_s is None or self._time_ns is None:
+            return math.inf
+        passed_s = time.monotonic() - self._since_s
+        return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
+
+
+@dataclass
+class Subscriber:
+    """Number of poses taken, monotonic times of the last progress and the last report.
+
+    `lost` poses never reached it; with `never_reported` it is no longer waited for.
+    """
+
+    taken: int
+    advanced_s: float
+    reported_s: float | None = None
+    lost: int = 0
+    never_reported: bool = False
+
+
+class PoseWindow:
+    """The poses that were sent, and how many of them each reporting subscriber has taken.
+
+    A subscriber that joins, or joins again, starts with the next pose. Its reports identify the
+    newest pose it has taken by the stamp; poses lost before that one are not waited for. All
+    times are monotonic seconds. Thread-safe.
+
+    Attributes:
+        subscribers: those present, by their full names.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._published = 0
+        self._published_s = 0.0
+        # Larger than the largest window.
+        self._stamps: deque[int] = deque(maxlen=20_000)
+        self.subscribers: dict[str, Subscriber] = {}
+
+    def add_sent(self, stamp_ns: int, now_s: float) -> None:
+        """Add a pose that was sent, by its stamp."""
+        with self._lock:
+            self._published += 1
+            self._published_s = now_s
+            self._stamps.append(stamp_ns)
+
+    def set_subscribers(self, names: Iterable[str], now_s: float) -> None:
+        """Set the subscribers that are present now; others are no longer waited for."""
+        with self._lock:
+            known = self.subscribers
+            self.subscribers = {
+                name: known.get(name) or Subscriber(self._published, now_s)
+                for name in sorted(names)
+            }
+
+    def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
+        """Set the newest pose that a subscriber has taken, or all of them without a name."""
+        with self._lock:
+            # Of poses with equal stamps, the newest.
+            back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
+            taken = 0 if back is None else self._published - back
+            for known, subscriber in self.subscribers.items():
+                if name in (None, known):
+                    subscriber.reported_s, subscriber.never_reported = now_s, False
+                    if taken > subscriber.taken:
+                        subscriber.taken, subscriber.advanced_s = taken, now_s
+
+    def lag(self, now_s: float) -> dict[str, int]:
+        """Number of poses that each subscriber still has to take, if it is waited for."""
+        with self._lock:
+            waited_for = {}
+            for name, subscriber in self.subscribers.items():
+                if subscriber.taken < self._published:
+                    self._time_out(subscriber, now_s)
+                if subscriber.taken < self._published and not subscriber.never_reported:
+                    waited_for[name] = self._published - subscriber.taken
+            return waited_for
+
+    def _time_out(self, subscriber: Subscriber, now_s: float) -> None:
+        quiet_since_s = max(self._published_s, subscriber.advanced_s)
+        if subscriber.reported_s is None:
+            subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
+        elif (
+            now_s - quiet_since_s > LOST_TIMEOUT_S
+            # Without reports in this time it may be busy.
+            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
+        ):
+            subscriber.lost += self._published - subscriber.taken
+            subscriber.taken = self._published
+
+
+class FlowControl:
+    """Keeps a publisher of poses at most `window` poses ahead of its subscribers.
+
+    It waits for each pose to be reported by the subscribers that publish PoseProgress on
+    `atomizer/progress`, and for the middleware's acknowledgement by the others. The waiting
+    methods are for one thread beside the executor, and return early once `stopped` is set.
+    `status` describes what is waited for.
+    """
+
+    def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
+        self._node, self._publisher = node, publisher
+        self._limit, self._stopped = window, stopped
+        self._window = PoseWindow()
+        self._sent = 0
+        self._discovered_s = -math.inf
+        self._never_reported: set[str] = set()
+        self.status = 'starting'
+        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
+
+    @property
+    def poses_ahead(self) -> int:
+        """Poses that the slowest reporting subscriber has not taken yet."""
+        return max(self._window.lag(time.monotonic()).values(), default=0)
+
+    def add_sent(self, pose_stamp_ns: int) -> None:
+        """Add a pose that is about to be published."""
+        self._sent += 1
+        self._window.add_sent(pose_stamp_ns, time.monotonic())
+
+    def wait_for_subscribers(self, wanted: int) -> None:
+        """Wait until there are so many subscribers and no more appear for a moment."""
+        seen, since_s, logged_s = None, time.monotonic(), 0.0
+        while wanted and not self._stopped.is_set():
+            count = self._publisher.get_subscription_count()
+            present = count, self._discover()
+            now_s = time.monotonic()
+            if present != seen:
+                seen, since_s = present, now_s
+            # Its subscriptions and its publisher are not discovered at the same moment.
+            if count >= wanted and now_s - since_s >= 0.5:
+                break
+            if count < wanted and now_s - logged_s > LOG_PERIOD_S:
+                logged_s = now_s
+                topic = self._publisher.topic_name
+                self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
+            self._stopped.wait(GRAPH_PERIOD_S)
+        self._discover()
+
+    def wait_for_room(self) -> None:
+        """Wait until one more pose fits into the window."""
+        if self._sent % self._limit == 0:
+            self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
+        self._wait_for_lag_below(self._limit)
+
+    def wait_until_taken(self) -> None:
+        """Wait until every pose is taken or known to be lost."""
+        self._wait_for_lag_below(1)
+        deadline_s = time.monotonic() + LOG_PERIOD_S
+        while not self._stopped.is_set() and time.monotonic() < deadline_s:
+            if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
+                break
+        for name, subscriber in self._window.subscribers.items():
+            if subscriber.lost:
+                self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
+
+    def _wait_for_lag_below(self, limit: int) -> None:
+        logged_s = time.monotonic()
+        while not self._stopped.is_set():
+            now_s = time.monotonic()
+            if now_s - self._discovered_s > GRAPH_PERIOD_S:
+                self._discover()
+            behind = self._window.lag(now_s)
+            if max(behind.values(), default=0) < limit:
+                break
+            never_reported = {
+                name for name, s in self._window.subscribers.items() if s.never_reported
+            }
+            for name in never_reported - self._never_reported:
+                self._node.get_logger().warning(
+                    f'{name} has never reported its progress: it is no longer waited for, and '
+                    'may lose poses when its queue overflows'
+                )
+            self._never_reported = never_reported
+            if now_s - logged_s > LOG_PERIOD_S:
+                logged_s = now_s
+                late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
+                self._log_status(f'waiting for {late}')
+            self._stopped.wait(0.001)
+        self.status = 'playing'
+
+    def _log_status(self, status: str) -> None:
+        self.status = status
+        self._node.get_logger().info(status)
+
+    def _take_report(self, progress: PoseProgress) -> None:
+        stamp = stamp_ns(progress.header)
+        self._window.report(progress.reporter or None, stamp, time.monotonic())
+
+    def _discover(self) -> frozenset[str]:
+        """Full names of the subscribers that also publish progress."""
+        self._discovered_s = time.monotonic()
+        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        progress = self._node.resolve_topic_name(PROGRESS_TOPIC)
+        reporters = self._node.get_publishers_info_by_topic(progress)
+        names = frozenset(map(node_name, takers)) & frozenset(map(node_name, reporters))
+        self._window.set_subscribers(names, self._discovered_s)
+        return names

@@ -1,0 +1,356 @@
+"""Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
+
+import shutil
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from paint_msgs.msg import Part, PoseProgress
+from rclpy.serialization import deserialize_message
+from rclpy.topic_endpoint_info import TopicEndpointInfo
+
+from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.files.provenance import provenance
+from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE
+from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
+from paint_deposition.nodes.bags.recorded_topic import (
+    MISSED_BEFORE_DISCOVERY,
+    PARAMETER_EVENTS,
+    PART_POSE,
+    POSES,
+    RECORDER,
+    STATES,
+    RecordedTopic,
+    bag_qos,
+    default_topics,
+    part_data,
+    unused_name,
+)
+from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, Task
+from paint_deposition.nodes.runtime.parameters import require_file_name
+from paint_deposition.nodes.runtime.topics import (
+    PART_TOPIC,
+    PROGRESS,
+    PROGRESS_TOPIC,
+    gun_topic,
+)
+
+# The run of a part that has left takes poses that were sent for it until none has come so long.
+LATE_S = 2.0
+
+
+class RunRecorder(ManagedNode):
+    """Records serialised messages, byte by byte as they were published.
+
+    Publishers are discovered as they appear, and each is heard as reliably, and as latched, as it
+    offers. If the disk fails or is full, the node ends with an error, and
+    `paint recover` reads the incomplete run.
+    """
+
+    PARAMETERS = RECORDER
+    run: RunWriter
+    runs = 0
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('run_recorder', **kwargs)
+
+    def _configure(self) -> None:
+        guns = self.values['atomizers'] or ['']
+        wanted = self.values['topics'] or default_topics(guns)
+        self._part_topic = self.resolve_topic_name(PART_TOPIC)
+        named = [self.resolve_topic_name(name) for name in wanted]
+        self._wanted = list(dict.fromkeys([*named, self._part_topic]))
+        motion = {
+            self.resolve_topic_name(gun_topic(gun, POSES)):
+            self.resolve_topic_name(gun_topic(gun, STATES)) for gun in guns
+        }  # fmt: skip
+        self._initial_messages = InitialMessages(motion, self.resolve_topic_name(PART_POSE))
+        # Also while no run is recorded, since they stay in force.
+        self._motion = {*motion, *motion.values()}
+        self._always_heard = {PARAMETER_EVENTS, *motion.values()}
+        self.recorded: dict[str, RecordedTopic] = {}
+        self._error: RecordingError | None = None
+        self._progress = {
+            self.resolve_topic_name(gun_topic(gun, POSES)): self.create_publisher(
+                PoseProgress, gun_topic(gun, PROGRESS_TOPIC), PROGRESS
+            )
+            for gun in guns
+        }
+        self.create_trigger_service('~/stop', self._stop)
+
+    def _activate(self) -> None:
+        # Only after a run of this node's own is another name chosen for one that exists.
+        name = unused_name(self._folder, self._own_name) if self.runs else self._own_name
+        self._begin_run(self._create_run(name, self._custom_data), time.time_ns())
+        self.runs += 1
+        # Run and stamp of the part, as it was announced.
+        self._part: tuple[str, int] | None = None
+        self._refused: set[str] = set()
+        # The run of the part that has left, while poses of it may come; until when, and when the
+        # last of them was sent. Poses that came even later.
+        self.leaving: RunWriter | None = None
+        self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
+        # Poses of these topics have not come since it left.
+        self._behind: set[str] = set()
+        self.create_steady_timer(0.1, self._discover)
+        self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
+        self.create_steady_timer(0.2, self._report_progress)
+        self.get_logger().info(f'recording {len(self._wanted)} topics into {self.run.folder}')
+
+    def _load_files(self) -> None:
+        self._custom_data = provenance(self.values['mesh_file'], self.values['model_file'])
+        if self.values['name']:
+            require_file_name('name', self.values['name'])
+
+    @property
+    def _folder(self) -> Path:
+        return Path(self.values['output_directory'])
+
+    @property
+    def _own_name(self) -> str:
+        return self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+
+    def _create_run(self, name: str, custom_data: dict[str, str]) -> RunWriter:
+        folder = self._folder / name
+        return RunWriter(folder, custom_data, compression=self.values['compression'])
+
+    def destroy_node(self) -> None:
+        for run in (self.run, self.leaving) if self.runs else ():
+            if run is not None and not run.complete:
+                run.abandon()
+        super().destroy_node()
+
+    # --- discovery
+
+    def _discover(self) -> None:
+        if self.leaving is not None and time.monotonic() > self._leaves_s:
+            self._drain()  # what is in the queues may be of that part
+            if time.monotonic() > self._leaves_s:
+                self._guarded(self._end_of_leaving)
+        for name in self._wanted:
+            publishers = self.get_publishers_info_by_topic(name)
+            if publishers and name not in self._refused and self._error is None:
+                try:
+                    self._subscribe(name, publishers)
+                except RecordingError as error:
+                    self._refused.add(name)
+                    self.get_logger().error(f'{name} is not recorded: {error}')
+
+    def _subscribe(self, name: str, publishers: list[TopicEndpointInfo]) -> None:
+        types = sorted({publisher.topic_type for publisher in publishers})
+        if len(types) > 1:
+            raise RecordingError(f'{name} is published as {" and ".join(types)}')
+        is_pose = types[0] == POSE_TYPE
+        depth = 5000 if is_pose or name == TF else 100
+        topic = self.recorded.get(name)
+        if topic is None:
+            max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
+            offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
+            run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
+            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
+            self._guarded(self.run.add_topic, run_topic)
+            self.recorded[name] = topic
+        topic.subscribe(depth)
+
+    # --- writing
+
+    def _write(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
+        if not self.active:
+            self._initial_messages.add(name, cdr, log_time_ns, sent_ns)
+            return
+        if name == self._part_topic:
+            self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
+        elif sent_ns <= self._left_ns and name in self._motion:
+            self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
+            if name in self._progress:
+                return
+        elif self.leaving is not None and name in self._behind:
+            self._behind.discard(name)
+            self._leave_soon()
+        elif self.leaving is not None and name == TF in self.leaving.counts:
+            self._guarded(self.leaving.write, name, cdr, log_time_ns, sent_ns)
+        for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
+            self._guarded(self.run.write, *first[:4])
+        self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
+        if name in self._progress and self.recorded[name].messages % 50 == 0:
+            self._report_progress()
+
+    def _write_late(self, name: str, cdr: bytes, log_time_ns: int, sent_ns: int) -> None:
+        """Write what was sent for the part that has left into its run, before what was not."""
+        if name in self._progress:
+            self._initial_messages.add_late(name, cdr, sent_ns)
+        if self.leaving is None:
+            self._too_late += 1
+            return
+        if name not in self.leaving.counts:
+            self.leaving.add_topic(self.recorded[name].run_topic)
+        before_ns = self._initial_messages.begin_ns - 1
+        self.leaving.write(name, cdr, min(log_time_ns, before_ns), sent_ns)
+        self.leaving.keep_another(name)
+        self._leaves_s = time.monotonic() + LATE_S
+
+    def _leave_soon(self) -> None:
+        if not self._behind:
+            # A publisher keeps the order: after its first pose for the next part none comes.
+            self._leaves_s = min(self._leaves_s, time.monotonic() + 0.3)
+
+    def _drain(self) -> None:
+        """Take what is in the queues of all topics but that of the part."""
+        for topic in self.recorded.values():
+            if topic.name != self._part_topic:
+                topic.drain()
+
+    def _end_of_leaving(self) -> None:
+        """Complete the run of the part that has left."""
+        leaving, self.leaving = self.leaving, None
+        if leaving is not None:
+            leaving.finish()
+            self.get_logger().info(_summary(leaving, self._lost_of_leaving))
+
+    def _change_part(self, part: Part, log_time_ns: int, sent_ns: int) -> None:
+        """Complete the run of the previous part, and begin that of the new one."""
+        before, self._part = self._part, (part.run, stamp_ns(part.header))
+        # The message is latched, and may be received again.
+        if self._error is not None or self._part == before:
+            return
+        if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
+            return  # a reset from before this recorder
+        try:
+            name = unused_name(self._folder, part.run or self._own_name)
+            new_run = self._create_run(name, part_data(part, self.values['model_file']))
+            self._drain()
+            self._end_of_leaving()
+            # Some messages were sent for this part, and are in the run before, too.
+            self._left_ns, early = self._initial_messages.begin_part(part, sent_ns)
+            self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
+            self.leaving, self._lost_of_leaving = self.run, self._losses
+            self._leaves_s = time.monotonic() + LATE_S
+            self._behind = {name for name in self._progress if self.run.counts.get(name)}
+            self._behind -= early.keys()
+            self._leave_soon()
+            self._begin_run(new_run, log_time_ns)
+            self.get_logger().info(f'recording {part.run} into {self.run.folder}')
+        except RecordingError as error:
+            self._record_failure(error)
+        except PaintError as error:
+            self.get_logger().error(f'{self._part_topic}: {error}; the run continues')
+
+    def _begin_run(self, run: RunWriter, log_time_ns: int) -> None:
+        """Begin with what is in force."""
+        self.run, self._begun_ns = run, time.time_ns()
+        for topic in self.recorded.values():
+            topic.reset_counts(self._begun_ns)
+            run.add_topic(topic.run_topic)
+        for message in self._initial_messages.begin_run(log_time_ns):
+            run.write(*message[:4])
+
+    def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
+        """Write, unless writing has failed before; the first error ends the recording."""
+        if self._error is not None:
+            return
+        try:
+            step(*arguments)
+        except RecordingError as error:
+            self._record_failure(error)
+
+    def _record_failure(self, error: RecordingError) -> None:
+        self._error = error
+        self.get_logger().error(str(error))
+        self.fail(error)
+
+    def _report_progress(self) -> None:
+        reporter = self.get_fully_qualified_name()
+        for name in self._progress.keys() & self.recorded.keys():
+            topic = self.recorded[name]
+            report = PoseProgress(reporter=reporter, poses_received=topic.messages)
+            report.header = header('', topic.newest_stamp_ns)
+            self._progress[name].publish(report)
+
+    # --- ending
+
+    def _stop(self) -> tuple[bool, str]:
+        if self.active:
+            self.trigger_deactivate()
+        # The answer of a process that ends at once may be lost; its client would wait for ever.
+        self.create_steady_timer(1.0, self.finish)
+        if not self.runs:
+            return True, 'nothing was recorded: the recorder was never activated'
+        return self.run.complete, self.summary()
+
+    def _deactivate(self) -> None:
+        for topic in self.recorded.values():
+            if topic.name in self._always_heard:
+                topic.drain()
+            else:
+                topic.unsubscribe()
+        self._initial_messages.end_motion()
+        if self._error is not None:
+            return
+        self._guarded(self._end_of_leaving)
+        self._guarded(self.run.finish)
+        self.get_logger().info(self.summary())
+        never = [name for name in self._wanted if name not in self.recorded]
+        if never and self.values['topics']:
+            self.get_logger().warning(f'never published: {" ".join(never)}')
+
+    def summary(self) -> str:
+        """One line on what was recorded and what was lost."""
+        return _summary(self.run, self._losses)
+
+    @property
+    def _losses(self) -> str:
+        topics = self.recorded.values()
+        missed = sum(topic.missed for topic in topics)
+        lost = f', {missed} missed' if missed else ''
+        first = [f'{t.before_discovery} of {t.name}' for t in topics if t.before_discovery]
+        lost += f', {" and ".join(first)} {MISSED_BEFORE_DISCOVERY}' if first else ''
+        if any(topic.unnumbered for topic in topics):
+            lost += ' (losses cannot be counted: this middleware does not number messages)'
+        if self._too_late:
+            lost += f', {self._too_late} poses and states came too late for the run before'
+        return f'{lost}, {sum(topic.gaps for topic in topics)} gaps'
+
+    def _diagnostic_tasks(self) -> Mapping[str, Task]:
+        return {'recording': self.status}
+
+    def status(self) -> Status:
+        if not self.active and self._error is None:
+            return Status(OK, f'inactive; {self.summary()}' if self.runs else 'inactive')
+        try:
+            size, free = self.run.path.stat().st_size, shutil.disk_usage(self.run.folder).free
+        except OSError as error:
+            reason = f'{self.run.path}: {error.strerror}; nothing more can be recorded there'
+            if self._error is None:
+                self._record_failure(RecordingError(reason))
+            return Status(ERROR, reason)
+        topics = self.recorded.values()
+        counts, unnumbered = Counter(self.run.counts), sum(t.unnumbered for t in topics)
+        values = {
+            'run': self.run.folder,
+            'messages without a sequence number, whose losses cannot be counted': unnumbered,
+            'bytes': size,
+            'disk free bytes': free,
+            'longest pose gap s': max((t.longest_gap_ns for t in topics), default=0) * 1e-9,
+            **{t.name: f'{counts[t.name]} messages, {t.losses}, {t.gaps} gaps' for t in topics},
+        }
+        if self._error is not None:
+            return Status(ERROR, str(self._error), values)
+        if self._refused:
+            return Status(ERROR, f'not recorded: {" ".join(sorted(self._refused))}', values)
+        if free < 1_000_000_000:
+            return Status(WARN, 'the disk is almost full', values)
+        if self._too_late or any(topic.missed for topic in topics):
+            return Status(WARN, f'messages were missed{self._losses}', values)
+        return Status(OK, 'recording', values)
+
+
+def _summary(run: RunWriter, losses: str) -> str:
+    state = 'complete' if run.complete else 'INCOMPLETE'
+    return f'{run.message_count} messages{losses}, file {state}: {run.folder}'

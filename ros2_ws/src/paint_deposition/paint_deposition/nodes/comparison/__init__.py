@@ -1,1 +1,0 @@
-"""The node that compares gauge readings with the film."""

@@ -1,0 +1,216 @@
+"""Node `model_comparison`: compares gauge readings with the film of a model during painting."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from geometry_msgs.msg import Point
+from paint_msgs.msg import ComparisonStats
+from visualization_msgs.msg import Marker, MarkerArray
+
+from paint_deposition.errors import PaintError, ReadingsError
+from paint_deposition.files.gauge_readings import read_readings
+from paint_deposition.film.colour_scales import ColourScale, residual_scale
+from paint_deposition.inference.comparison.residual_field import interpolation_matrix, reached
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.gauge_noise import gauge_noise
+from paint_deposition.inference.readings.plausibility import readings_in_doubt, zeros_in_doubt
+from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.motion.path import SprayPath
+from paint_deposition.nodes.painting.film_display import legend
+from paint_deposition.nodes.painting.health import painting_tasks
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.painting.painting_parameters import PAINTING
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import ColouredMesh, header
+from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    fixed_while_configured,
+    thickness_parameter,
+)
+from paint_deposition.part.facing import turned
+from paint_deposition.part.points import SurfacePoints
+from paint_deposition.part.surface import Surface
+
+COMPARISON = dict(
+    **PAINTING,
+    **fixed_while_configured(
+        'the film is painted where they were taken; clean the node up or restart it',
+        measurements_file=NodeParameter(
+            '', 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]'
+        ),
+    ),
+    color_max_um=thickness_parameter(
+        'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+    ),
+    color_radius_m=NodeParameter(
+        0.0,
+        'Radius of the colour around a reading; 0: from the spacing of the readings [m]',
+        (0.0, 5.0),
+    ),
+)
+
+
+class ModelComparison(PaintingNode):
+    """Paints the points of gauge readings and publishes their residuals.
+
+    A residual, measured minus predicted, starts as the whole reading and falls to what the model
+    does not explain. The film is computed in double precision at the readings; the colours around
+    them are for display only.
+    """
+
+    PARAMETERS = COMPARISON
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('model_comparison', **kwargs)
+
+    def _configure(self) -> None:
+        super()._configure()
+        self._mesh_publisher, self._stats_publisher, self._legend_publisher = (
+            self.create_publisher(message, f'comparison/{topic}', topics.LATCHED)
+            for message, topic in (
+                (Marker, 'mesh'), (ComparisonStats, 'stats'), (MarkerArray, 'legend'),
+            )
+        )  # fmt: skip
+        self.create_trigger_service('~/compare', self._compare)
+        self._publish_legend()
+        self.publish()
+
+    def _diagnostic_tasks(self) -> Mapping[str, Task]:
+        return painting_tasks(self) | {'comparison': self.status}
+
+    # --- the part and its readings
+
+    def _read_part(self) -> None:
+        if not self.values['measurements_file']:
+            raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
+        self._is_read = False
+        self.readings = read_readings(self.values['measurements_file'])
+        self.get_logger().info(self.readings.understood)
+        self._noise = gauge_noise(self.readings)
+
+    def _points_on(self, surface: Surface) -> SurfacePoints:
+        return self._experiment.points
+
+    def _set_surface(self, surface: Surface) -> None:
+        try:
+            self._experiment = self._experiment_on(surface)
+        except ReadingsError:
+            # Until the gun tells which side of an open sheet is outward, readings with normals do.
+            if self._is_read:
+                raise
+            surface = turned(surface)
+            self._experiment = self._experiment_on(surface)
+        self._is_read = True
+        super()._set_surface(surface)
+        for doubt in readings_in_doubt(surface, self.readings, np.zeros(len(self.readings))):
+            self.get_logger().warning(doubt)
+        frame_id = self.frame.frame_id
+        self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
+        self._spread_colours()
+
+    def _experiment_on(self, surface: Surface) -> Experiment:
+        return Experiment.of('live', surface, SprayPath.empty(), self.readings)
+
+    def _spread_colours(self) -> None:
+        at = slice(len(self._experiment))
+        places, normals = self.points.positions_m[at], self.points.normals[at]
+        radius_m = self.values['color_radius_m']
+        self._spreading = interpolation_matrix(self.surface, places, normals, radius_m)
+        self._coloured = reached(self._spreading)
+
+    def residuals(self) -> Residuals:
+        """The residuals of all readings, with the film of all poses received."""
+        predicted = self.film.snapshot().gauge_um[: len(self._experiment)]
+        at_readings = predicted[self._experiment.means.owner]
+        return Residuals(self.readings.thickness_um, at_readings, self._noise.sigma_um)
+
+    # --- parameters
+
+    def _on_change(self, names: set[str]) -> None:
+        super()._on_change(names)
+        if 'color_radius_m' in names:
+            self._spread_colours()
+        if 'color_max_um' in names:
+            self._publish_legend()
+        self._shown = None
+
+    # --- publishing
+
+    @property
+    def _scale(self) -> ColourScale:
+        thickest = float(np.abs(self.readings.thickness_um).max())
+        return residual_scale(np.array([0.25 * thickest]), self.values['color_max_um'])
+
+    @property
+    def _model_name(self) -> str:
+        files = self.values['model_files'] or [self.values['model_file']]
+        return ' '.join(Path(file).name or 'default model' for file in files)
+
+    def publish(self) -> None:
+        """Publish the comparison if the film has changed."""
+        self.catch_up()
+        film = self.film.snapshot()
+        if film == self._shown:
+            return
+        self._shown = film
+        residuals = self.residuals()
+        stamp_ns = self.film.newest_ns or 0
+        self._stats_publisher.publish(self._stats(residuals, stamp_ns))
+        means = self._experiment.means
+        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
+        scale = self._scale
+        rows = scale.rows(self._spreading @ at_points, self._coloured)
+        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
+
+    def _publish_legend(self) -> None:
+        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
+        self._legend_publisher.publish(bar)
+
+    def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
+        x, y, z = self.readings.positions_m[residuals.worst].tolist()
+        return ComparisonStats(
+            header=header(self.frame.frame_id, stamp_ns),
+            model=self._model_name,
+            readings=len(residuals),
+            readings_painted=int(residuals.painted.sum()),
+            bias_um=residuals.bias_um,
+            rmse_um=residuals.rmse_um,
+            rmse_painted_um=residuals.rmse_painted_um,
+            chi_square_per_reading=residuals.chi_square_per_reading,
+            noise_floor_um=np.nan if self._noise.source == 'assumed' else self._noise.typical_um,
+            worst_position=Point(x=x, y=y, z=z),
+            worst_residual_um=float(residuals.residual_um[residuals.worst]),
+        )
+
+    def _compare(self) -> tuple[bool, str]:
+        """The comparison in one line."""
+        self.catch_up()
+        found = self.residuals()
+        x, y, z = self.readings.positions_m[found.worst]
+        line = (
+            f'{self._model_name}: {len(found)} readings, {found.painted.sum()} where '
+            f'paint is predicted; residual {found.bias_um:+.2f} µm on average, rms '
+            f'{found.rmse_um:.2f} µm (gauge {self._noise.typical_um:.2f} µm, '
+            f'{self._noise.source}), chi-square {found.chi_square_per_reading:.2f} a reading; '
+            f'worst {found.residual_um[found.worst]:+.2f} µm at ({x:.3f}, {y:.3f}, {z:.3f}) m'
+        )
+        if doubt := zeros_in_doubt(self.readings, found.predicted_um):
+            line += f'; {doubt}'
+        self.get_logger().info(line)
+        return True, line
+
+    def status(self) -> Status:
+        found = self.residuals()
+        values = {
+            'readings': self.values['measurements_file'],
+            'bias [µm]': f'{found.bias_um:.3f}',
+            'noise of the gauge [µm]': f'{self._noise.typical_um:.3f}',
+            'noise known from': self._noise.source,
+        }
+        line = f'rms {found.rmse_um:.2f} µm at {len(found)} readings'
+        if doubt := zeros_in_doubt(self.readings, found.predicted_um):
+            return Status(WARN, f'{line}; {doubt}', values)
+        return Status(OK, line, values)

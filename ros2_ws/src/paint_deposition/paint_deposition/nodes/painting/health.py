@@ -1,0 +1,228 @@
+"""The diagnostics of the nodes that paint, and whether their film can be trusted."""
+
+import functools
+import math
+import time
+from collections.abc import Callable, Mapping
+from functools import partial
+
+from diagnostic_msgs.msg import DiagnosticStatus
+from paint_msgs.msg import PoseProgress
+
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.film.live_film import LiveFilm
+from paint_deposition.nodes.painting.atomizer_input import (
+    LONGEST_NAME,
+    MOST_NAMES,
+    STATES_REFUSED,
+    AtomizerInput,
+)
+from paint_deposition.nodes.painting.painting_node import PaintingNode
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
+from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic, node_name
+
+# Without poses for so long, a gun that sprays is reported.
+SILENT_S = 2.0
+NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
+# Labels of the counts of poses and states.
+COUNT_LABELS = {
+    'gaps': 'gaps',
+    'restarts': 'restarts of the stream',
+    'repeated_stamps': 'repeated stamps',
+    'repeated_samples': 'repeated samples',
+    'backward_stamps': 'backward stamps',
+    'not_finite': 'poses that are not finite',
+    'not_unit_quaternions': 'quaternions not of unit length',
+    'late_triggers': 'late states',
+}
+
+
+def poses_status(node: PaintingNode, number: int) -> Status:
+    """The status of a gun's poses and states since the last reset."""
+    source, film = node.inputs[number], node.film.guns[number]
+    counts, rhythm_ns = film.counts, source.intervals.typical_ns
+    counted = {words: getattr(counts, name) for name, words in COUNT_LABELS.items()}
+    counted |= {
+        'steps faster than a robot': source.jumps.count, **source.anomalies,
+        'messages lost by the middleware': source.messages_lost,
+    }  # fmt: skip
+    programmed = source.programmed_m_per_s
+    gun = _gun_text(film)
+    values: dict[str, object] = {
+        'poses taken': counts.received,
+        'poses refused': counts.rejected + source.poses_refused,
+        **counted,
+        'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
+        'intervals over 1.5 times the usual one': source.intervals.long,
+        'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
+        'speed [m/s]': f'{source.speed.m_per_s:.3f}',
+        'programmed speed [m/s]': f'{programmed:.3f}' if programmed > 0.0 else 'unknown',
+        'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
+        'poses not painted while inactive': source.unpainted,
+        'poses in the tf queue': len(source.tf_queue),
+        'gun': gun,
+    }
+    if not node.active and source.unpainted:
+        words = f'inactive: {source.unpainted} poses came and were not painted'
+        return Status(WARN, words, values)
+    if not node.active:
+        return Status(OK, 'inactive', values)
+    if another := _state_of_another_type(node, source.name):
+        node.get_logger().error(another, once=True)
+        return Status(ERROR, another, values)
+    now_s = time.monotonic()
+    if source.refused_frames and now_s - source.refused_s < 5.0:
+        frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
+        words = (
+            f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
+            f"'{node.frame.frame_id}' and {source.refusal}"
+        )
+        return Status(ERROR, words, values)
+    wrong = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
+    silent_s = now_s - source.pose_s
+    if source.spraying and silent_s > SILENT_S:
+        since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
+        wrong.append(f'the gun sprays, and no pose has come {since}')
+    counted['poses refused for their frame'] = source.poses_refused
+    wrong += [f'{count} {words}' for words, count in counted.items() if count]
+    wrong += sorted(source.state_errors)
+    if wrong:
+        return Status(WARN, ', '.join(wrong), values)
+    return Status(OK, 'waiting for poses' if silent_s > SILENT_S else 'painting', values)
+
+
+def _state_of_another_type(node: PaintingNode, gun: str) -> str:
+    """What to do where a Bool, say, comes as the gun's state, which nobody hears; else ''."""
+    topic = gun_topic(gun, 'atomizer/state')
+    for info in node.get_publishers_info_by_topic(node.resolve_topic_name(topic)):
+        if info.topic_type != STATE_TYPE:
+            return (
+                f'{topic} comes as {info.topic_type} and does not switch the gun: publish it on '
+                'a topic of its own, and start atomizer_source with that topic as trigger'
+            )
+    return ''
+
+
+def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
+    """The status of part, model and computing time."""
+    guns = node.film.guns
+    factor = node.real_time_factor
+    files = node.values['model_files'] or [node.values['model_file'] or 'default']
+    effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
+    values = {
+        'mesh': node.mesh_file,
+        'triangles': len(node.surface.faces),
+        'down': ' '.join(f'{value:g}' for value in node.surface.down),
+        'model': ' '.join(files),
+        'effects': ' '.join(effects) or 'none',
+        'poses remembered': sum(gun.log.poses for gun in guns),
+        'real-time factor': f'{factor:.2f}',
+        **{f'note {number}': note for number, note in enumerate(node.surface.notes, start=1)},
+        **more_values,
+    }
+    if node.model_problem:
+        return Status(WARN, node.model_problem, values)
+    if not node.film.complete:
+        limit = f'over {node.values["pose_memory"]} poses (pose_memory)'
+        return Status(WARN, f'{limit}: a new model paints from then on only', values)
+    if factor > 0.8:
+        share = f'painting takes {factor:.0%} of the time that the motion lasts'
+        remedy = 'poses may be lost; use a larger max_edge_length_m'
+        return Status(WARN, f'{share}: {remedy}', values)
+    return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
+
+
+def _gun_text(film: LiveFilm) -> str:
+    if film.flow is None:
+        return NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
+    of_brush = f', brush {film.brush}' if film.brush else ''
+    return f'spraying, flow {film.flow:g}{of_brush}' if film.flow else 'off'
+
+
+def painting_tasks(
+    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
+) -> dict[str, Callable[[], Status]]:
+    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
+    poses = {
+        gun_topic(source.name, 'poses'): functools.partial(poses_status, node, number)
+        for number, source in enumerate(node.inputs)
+    }
+    return {**poses, 'film': lambda: film_status(node, film_values())}
+
+
+class FilmTrust:
+    """Publishes `thickness/trust`, latched and twice a second: the level and the reasons.
+
+    Nodes that report the poses they have taken on `atomizer/progress`, as a recorder does, must
+    not fall behind.
+    """
+
+    def __init__(self, node: PaintingNode) -> None:
+        self._node = node
+        # Of each gun and reporter: stamp of its newest pose, and when it said so.
+        self._reports: dict[tuple[str, str], tuple[int, float]] = {}
+        self._publisher = node.create_publisher(
+            DiagnosticStatus, topics.TRUST_TOPIC, topics.LATCHED
+        )
+        for source in node.inputs:
+            topic = gun_topic(source.name, PROGRESS_TOPIC)
+            take = partial(self._take_report, source.name)
+            node.create_subscription(PoseProgress, topic, take, topics.PROGRESS)
+        node.create_steady_timer(0.5, self.publish)
+
+    def publish(self) -> None:
+        """Publish the status of the film as it is now."""
+        doubts = [doubt for number in range(len(self._node.inputs)) for doubt in self._of(number)]
+        if self._node.model_problem:
+            doubts.append(self._node.model_problem)
+        self._publisher.publish(
+            DiagnosticStatus(
+                level=WARN if doubts else OK, name=topics.TRUST_TOPIC,
+                message='; '.join(doubts) or 'all that was sent is in the film',
+                hardware_id=self._node.get_fully_qualified_name(),
+            )
+        )  # fmt: skip
+
+    def _of(self, number: int) -> list[str]:
+        """What is doubtful of a gun's share since the last reset."""
+        source, counts = self._node.inputs[number], self._node.film.guns[number].counts
+        counted = {
+            'messages lost': source.messages_lost,
+            'poses refused': source.poses_refused,
+            'poses that are none': counts.not_finite + counts.not_unit_quaternions,
+            'poses that came behind others': counts.backward_stamps,
+            'late states': counts.late_triggers,
+            STATES_REFUSED: source.anomalies[STATES_REFUSED],
+            'poses not painted while inactive': source.unpainted,
+        }
+        doubts = [f'{count} {what}' for what, count in counted.items() if count]
+        silent_s = time.monotonic() - source.pose_s
+        if source.spraying and silent_s > SILENT_S:
+            doubts.append(f'the gun sprays, and no pose has come for {silent_s:.0f} s')
+        doubts += self._behind(source)
+        return [f'{source.name}: {doubt}' if source.name else doubt for doubt in doubts]
+
+    def _behind(self, source: AtomizerInput) -> list[str]:
+        """Who is behind with the poses of a gun."""
+        reports = {name: it for (gun, name), it in self._reports.items() if gun == source.name}
+        if not reports:
+            return []
+        topic = self._node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
+        there = {node_name(info) for info in self._node.get_publishers_info_by_topic(topic)}
+        doubts = []
+        for name, (newest_ns, heard_s) in reports.items():
+            if name not in there:  # it has ended
+                del self._reports[source.name, name]
+            elif time.monotonic() - heard_s > 3.0:
+                doubts.append(f'{name} has stalled')
+            elif source.newest_ns - newest_ns > 2_000_000_000:
+                doubts.append(f'{name} is {1e-9 * (source.newest_ns - newest_ns):.0f} s behind')
+        return doubts
+
+    def _take_report(self, gun: str, report: PoseProgress) -> None:
+        key = gun, report.reporter[:LONGEST_NAME]
+        own = report.reporter == self._node.get_fully_qualified_name()
+        if not own and (key in self._reports or len(self._reports) < MOST_NAMES):
+            self._reports[key] = stamp_ns(report.header), time.monotonic()

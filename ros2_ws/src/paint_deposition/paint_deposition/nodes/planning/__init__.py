@@ -1,1 +1,0 @@
-"""The node that recommends an index and plans passes."""

@@ -1,1 +1,0 @@
-"""The node that shows the cell on a page."""

@@ -1,0 +1,254 @@
+"""Node `web_view`: the film as it is painted, on a page for browsers."""
+
+import contextlib
+import os
+import sys
+import time
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+from diagnostic_msgs.msg import DiagnosticStatus
+from geometry_msgs.msg import PoseStamped, TransformStamped
+from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
+
+from paint_deposition.errors import PaintError
+from paint_deposition.files.recordings.headers import (
+    stamp_ns,
+    transforms_of,
+    trigger_change,
+)
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
+from paint_deposition.motion.part_frame import PART_POSE_TOPIC
+from paint_deposition.motion.pose_stream import PoseBatch
+from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
+from paint_deposition.nodes.painting.painting_parameters import read_part
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
+from paint_deposition.nodes.runtime.parameters import (
+    NodeParameter,
+    atomizers_parameter,
+    direction_parameter,
+    fixed_while_running,
+    mesh_parameters,
+    require_colours,
+    thickness_parameter,
+)
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
+from paint_deposition.part.facing import turned
+from paint_deposition.report.live.scene import Scene
+from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
+
+# The simulator speaks twice a second [s].
+SILENT_S = 2.0
+
+
+WEB_VIEW = dict(
+    **fixed_while_running(
+        'the page is served with it; restart the node with the new value',
+        **mesh_parameters(max_edge_length_m=0.01),
+        down=direction_parameter('As for deposition_simulator [-]'),
+        atomizers=atomizers_parameter('to show'),
+        host=NodeParameter(
+            DEFAULT_HOST,
+            'Address to listen on; any but that of this machine alone needs a token [name]',
+        ),
+        port=NodeParameter(DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)),
+        token=NodeParameter(
+            '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
+        ),
+    ),
+    color_min_um=thickness_parameter(
+        'Film at the lower end of the colours; both ends 0: automatic [µm]'
+    ),
+    color_max_um=thickness_parameter(
+        'Film at the upper end of the colours; both ends 0: automatic [µm]'
+    ),
+    painted_above_um=thickness_parameter(
+        'Thinner film is shown as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
+    ),
+    target_um=thickness_parameter('Film wanted; 0: none [µm]'),
+    target_tolerance_um=thickness_parameter('Allowed difference from the target [µm]'),
+)
+
+
+class WebView(PaintNode):
+    """Serves the live page with what the simulator publishes; it computes no film itself.
+
+    The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
+    """
+
+    PARAMETERS = WEB_VIEW
+
+    def __init__(self, **kwargs: Any):
+        super().__init__('web_view', **kwargs)
+        results = topics.RESULTS
+        for message, topic, take, profile in (
+            (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
+            (TransformStamped, PART_POSE_TOPIC, self._take_part_pose, topics.LATCHED),
+            (ThicknessField, 'thickness/field', self._take_field, results),
+            (ThicknessStats, 'thickness/stats', self._take_stats, topics.LATCHED),
+            (ComparisonStats, 'comparison/stats', self._take_comparison, topics.LATCHED),
+            (DiagnosticStatus, topics.TRUST_TOPIC, self._take_trust, topics.LATCHED),
+        ):
+            self.create_subscription(message, topic, take, profile)
+        self._inputs = [
+            AdaptiveSubscription(
+                self, message, gun_topic(name, topic), partial(take, name), depth=500,
+                latched=message is AtomizerState,
+            )
+            for name in self.values['atomizers'] or ['']
+            for message, topic, take in (
+                (AtomizerState, 'atomizer/state', self._take_state),
+                (PoseStamped, 'atomizer/pose', self._take_pose),
+            )
+        ]  # fmt: skip
+        # At 1 kHz fifty poses wait at most.
+        self.create_steady_timer(0.05, self._take_motion)
+        self.create_steady_timer(0.5, self._show_trust)
+        self.report({'page': self.status})
+
+    def _load_files(self) -> None:
+        self.scene = Scene()
+        self._frame = PartFrame(self, self.values['frame_id'])
+        self._flow: dict[str, float] = {}
+        # The simulator, which cannot paint a pose without a transform, says why.
+        self._waiting = {
+            name: TfQueue(partial(self._move_gun, name), lambda *_: None)
+            for name in self.values['atomizers'] or ['']
+        }
+        # Stamp of the newest figures; their time, which goes on where a stream is restarted.
+        self._newest_ns, self._time_s = 0, 0.0
+        self._rmse_um = float('nan')
+        # What makes the film doubtful, '' if nothing does, and when the simulator said so.
+        self._doubts, self._trusted_s = '', time.monotonic()
+        self._problem = ''
+        self._sent = 0, time.monotonic()
+        self._show_part(self.values['mesh_file'])
+        values = self.values
+        token = values['token'] or os.environ.get(TOKEN, '')
+        self.page = Page([self.scene], values['host'], values['port'], token)
+        # Not to the log, which is published.
+        sys.stdout.write(f'the page is at {self.page.url}\n')
+        sys.stdout.flush()
+
+    def close(self) -> None:
+        self.page.close()
+
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        require_colours(values)
+        require_band(values['target_um'], values['target_tolerance_um'])
+
+    def _on_change(self, names: set[str]) -> None:
+        self._show_scale()
+
+    # --- the part and its film
+
+    def _show_part(self, mesh_file: str) -> None:
+        surface = read_part(self.values, mesh_file)
+        # The simulator may find that the guns paint its other side.
+        self._mesh_file, self._mesh_ids = mesh_file, {surface.mesh_id, turned(surface).mesh_id}
+        self.scene.show_part(surface)
+        self.scene.tell('about', text=Path(mesh_file).name)
+        self._film_um: np.ndarray = np.zeros(0, np.float32)
+        self._show_scale()
+
+    def _take_part(self, part: Part) -> None:
+        self._newest_ns, self._time_s = 0, 0.0
+        if part.mesh_file == self._mesh_file:
+            self.scene.begin_again()
+        else:
+            try:
+                self.require_named_folder(part.mesh_file)
+                self._show_part(part.mesh_file)
+            except (PaintError, MemoryError) as error:
+                self._say(str(error) or 'not enough memory')
+                return
+        serial = f'{part.serial}, ' if part.serial else ''
+        self.scene.tell('about', text=serial + Path(part.mesh_file).name)
+
+    def _take_field(self, field: ThicknessField) -> None:
+        if field.mesh_id not in self._mesh_ids:
+            self._say(
+                f'the film that comes is not on {self._mesh_file} as it is read here; give '
+                'web_view the mesh_file, mesh_scale and max_edge_length_m of the simulator'
+            )
+            return
+        self._say('')
+        self._film_um = np.asarray(field.thickness_um, np.float32)
+        self._show_scale()
+        self.scene.show_film(self._film_um)
+
+    def _show_scale(self) -> None:
+        values = self.values
+        scale = film_scale(self._film_um, values['color_min_um'], values['color_max_um'])
+        target = values['target_um'], values['target_tolerance_um']
+        self.scene.show_scale(scale, values['painted_above_um'], *target)
+
+    def _take_stats(self, stats: ThicknessStats) -> None:
+        now_ns = stamp_ns(stats.header)
+        if now_ns:  # there was a pose
+            self._time_s += max(now_ns - (self._newest_ns or now_ns), 0) * 1e-9
+            self._newest_ns = now_ns
+            self.scene.add_figures(self._time_s, stats, self._rmse_um)
+
+    def _take_comparison(self, stats: ComparisonStats) -> None:
+        self._rmse_um = stats.rmse_um
+
+    def _take_trust(self, trust: DiagnosticStatus) -> None:
+        self._doubts = '' if trust.level == OK else trust.message
+        self._trusted_s = time.monotonic()
+
+    def _show_trust(self) -> None:
+        silent_s = time.monotonic() - self._trusted_s
+        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > SILENT_S else ''
+        self.scene.tell('trust', doubts=silent or self._doubts)
+
+    def _say(self, problem: str) -> None:
+        """Tell what keeps the film from being shown; '' is nothing."""
+        if problem:
+            self.get_logger().error(problem, once=True)
+        self._problem = problem
+        self.scene.tell('message', text=problem)
+
+    # --- the guns
+
+    def _take_motion(self) -> None:
+        self._frame.take_pending()
+        for topic in self._inputs:
+            topic.take_pending()
+        for waiting in self._waiting.values():
+            waiting.process(time.monotonic())
+
+    def _take_part_pose(self, placed: TransformStamped) -> None:
+        for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
+            self._frame.take_part_pose(parent, pose)
+
+    def _take_state(self, gun: str, state: AtomizerState, _info: Any) -> None:
+        with contextlib.suppress(PaintError):  # the simulator, which refuses it, says so
+            self._flow[gun] = trigger_change(state).flow
+
+    def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
+        self._waiting[gun].add(message, time.monotonic())
+
+    def _move_gun(self, gun: str, message: PoseStamped) -> None:
+        position_m, quaternion = self._frame.on_part(message)
+        stamps = np.array([stamp_ns(message.header)])
+        batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
+        for position, z_axis in zip(*batch.finite_axes(), strict=True):
+            # Without any state the gun is taken to spray, as the simulator does.
+            self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
+
+    def status(self) -> Status:
+        sent, now_s = self.page.bytes_sent, time.monotonic()
+        rate = (sent - self._sent[0]) / max(now_s - self._sent[1], 1e-9)
+        self._sent = sent, now_s
+        browsers = len(self.page.browsers)
+        values = {'browsers': browsers, 'sent to all of them [kB/s]': f'{rate / 1e3:.0f}'}
+        if self._problem:
+            return Status(WARN, self._problem, values)
+        return Status(OK, f'{browsers} browsers on {self.page.url.split("?")[0]}', values)

@@ -1,0 +1,79 @@
+"""A recorder and who publishes to it; a player and who listens to it."""
+
+import time
+
+import pytest
+
+from files.recorded import straight_pass
+from paint_deposition.files.recordings.bags import write_pose_bag
+
+
+@pytest.fixture
+def cell(ros_context, spin):
+    """A node to publish from."""
+    from rclpy.node import Node
+
+    node = Node('cell', context=ros_context)
+    spin(node)
+    return node
+
+
+@pytest.fixture
+def publisher(cell, wait_until):
+    """`publisher(type, topic, profile)`: a publisher that the recorder has subscribed to."""
+
+    def publisher(kind, topic: str, profile, subscribers: int = 1):
+        made = cell.create_publisher(kind, topic, profile)
+        wait_until(
+            lambda: made.get_subscription_count() >= subscribers, what=f'a subscriber on {topic}'
+        )
+        return made
+
+    return publisher
+
+
+@pytest.fixture
+def play(ros_context, spin):
+    """`play(bag, **parameters)`: a player of this bag, running."""
+    from nodes.cell import parameters
+    from paint_deposition.nodes.bags.bag_player import BagPlayer
+
+    def play(bag, namespace='', **chosen) -> BagPlayer:
+        values = {'bag': str(bag)} | chosen
+        player = BagPlayer(
+            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
+        )
+        spin(player)
+        return player
+
+    return play
+
+
+@pytest.fixture
+def listen(ros_context, spin):
+    """`listen(name)`: a node that hears the poses, running."""
+    from nodes.bags.listener import Listener
+
+    def listen(name='listener', reports=True, namespace='') -> Listener:
+        listener = Listener(ros_context, name, reports, namespace)
+        spin(listener)
+        return listener
+
+    return listen
+
+
+@pytest.fixture
+def pass_bag(tmp_path):
+    """A recording of 700 poses."""
+    return write_pose_bag(tmp_path / 'pass', straight_pass(700))
+
+
+@pytest.fixture
+def still(wait_until):
+    """`still(duration_s)`: let so much time pass, in which nothing more should happen."""
+
+    def still(duration_s: float) -> None:
+        end_s = time.monotonic() + duration_s
+        wait_until(lambda: time.monotonic() > end_s, what='the time')
+
+    return still

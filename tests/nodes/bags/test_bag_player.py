@@ -1,0 +1,188 @@
+"""Replay over real DDS: the recorded bytes in the recorded order, whatever the speed."""
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.serialization import deserialize_message
+from std_srvs.srv import Trigger
+
+from files.recorded import START_NS, STATE_TYPES, Messages, pose_entries, straight_pass, write_bag
+from nodes.bags.listener import recorded
+from nodes.processes import NodeProcess
+from paint_deposition.errors import PaintError, RecordingError
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.files.recordings.headers import stamp_ns
+from robot_arm import JOINTS, sweep, urdf
+
+
+@pytest.mark.parametrize('rate', [0.0, 20.0])
+def test_the_recorded_bytes_arrive_in_order(play, listen, wait_until, still, pass_bag, rate):
+    """Nothing is sent before somebody listens; without its clock a player publishes none."""
+    player = play(pass_bag, rate=rate, state_topic='/atomizer/state', publish_clock=False)
+    still(0.3)
+    assert player.poses_published == 0
+    assert not player.count_publishers('/clock')
+    listener = listen()
+    wait_until(player.finished.done, what='the end of the replay')
+    wait_until(lambda: len(listener.poses) == 700, what='the last poses')
+    assert listener.poses == recorded(pass_bag)
+    written = straight_pass(700)
+    assert [stamp_ns(s.header) for s in listener.states] == written.trigger_stamps_ns.tolist()
+    assert [(s.spraying, s.flow) for s in listener.states] == [(True, 1.0), (False, 0.0)]
+    assert np.isnan(listener.states[0].voltage_kv)
+    assert (player.poses_published, player.states_published) == (700, 2)
+
+
+def test_a_ros1_bag_is_replayed_as_ros2_messages(play, listen, wait_until, tmp_path):
+    written = straight_pass(40, triggers=False)
+    bag = write_bag(tmp_path / 'old.bag', pose_entries(written, ros1=True), 'ros1')
+    listener = listen()
+    player = play(bag, rate=0.0)
+    wait_until(player.finished.done, what='the end of the replay')
+    poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
+    assert [stamp_ns(pose.header) for pose in poses] == written.stamps_ns.tolist()
+    assert [pose.pose.position.x for pose in poses] == written.positions_m[:, 0].tolist()
+    assert {pose.header.frame_id for pose in poses} == {'door'}
+
+
+@pytest.mark.parametrize('kind', ['tf', 'urdf'])
+def test_a_bag_without_poses_is_replayed(kind, play, listen, wait_until, tmp_path):
+    """From transforms or joint states of a robot, with the trigger, as `paint simulate` does."""
+    messages, entries = Messages(), []
+    stamps_ns = START_NS + 20_000_000 * np.arange(40)
+    (tmp_path / 'arm.urdf').write_text(urdf())
+    for stamp, joints in zip(stamps_ns.tolist(), sweep(40), strict=True):
+        if kind == 'urdf':
+            moved = '/joint_states', stamp + 100, messages.joints(stamp, JOINTS, joints)
+        else:
+            pose = [joints[0], 0.2, 0.3, 0.0, 0.0, 0.0, 1.0]
+            moved = '/tf', stamp + 100, messages.transforms((stamp, 'base', 'tool0', pose))
+        entries.append(moved)
+    entries.insert(20, ('/gun', int(stamps_ns[20]), messages.trigger(True)))
+    bag = write_bag(tmp_path / 'run', entries, messages=messages)
+    remedy = 'give tf: TARGET SOURCE' if kind == 'tf' else 'give urdf'
+    with pytest.raises(RecordingError, match=remedy):
+        play(bag)
+    given = {'tf': ['base', 'tool0']} if kind == 'tf' else {'urdf': str(tmp_path / 'arm.urdf')}
+    listener = listen()
+    player = play(bag, rate=0.0, state_topic='/gun', **given)
+    wait_until(player.finished.done, what='the end of the replay')
+    poses = [deserialize_message(cdr, PoseStamped) for cdr in listener.poses]
+    offline = read_recording(bag, state_topic='/gun', **given)
+    assert [stamp_ns(pose.header) for pose in poses] == offline.stamps_ns.tolist()
+    places = [(p.x, p.y, p.z) for p in (pose.pose.position for pose in poses)]
+    np.testing.assert_array_equal(places, offline.positions_m)
+    assert {pose.header.frame_id for pose in poses} == {offline.frame_id}
+    assert [stamp_ns(s.header) for s in listener.states] == offline.trigger_stamps_ns.tolist()
+
+
+def test_states_of_another_version_keep_what_they_say(play, listen, wait_until, tmp_path):
+    """The bag's own definition lacks the voltage; the message of today has it."""
+    (kind,) = STATE_TYPES
+    messages = Messages(state_types={kind: STATE_TYPES[kind].replace('float64 voltage_kv\n', '')})
+    header = messages.header(START_NS - 9)
+    state = messages.store.types[kind](header, True, 0.7, 250.0, 4e4)
+    entries = pose_entries(straight_pass(20, triggers=False))
+    entries.insert(0, ('/state', START_NS - 5, state))
+    bag = write_bag(tmp_path / 'older', entries, messages=messages)
+    listener = listen()
+    player = play(bag, rate=0.0, state_topic='state')
+    wait_until(player.finished.done, what='the end of the replay')
+    (taken,) = listener.states
+    assert stamp_ns(taken.header) == START_NS - 9
+    assert (taken.spraying, taken.flow, taken.shaping_air_l_per_min) == (True, 0.7, 250.0)
+    assert np.isnan(taken.voltage_kv)
+    assert taken.brush == 0
+
+
+def test_a_bool_of_another_clock_is_refused(play, tmp_path):
+    entries = pose_entries(straight_pass(20, triggers=False), delay_ns=10**10)
+    entries.insert(0, ('/gun', START_NS + 10**10, Messages().trigger(True)))
+    bag = write_bag(tmp_path / 'other_clock', entries)
+    with pytest.raises(RecordingError, match='10 s off its own stamps'):
+        play(bag, state_topic='/gun')
+
+
+def test_pause_and_resume(onlooker, play, listen, call, wait_until, still, pass_bag):
+    caller, listener = onlooker({}), listen()
+    player = play(pass_bag, rate=1.0, start_paused=True)
+
+    def tell(name: str) -> Trigger.Response:
+        return call(caller, Trigger, f'bag_player/{name}', Trigger.Request())
+
+    assert tell('resume').message == 'resumed'
+    assert not tell('resume').success
+    wait_until(lambda: len(listener.poses) > 20, what='poses')
+    assert tell('pause').success
+    assert tell('pause').message == 'already paused'
+    paused_at = player.poses_published
+    still(0.2)
+    assert player.poses_published - paused_at <= 1
+    assert tell('resume').success
+    wait_until(lambda: len(listener.poses) > paused_at + 20, what='more poses')
+    assert listener.poses == recorded(pass_bag)[: len(listener.poses)]
+
+
+def test_a_loop_starts_over(play, listen, wait_until, tmp_path):
+    bag = write_pose_bag(tmp_path / 'short', straight_pass(30, triggers=False))
+    listener = listen()
+    player = play(bag, rate=0.0, loop=True)
+    wait_until(lambda: len(listener.poses) >= 100, what='the fourth round')
+    assert listener.poses[:90] == 3 * recorded(bag)
+    assert not player.finished.done()
+
+
+def test_bad_input_is_reported_at_the_start(play, pass_bag):
+    for values, says in (
+        ({'bag': ''}, 'bag is empty: give the path of a recording'),
+        ({'bag': '/nowhere'}, 'no bag at /nowhere'),
+        ({'pose_topic': 'atomizer/pos'}, 'its PoseStamped topics: /atomizer/pose'),
+        ({'state_topic': '/gun'}, 'its state topics: /atomizer/state'),
+        ({'rate': -1.0}, 'rate is -1; give at least 0'),
+        ({'topic': 'x'}, 'bag_player has no parameter topic; did you mean'),
+    ):
+        with pytest.raises((PaintError, RecordingError), match=says):
+            play(**{'bag': str(pass_bag)} | values)
+
+
+def test_the_player_stays_within_its_window(play, listen, wait_until, still, pass_bag):
+    """A subscriber that takes poses and never says so gets a window of them, and no more."""
+    listener = listen(reports=False)  # it has the publisher, and is silent
+    player = play(pass_bag, rate=0.0, window=60)
+    wait_until(lambda: player.poses_published == 60, what='a window of poses')
+    still(0.5)
+    assert player.poses_published == 60
+    wait_until(lambda: len(listener.poses) == 60, what='the poses')
+    listener.report()
+    wait_until(lambda: player.poses_published == 120, what='the next window')
+    while not player.finished.done():
+        taken = len(listener.poses)
+        listener.report()
+        wait_until(
+            lambda taken=taken: len(listener.poses) > taken or player.finished.done(),
+            what='more poses',
+        )
+    assert listener.poses == recorded(pass_bag)
+
+
+def test_an_interrupt_ends_a_waiting_player(ros_domain, wait_until, pass_bag, tmp_path):
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=pass_bag) as process:
+        wait_until(lambda: 'waiting for 1 subscribers' in process.err)
+        process.interrupt_as_launch_does()
+        assert process.wait() == 0
+        assert 'replayed 0 poses, 0 states' in process.err
+        assert 'Traceback' not in process.err
+
+
+def test_a_bag_that_breaks_off_later_ends_the_process(ros_domain, listen, wait_until, tmp_path):
+    bag = write_pose_bag(tmp_path / 'pass', straight_pass(4_000))
+    path = bag / 'pass_0.mcap'
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 0xFF
+    path.write_bytes(content)
+    listen()
+    with NodeProcess(tmp_path / 'player', 'bag_player', bag=bag, rate='0.0') as process:
+        wait_until(lambda: process.exit_code is not None, what='the end')
+        assert process.exit_code == 2
+        assert f'run: paint recover {bag}' in process.err

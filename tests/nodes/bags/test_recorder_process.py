@@ -1,0 +1,105 @@
+"""A recorder as a process: killed, told to end, its folder taken away, its disk full."""
+
+import contextlib
+import itertools
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+from geometry_msgs.msg import PoseStamped
+from rclpy.qos import QoSProfile
+from rosbags.rosbag2 import Reader
+from std_msgs.msg import String
+
+from files.recorded import START_NS
+from nodes.bags.runs import pose
+from nodes.processes import NodeProcess
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.mcap_recovery import recover
+
+MODULE = 'run_recorder'
+
+
+def test_a_run_that_is_taken_away_ends_the_recorder(ros_domain, wait_until, tmp_path):
+    run = tmp_path / 'run'
+    with NodeProcess(
+        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run'
+    ) as process:
+        wait_until(lambda: 'recording' in process.err, what='the recording')
+        shutil.rmtree(run)
+        wait_until(lambda: process.exit_code is not None, what='the end')
+        assert process.exit_code == 2
+        assert f'error: {run}/run_0.mcap: No such file or directory' in process.err
+        assert 'Traceback' not in process.err
+
+
+def test_a_killed_recorder_keeps_what_came_a_moment_before(
+    ros_domain, publisher, wait_until, tmp_path
+):
+    """A hundred poses do not fill a chunk: the recorder closes it by its age."""
+    with NodeProcess(
+        tmp_path / 'recorder', MODULE, output_directory=tmp_path, name='run', topics='[/pose]'
+    ) as process:
+        poses = publisher(PoseStamped, '/pose', QoSProfile(depth=100))
+        for number in range(100):
+            poses.publish(pose(START_NS + number * 4_000_000))
+
+        def on_disk() -> int:
+            # One chunk of poses that came within half a second, or several.
+            with contextlib.suppress(RecordingError):
+                recovery = recover(tmp_path / 'run', tmp_path / f'tried_{next(attempts)}')
+                return recovery.message_count
+            return 0
+
+        attempts = itertools.count()
+        wait_until(lambda: on_disk() == 100, what='all poses on disk')
+        process.kill()
+    assert not (tmp_path / 'run/metadata.yaml').exists()
+    recovery = recover(tmp_path / 'run', tmp_path / 'recovered')
+    assert recovery.counts == {'/pose': 100}
+    assert len(read_recording(tmp_path / 'recovered')) == 100
+    with Reader(tmp_path / 'recovered') as reader:
+        (connection,) = reader.connections
+        assert connection.digest.startswith('RIHS01_')
+        assert connection.ext.offered_qos_profiles[0].reliability.name == 'RELIABLE'
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of one megabyte."""
+    folder = tmp_path / 'small_disk'
+    folder.mkdir()
+    mounted = subprocess.run(
+        ['mount', '-t', 'tmpfs', '-o', 'size=1m', 'tmpfs', str(folder)],
+        capture_output=True,
+        check=False,
+    )
+    if mounted.returncode != 0:
+        pytest.skip('a small file system can be mounted by root alone')
+    yield folder
+    subprocess.run(['umount', '-l', str(folder)], check=True)
+
+
+def test_a_full_disk_ends_the_recorder(ros_domain, cell, wait_until, tmp_path, small_disk):
+    chatter = cell.create_publisher(String, 'chatter', QoSProfile(depth=100))
+    noise = np.random.default_rng(2)
+    with NodeProcess(
+        tmp_path / 'recorder',
+        MODULE,
+        output_directory=small_disk,
+        name='run',
+        topics='[chatter]',
+        compression='none',
+    ) as process:
+        wait_until(lambda: chatter.get_subscription_count() > 0)
+        cell.create_timer(0.002, lambda: chatter.publish(String(data=noise.bytes(5_000).hex())))
+        wait_until(lambda: process.exit_code is not None, what='the end')
+        assert process.exit_code == 2
+        assert 'No space left on device; run `paint recover' in process.err
+    assert not (small_disk / 'run/metadata.yaml').exists()
+    recovery = recover(small_disk / 'run', tmp_path / 'recovered')
+    # A megabyte of messages of 10 kB, less the chunk that did not fit.
+    assert 85 <= recovery.message_count <= 105
+    shutil.rmtree(small_disk / 'run')

@@ -1,0 +1,201 @@
+"""The live comparison with gauge readings over real DDS."""
+
+import numpy as np
+import pytest
+from paint_msgs.msg import ComparisonStats
+from std_srvs.srv import Trigger
+from visualization_msgs.msg import Marker, MarkerArray
+
+from nodes.cell import offline_um, parameters, two_passes, write_panel
+from paint_deposition.effects.catalogue import effect_class
+from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PaintError
+from paint_deposition.files.gauge_readings import write_table
+from paint_deposition.files.meshes import read_mesh
+from paint_deposition.files.model_file import write_model
+from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.film.colour_scales import BARE_RGB
+from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes.model_comparison import ModelComparison
+from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.node import OK, WARN
+
+MOTION = two_passes()
+TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))
+SIGMA_UM = 0.2
+
+
+@pytest.fixture
+def readings(tmp_path):
+    """A file of forty noisy readings of the true film, each place measured twice."""
+    rng = np.random.default_rng(11)
+    surface = read_mesh(write_panel(tmp_path / 'panel.stl'), 1.0, 0.05)
+    places = np.column_stack(
+        [rng.uniform(-0.25, 0.25, 20), np.zeros(20), rng.uniform(-0.25, 0.25, 20)]
+    )
+    integrator = FilmIntegrator(surface.at(places), TRUTH, 'double')
+    integrator.add(spray_path(MOTION)[0])
+    lines = [['x_m', 'y_m', 'z_m', 'thickness_um', 'point', 'sigma_um']]
+    for number, (place, film) in enumerate(zip(places, integrator.gauge_um, strict=True)):
+        for _ in range(2):
+            reading = film + rng.normal(scale=SIGMA_UM)
+            lines.append([*(f'{c:.6f}' for c in place), f'{reading:.4f}', number, SIGMA_UM])
+    path = tmp_path / 'readings.csv'
+    write_table(path, lines)
+    return path
+
+
+@pytest.fixture
+def comparison(ros_context, spin, readings, tmp_path):
+    """`comparison(**parameters)`: a comparison with the readings that runs."""
+
+    def comparison(**values) -> ModelComparison:
+        chosen = {
+            'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
+            'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
+        } | values  # fmt: skip
+        node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
+        spin(node)
+        return node
+
+    return comparison
+
+
+@pytest.fixture
+def viewer(onlooker):
+    """A node that looks at the comparison."""
+    kinds = {'stats': ComparisonStats, 'mesh': Marker, 'legend': MarkerArray}
+    return onlooker({f'comparison/{t}': (kind, topics.LATCHED) for t, kind in kinds.items()})
+
+
+def _true_model(tmp_path) -> str:
+    write_model(tmp_path / 'truth.yaml', TRUTH)
+    return str(tmp_path / 'truth.yaml')
+
+
+def test_the_error_falls_to_the_noise_as_the_part_is_painted(
+    comparison, robot, viewer, wait_until, tmp_path
+):
+    node = comparison(model_file=_true_model(tmp_path))
+    source = robot(node)
+    wait_until(lambda: viewer.heard['comparison/stats'], what='the bare part')
+    errors = []
+    for start in range(0, len(MOTION), 200):
+        rows = slice(start, start + 200)
+        source.send(MOTION, rows)
+        newest = MOTION.stamps_ns[rows][-1]
+        wait_until(
+            lambda newest=newest: viewer.shows(
+                'comparison/stats', lambda m: stamp_ns(m.header) == newest
+            )
+        )
+        errors.append(viewer.newest('comparison/stats').rmse_um)
+    before_any = viewer.decoded('comparison/stats', 0)
+    measured = node.readings.thickness_um
+    assert before_any.rmse_um == pytest.approx(np.sqrt(np.mean(measured**2)))
+    assert before_any.readings_painted == 0
+    assert before_any.rmse_um > errors[0] > errors[1] > errors[2]
+    stats = viewer.newest('comparison/stats')
+    assert (stats.model, stats.readings, stats.readings_painted) == ('truth.yaml', 40, 40)
+    assert stats.rmse_um == pytest.approx(SIGMA_UM, rel=0.3)
+    assert stats.chi_square_per_reading == pytest.approx(1.0, abs=0.6)
+    assert stats.noise_floor_um == pytest.approx(SIGMA_UM)
+    assert abs(stats.worst_residual_um) < 5 * SIGMA_UM
+
+
+def test_a_better_model_set_at_run_time_lowers_the_error(
+    comparison, robot, viewer, call, wait_until, tmp_path
+):
+    """Predictions are those of an offline run in double precision, and a service says it."""
+    node = comparison()
+    robot(node).send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    node.publish()
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
+    without = viewer.newest('comparison/stats')
+    assert without.model == 'default model'
+    assert without.rmse_um > 3 * SIGMA_UM
+    offline = offline_um(node, MOTION, precision='double')
+    found = node.residuals()
+    assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
+    readings_um = node.readings.thickness_um
+    assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
+    answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
+    assert answer.success
+    assert '\n' not in answer.message
+    assert f'rms {found.rmse_um:.2f} µm' in answer.message
+    assert '40 readings, 40 where' in answer.message
+    node.set_parameters(parameters(model_file=_true_model(tmp_path)))
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
+    assert viewer.newest('comparison/stats').model == 'truth.yaml'
+
+
+def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
+    comparison, robot, viewer, wait_until
+):
+    node = comparison(color_radius_m=0.06, color_max_um=5.0)
+    robot(node).send(MOTION)
+    wait_until(lambda: node.film.counts.received == len(MOTION))
+    node.publish()
+    newest = MOTION.stamps_ns[-1]
+    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: stamp_ns(m.header) == newest))
+    wait_until(lambda: viewer.newest('comparison/legend'), what='the legend')
+    mesh = viewer.newest('comparison/mesh')
+    colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
+    corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
+    places = node.readings.positions_m
+    distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
+    grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
+    assert grey[distance > 0.0601].all()
+    assert not grey[distance < 0.0599].any()
+    texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
+    assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
+
+
+def test_a_zero_is_warned_of_once_film_is_expected_there(
+    comparison, robot, readings, wait_until, tmp_path
+):
+    table = readings.read_text().splitlines()
+    x, y, z, _, *rest = table[1].split(',')
+    readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))
+    node = comparison()
+    assert node.status().level == OK
+    robot(node).send(MOTION)
+    wait_until(lambda: node.status().level == WARN, what='the warning')
+    assert '; 1 of 40 readings are 0 where the model expects' in node.status().message
+
+
+def test_bad_input_is_one_line(comparison):
+    for values, words in (
+        ({'measurements_file': ''}, 'measurements_file is empty'),
+        ({'measurements_file': 'nowhere.csv'}, 'nowhere.csv: no such file'),
+        ({'mesh_file': ''}, 'mesh_file is empty'),
+        ({'mesh_scale': 0.01}, "lie off the part's surface"),
+    ):
+        with pytest.raises(PaintError, match=words) as caught:
+            comparison(**values)
+        assert '\n' not in str(caught.value)
+
+
+@pytest.mark.parametrize('toward_gun', [True, False])
+def test_readings_with_normals_on_a_sheet_that_is_wound_inward(
+    comparison, readings, robot, painted, onlooker, wait_until, tmp_path, toward_gun
+):
+    """They are taken as `paint compare` takes them; those on the side that stays bare are said."""
+    write_panel(tmp_path / 'panel.stl', reverse=True)
+    heading, *lines = readings.read_text().splitlines()
+    normal = f'0,{-1 if toward_gun else 1},0'
+    text = '\n'.join([f'{heading},nx,ny,nz', *(f'{line},{normal}' for line in lines)])
+    readings.write_text(f'{text}\n')
+    node = comparison()
+    viewer, source = onlooker(), robot(node)
+    source.send(MOTION)
+    painted(node)
+    if toward_gun:
+        assert np.array_equal(node.film.snapshot().film_um,
+                              offline_um(node, MOTION, precision='double'))  # fmt: skip
+        assert node.residuals().painted.all()
+    else:
+        told = 'the gun paints the other side of the part'
+        wait_until(lambda: viewer.reports('model_comparison: film', told, b'\x01'), what=told)
