@@ -80,14 +80,13 @@ def competing_explanations(spray: Spray) -> str:
 
 
 def separation_words(spray: Spray) -> str:
-    """How far apart the explanations are now, and with a spray; the chance that one is left."""
-    several = 'the closest two of ' if len(spray.separates) > 2 else ''
+    """What a spray does for the leading effect: its distance from the next, and the chance."""
     words = (
-        f'{several}{competing_explanations(spray)} will differ by {spray.separation:.1f} instead '
-        f'of {spray.now:.1f} standard deviations'
+        f'it tells {competing_explanations(spray)} apart: the most probable one will be '
+        f'{spray.separation:.1f} standard deviations from the next, now {spray.now:.1f}'
     )
     if spray.chance == spray.chance:
-        words += f'; with a probability of {percent(spray.chance)} only one of them remains'
+        words += f', and one effect is left with a probability of {percent(spray.chance)}'
     return '; '.join(filter(None, [words, spray.film_words]))
 
 
