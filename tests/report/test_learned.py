@@ -11,7 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import (

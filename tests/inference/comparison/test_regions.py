@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.comparison.comparison import misfit_regions
+from paint_deposition.inference.comparison.regions import misfit_regions
 from paint_deposition.inference.fitting.study import Study
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from paint_deposition.inference.comparison.residual_field import (
+from paint_deposition.inference.comparison.regions import (
     interpolate_over_surface,
     interpolation_matrix,
     radius_of_readings_m,

@@ -27,7 +27,7 @@ from paint_deposition.inference.diagnosis.search import EffectSet, Search, Searc
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import root_mean_square
 
 POINTS, KNOTS = 80, 8
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))

@@ -39,7 +39,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     log_odds,
     probable_hyperparameters,
 )
-from paint_deposition.inference.fitting.smooth_fields import smooth
+from paint_deposition.inference.fitting.random_effects import smooth
 
 READINGS, NULL_RUNS = 60, 300
 # Probability that a correct p-value fails one of these bounds with other seeds.

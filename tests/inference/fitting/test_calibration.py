@@ -10,10 +10,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate
-from paint_deposition.inference.fitting.panel_fit import fit_collapse
+from paint_deposition.inference.fitting.panel import Panel, fit_collapse
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from virtual_paint_shop.shop import panel_study
 

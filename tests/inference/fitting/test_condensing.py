@@ -8,7 +8,7 @@ import pytest
 from inference.fitting.panels import ORDERS, column, painted_by, passes
 from paint_deposition.api.inference import compare
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.fitting.condensing import CELLS, cells_by_part, condensed
+from paint_deposition.inference.fitting.cleaning import CELLS, cells_by_part, condensed
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.report.words import count_words

@@ -7,8 +7,8 @@ from paint_deposition.api.simulation import look_at, require_brushes
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.inference.design.reading_choice import ChosenReadings, choose
+from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.motion.path_builder import DEFAULT_MAX_POSE_GAP_S
 from paint_deposition.motion.trajectory import Trajectory

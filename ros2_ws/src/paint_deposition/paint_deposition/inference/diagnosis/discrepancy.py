@@ -25,7 +25,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     footprint_basis,
 )
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.smooth_fields import smooth
+from paint_deposition.inference.fitting.random_effects import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern

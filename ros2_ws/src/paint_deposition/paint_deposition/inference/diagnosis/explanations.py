@@ -26,7 +26,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
 )
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.smooth_fields import field_over_values
+from paint_deposition.inference.fitting.random_effects import field_over_values
 from paint_deposition.inference.fitting.study import Study
 
 # Amplitudes are stepped by this share of their typical size.

@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from paint_deposition.inference.comparison.comparison import misfit_regions
+from paint_deposition.inference.comparison.regions import misfit_regions
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,

@@ -26,7 +26,7 @@ from paint_deposition.inference.diagnosis.gaussian import (
     OrthogonalDirections,
     simulated,
 )
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 

@@ -38,7 +38,7 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass,
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import beyond_noise_um, is_worse
+from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 
 # Significance level of the test that something is missing.
 ALPHA = 0.05

@@ -16,7 +16,7 @@ from paint_deposition.effects.learned.footprint import WAVES, LearnedFootprint, 
 from paint_deposition.effects.learned.law import LearnedLaw, hat_sums, hat_weights
 from paint_deposition.effects.learned.place import LearnedMap, PartGrid, places_m
 from paint_deposition.inference.fitting.least_squares import STEP, Fit
-from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
+from paint_deposition.inference.fitting.random_effects import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.covariates import Rays
 from paint_deposition.model.eq1_pattern import PlanarPattern

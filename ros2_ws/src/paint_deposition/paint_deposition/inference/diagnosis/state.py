@@ -30,9 +30,8 @@ from paint_deposition.inference.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import usable

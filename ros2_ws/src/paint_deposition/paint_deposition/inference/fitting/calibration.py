@@ -5,6 +5,7 @@ greatest standard deviation start the fit of the 2D model, which goes through th
 as every film, so that door and panel alike can be in a campaign.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,38 +14,37 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.paint_used import impossible_brushes
+from paint_deposition.film.paint_used import efficiency, impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
-from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
     Correlation,
+    DiscrepancyFigures,
     Estimate,
     correlations,
     estimates,
 )
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
-from paint_deposition.inference.fitting.panel_fit import (
+from paint_deposition.inference.fitting.panel import (
     CollapseFit,
+    Panel,
+    check_panel,
     fit_collapse,
     shifts,
     short_reaches,
 )
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.posterior import posterior_of, with_brushes_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.plausibility import (
     check_enough,
-    check_panel,
     check_readings,
     check_units_against_fit,
     geometry_by_experiment,
 )
-from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
 STARTS = 8
@@ -287,3 +287,25 @@ def _warnings(
             'readings to know it'
         )
     return warnings
+
+
+def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dict[str, Any] | None:
+    """Set-points and transfer efficiency of each brush.
+
+    None without brushes. The efficiency is that on a part which catches everything.
+    """
+    if not model.brushes:
+        return None
+    several = len(model.brushes) > 1
+    relative = {value.name: value.sigma / value.value for value in parameters if value.value}
+    by_number: dict[str, Any] = {}
+    for brush in model.brushes:
+        share = efficiency(brush)
+        name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
+        known = not math.isnan(share)
+        by_number[str(brush.number)] = {
+            **brush.set_points.model_dump(exclude_none=True),
+            'transfer_efficiency': share if known else None,
+            'transfer_efficiency_sigma': share * relative[name] if known else None,
+        }
+    return {'by_number': by_number}

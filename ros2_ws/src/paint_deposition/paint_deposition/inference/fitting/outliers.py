@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import expit, logsumexp
 
-from paint_deposition.inference.fitting.smooth_fields import field_over_values, root_of_field
+from paint_deposition.inference.fitting.random_effects import field_over_values, root_of_field
 from paint_deposition.inference.readings.covariates import Covariate
 
 # The film's texture, as a share of it: what is usual, within a factor, and what is considered.

@@ -1,4 +1,7 @@
-"""The posterior of a fit: the prior of the next job, and models drawn from it."""
+"""The posterior of a fit: the prior of the next job, and models drawn from it.
+
+A campaign starts from the brushes that painted it, and from what is known of these.
+"""
 
 from __future__ import annotations
 
@@ -11,13 +14,15 @@ from scipy.special import chdtri
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.model.brush import Brush, SetPoints, listed
+from paint_deposition.motion.trigger import ONLY_BRUSH
 
 # Settings that differ by a larger share than this are others.
 OTHER_SETTING = 0.05
@@ -230,3 +235,48 @@ class PatternShift:
             'usual': self.usual,
             'by_coordinate': self.by_coordinate,
         }
+
+
+# What recordings hold of the process beside the flow, which is relative to the brush's.
+RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
+
+
+def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionModel:
+    """A model with the brushes that painted a campaign's parts, and no others.
+
+    One pattern is the first guess of all brushes, with the set-points of the recordings.
+
+    Raises:
+        ModelError: the model has brushes, but not one of these.
+        ReadingsError: some recordings name their brush and others do not.
+    """
+    numbers = campaign.brushes
+    if model.brushes or len(numbers) <= 1:
+        return model.of_numbers(numbers)
+    if ONLY_BRUSH in numbers:
+        silent = next(e.name for e in campaign.experiments if ONLY_BRUSH in e.brushes)
+        raise ReadingsError(
+            f"experiment '{silent}' names no brush, others name {listed(numbers - {ONLY_BRUSH})}: "
+            'give it `brush: NUMBER` in the campaign'
+        )
+    return DepositionModel.of_brushes(
+        (
+            Brush(number=n, planar=model.planar, **_set_points(campaign, n).model_dump())
+            for n in numbers
+        ),
+        projection=model.projection, effects=model.effects,
+    )  # fmt: skip
+
+
+def _set_points(campaign: Campaign, number: int) -> SetPoints:
+    """Medians over the recordings with this brush alone."""
+    found = {}
+    for name in RECORDED:
+        recorded = [
+            abs(e.settings[name])
+            for e in campaign.experiments
+            if e.brushes == {number} and e.settings.get(name)
+        ]
+        if recorded:
+            found[name] = float(np.median(recorded))
+    return SetPoints(**found)

@@ -20,7 +20,7 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate, Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.inference.readings.plausibility import check_unit
-from paint_deposition.inference.readings.residuals import Residuals, root_mean_square
+from paint_deposition.inference.readings.readings import Residuals, root_mean_square
 
 # Times that points are left out for cross-validation, each of them once.
 FOLDS = 6

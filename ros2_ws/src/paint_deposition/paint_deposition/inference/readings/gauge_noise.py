@@ -10,8 +10,7 @@ import numpy as np
 from scipy.ndimage import median
 from scipy.special import ndtri, stdtrit
 
-from paint_deposition.inference.readings.readings import PointMeans, Readings
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import PointMeans, Readings, root_mean_square
 
 # A usual magnetic or eddy-current gauge, for readings that say nothing of their noise.
 ASSUMED_FLOOR_UM = 0.7

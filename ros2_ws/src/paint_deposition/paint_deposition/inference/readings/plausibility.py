@@ -4,14 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError, some
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.part.surface import Surface
@@ -27,10 +25,6 @@ THINNEST_MILS = 0.15
 LEAST_GAP = 6.0
 UNIT_SLACK = 1.8
 NEGATIVE_SIGMAS = 4.0
-# The film has structure if noise alone scatters as much with a smaller probability.
-NO_STRUCTURE_P = 1e-3
-# A point lies beside a pass from this share of the panel's scale on.
-BESIDE = 0.05
 MOST_NAMED = 6
 # A film is near a target if the logarithm of their ratio is no larger.
 NEAR = np.log(1.5)
@@ -84,35 +78,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     for unit, exact in UNITS.items():
         if exact / UNIT_SLACK < factor < exact * UNIT_SLACK:
             raise _other_unit(readings, low, high, unit)
-
-
-def check_panel(
-    readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
-) -> None:
-    """Refuse a panel whose readings cannot determine a pass.
-
-    Args:
-        readings: as taken. panel: where points and passes lie.
-        measured_um, sigma_um: (P,) point means and their standard deviations [um].
-    """
-    places = panel.places_m
-    nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
-    beside = BESIDE * panel.scale_m
-    if nearest.min() > -beside or nearest.max() < beside:
-        missing = 'x < 0' if nearest.min() > -beside else 'x > 0'
-        raise ReadingsError(
-            f'{readings.source}: all readings lie on one side of the passes ({missing} is bare '
-            'of readings, x from tool z times travel); measure across whole passes'
-        )
-    weights = sigma_um**-2.0
-    mean = float(weights @ measured_um) / float(weights.sum())
-    scatter = float(weights @ (measured_um - mean) ** 2)
-    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
-        raise ReadingsError(
-            f'{readings.source}: the film varies by no more than the noise of the gauge '
-            f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
-            'measure beyond the passes or paint at a wider index'
-        )
 
 
 def check_units_against_fit(

@@ -10,7 +10,7 @@ from matplotlib.patheffects import Normal, Stroke
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
 from paint_deposition.report.pictures.chart import MM, legend, new_figure, quiet, save_picture
 from paint_deposition.report.pictures.part import PartPicture

@@ -14,7 +14,7 @@ from paint_deposition.files.json_files import write_json
 from paint_deposition.files.planned_model import DIGEST, IMPROVEMENT_FILE, PLAN_FILE
 from paint_deposition.files.provenance import model_digest, origin
 from paint_deposition.film.spray_geometry import spray_geometry
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.part.orientation import across_axis
 from paint_deposition.planning.improvement.improvement import Improvement

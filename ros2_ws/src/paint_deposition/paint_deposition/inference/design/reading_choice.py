@@ -9,9 +9,12 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.diagnosis.reading_exchange import CandidateDesign, exchanged
+from paint_deposition.inference.design.reading_exchange import (
+    CandidateDesign,
+    UnmeasuredPart,
+    exchanged,
+)
 from paint_deposition.inference.diagnosis.testability import power_along
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath

@@ -12,16 +12,17 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.contenders import (
+from paint_deposition.inference.design.contenders import (
     Contender,
     Forecast,
     Placement,
     contenders_of,
 )
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
-from paint_deposition.inference.diagnosis.stationary_spray import (
+from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
+from paint_deposition.inference.diagnosis.proposals import (
     KEY,
+    Place,
+    Spray,
     StationarySpray,
     spots,
     suits,

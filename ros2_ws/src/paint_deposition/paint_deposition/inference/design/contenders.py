@@ -45,7 +45,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.smooth_fields import field_over_values
+from paint_deposition.inference.fitting.random_effects import field_over_values
 from paint_deposition.inference.fitting.study import Study
 
 # Effects that compete at the most.

@@ -1,7 +1,8 @@
-"""Eq. (3) fitted across the passes of a panel (section 4.1), and how far its readings reach.
+"""A flat panel painted by straight parallel passes: eq. (3) across them, how far readings reach.
 
-Paint that lands beyond the readings is extrapolated. A little more film along a panel's rim, as
-fat edges have it, then makes the fitted pattern far too wide, which its intervals do not show.
+Section 4.1 of Conner et al. (IROS 2002). Paint that lands beyond the readings is extrapolated. A
+little more film along a panel's rim, as fat edges have it, then makes the fitted pattern far too
+wide, which its intervals do not show.
 """
 
 from collections.abc import Callable
@@ -11,17 +12,144 @@ from itertools import product
 import numpy as np
 from scipy.integrate import cumulative_trapezoid
 from scipy.optimize import least_squares
+from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.film.pass_film import sampled_collapse
+from paint_deposition.film.pass_film import collapse_um, sampled_collapse
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.plausibility import FEWEST_POINTS
-from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.inference.readings.readings import Readings, Residuals
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
+from paint_deposition.motion.trigger import ONLY_BRUSH
+
+# Cosines of the largest angles: between normals of a flat panel, between parallel passes, and
+# between the gun's axis and the panel's normal.
+FLAT_COSINE = np.cos(np.radians(3.0))
+PARALLEL_COSINE = np.cos(np.radians(2.0))
+SQUARE_COSINE = np.cos(np.radians(5.0))
+SHORTEST_PASS_M = 0.05
+# All but the ends of a pass lie this close to one line [m].
+INNER, STRAIGHT_M = (0.05, 0.95), 0.02
+
+
+@dataclass(frozen=True)
+class Panel:
+    """Where readings and passes lie across the direction of travel."""
+
+    across_m: np.ndarray  # (P,) coordinate of each point [m]
+    passes_m: np.ndarray  # (n,) coordinate of each pass's line [m]
+    speed_m_per_s: np.ndarray  # (n,) of each pass
+    # (n,) bool, passes on which the gun was turned by half a turn against the first.
+    mirrored: np.ndarray
+    distance_m: float  # mean distance of the TCP from the surface, the standoff [m]
+    travel_rad: float  # direction of the first pass in the tool's x-y frame [rad]
+    brush: int = ONLY_BRUSH  # number of the brush of all passes
+
+    @staticmethod
+    def of(experiment: Experiment) -> 'Panel | None':
+        """The panel of an experiment, or None if part or motion are of another kind."""
+        normals = experiment.measured_points.normals
+        positions = experiment.measured_points.positions_m
+        outward = normals.mean(axis=0)
+        outward /= np.linalg.norm(outward)
+        if (normals @ outward).min() < FLAT_COSINE or len(experiment.brushes) != 1:
+            return None
+        path = experiment.path.select(experiment.path.flow > 0.0)
+        passes = [path.select(path.spray_pass == n) for n in np.unique(path.spray_pass)]
+        passes = [p for p in passes if p.dwell_s @ p.speed_m_per_s > SHORTEST_PASS_M]
+        if not passes:
+            return None
+        travels = np.array([p.dwell_s @ p.velocity_m_per_s for p in passes])
+        travels /= np.linalg.norm(travels, axis=1, keepdims=True)
+        travel = travels[0]
+        axes = np.array([np.median(p.rotation, axis=0) for p in passes])
+        across, turned = np.cross(-outward, travel), axes[:, :, 0] @ axes[0, :, 0]
+        # The first sub-steps of a pass may still be counted with the pass before.
+        spread = [np.ptp(np.quantile(p.position_m @ across, INNER)) for p in passes]
+        if (
+            np.abs(travels @ travel).min() < PARALLEL_COSINE
+            or (-axes[:, :, 2] @ outward).min() < SQUARE_COSINE
+            or np.abs(turned).min() < PARALLEL_COSINE
+            or max(spread) > STRAIGHT_M
+        ):
+            return None
+        height = np.mean([np.median(p.position_m @ outward) for p in passes])
+        return Panel(
+            across_m=positions @ across,
+            passes_m=np.array([np.median(p.position_m @ across) for p in passes]),
+            speed_m_per_s=np.array([np.median(p.speed_m_per_s) for p in passes]),
+            mirrored=turned < 0.0,
+            distance_m=float(height - (positions @ outward).mean()),
+            travel_rad=float(np.arctan2(travel @ axes[0, :, 1], travel @ axes[0, :, 0])),
+            brush=min(experiment.brushes),
+        )
+
+    @property
+    def scale_m(self) -> float:
+        """Order of a pass's width: the index, or a share of the readings' extent [m]."""
+        if len(self.passes_m) > 1:
+            return float(np.median(np.diff(np.sort(self.passes_m))))
+        return 0.6 * float(np.ptp(self.across_m))
+
+    def film_um(self, model: DepositionModel, across_m: np.ndarray) -> np.ndarray:
+        """Film of the passes on the panel at other places across them (L,) [um].
+
+        Passes count as endless; effects on the finished film are left out.
+        """
+        of_brush, at = model.painting_with(self.brush), (self.distance_m, self.travel_rad)
+        passes = zip(self.passes_m, self.speed_m_per_s, self.mirrored, strict=True)
+        films = [
+            collapse_um(of_brush, across_m - line, speed, *at, turned=mirrored)
+            for line, speed, mirrored in passes
+        ]
+        return np.sum(films, axis=0)
+
+    @property
+    def places_m(self) -> np.ndarray:
+        """(P, n) distance of each point from each pass's line, along that pass's own x axis."""
+        away = self.across_m[:, np.newaxis] - self.passes_m
+        return np.where(self.mirrored, -away, away)
+
+
+# The film has structure if noise alone scatters as much with a smaller probability.
+NO_STRUCTURE_P = 1e-3
+
+
+# A point lies beside a pass from this share of the panel's scale on.
+BESIDE = 0.05
+
+
+def check_panel(
+    readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
+) -> None:
+    """Refuse a panel whose readings cannot determine a pass.
+
+    Args:
+        readings: as taken. panel: where points and passes lie.
+        measured_um, sigma_um: (P,) point means and their standard deviations [um].
+    """
+    places = panel.places_m
+    nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
+    beside = BESIDE * panel.scale_m
+    if nearest.min() > -beside or nearest.max() < beside:
+        missing = 'x < 0' if nearest.min() > -beside else 'x > 0'
+        raise ReadingsError(
+            f'{readings.source}: all readings lie on one side of the passes ({missing} is bare '
+            'of readings, x from tool z times travel); measure across whole passes'
+        )
+    weights = sigma_um**-2.0
+    mean = float(weights @ measured_um) / float(weights.sum())
+    scatter = float(weights @ (measured_um - mean) ** 2)
+    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
+        raise ReadingsError(
+            f'{readings.source}: the film varies by no more than the noise of the gauge '
+            f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
+            'measure beyond the passes or paint at a wider index'
+        )
+
 
 # Starts of the search: offset radii and standard deviations in units of the panel's scale.
 RADII = (0.2, 0.35, 0.5)
