@@ -18,15 +18,6 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
-# Model lines are drawn through points this close along the surface [m].
-LINE_STEP_M = 0.01
-# Beyond the first and last reading lines go on for as far as readings are apart, but not off the
-# surface by more [m].
-OFF_SURFACE_M = 0.003
-# Readings without rows or columns are shown in strips of the part, about this many to a strip.
-READINGS_A_STRIP = 20
-MOST_STRIPS = 6
-
 
 @dataclass(frozen=True)
 class Profile:
@@ -113,7 +104,8 @@ def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, boo
     upright = passes_are_level(experiment.path, experiment.surface.down)
     height_m, across_m = _coordinates(experiment)
     aside, what = (across_m, 'across') if upright else (height_m, 'height')
-    count = int(np.clip(round(len(aside) / READINGS_A_STRIP), 1, MOST_STRIPS))
+    # About twenty readings to a strip, in six strips at the most.
+    count = int(np.clip(round(len(aside) / 20), 1, 6))
     for part in np.array_split(np.argsort(aside, kind='stable'), count):
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
@@ -148,7 +140,8 @@ def _film_along(
     """Positions, films of the models and of each pass alone, through places and normals (n, 3)."""
     low, high = position_m[[0, -1]]
     beyond = (high - low) / (len(position_m) - 1)
-    steps = max(2, int(np.ceil((high - low + 2.0 * beyond) / LINE_STEP_M)) + 1)
+    # Model lines are drawn through points this close along the surface [m].
+    steps = max(2, int(np.ceil((high - low + 2.0 * beyond) / 0.01)) + 1)
     at = np.unique(np.concatenate([np.linspace(low - beyond, high + beyond, steps), position_m]))
     line = np.column_stack([
         np.interp(at, position_m, column) for column in np.hstack([places, normals]).T
@@ -158,7 +151,9 @@ def _film_along(
         way /= way @ axis.direction
         line[outside, :3] += np.outer(at[outside] - position_m[end], way)
     off_m = experiment.surface.locate(line[:, :3], line[:, 3:]).distance_m
-    on = ((low <= at) & (at <= high)) | (off_m < OFF_SURFACE_M)
+    # Beyond the first and last reading lines go on for as far as readings are apart, but not off
+    # the surface by more [m].
+    on = ((low <= at) & (at <= high)) | (off_m < 0.003)
     at, line = at[on], line[on]
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)

@@ -14,36 +14,6 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.part.surface import Surface
 
-# Regions are discs of these radii about a point [m], or bands of some sixths of the height.
-RADII_M = (0.08, 0.12, 0.18, 0.26, 0.36)
-
-
-BANDS = 6
-
-
-FEWEST = 2
-
-
-MOST_REGIONS = 6
-
-
-# A region that is wider than this share of its part has no place across it [%].
-MOST_OF_WIDTH = 60.0
-
-
-# Readings within this width have none [m].
-LEAST_WIDTH_M = 0.05
-
-
-# Significance level: the probability that noise alone gives a part any region.
-SIGNIFICANCE = 0.02
-
-
-DRAWS = 1000
-
-
-SEED = 0
-
 
 @dataclass(frozen=True)
 class Region:
@@ -69,17 +39,18 @@ def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> l
         model: gives the incidence that the descriptions quote.
     """
     values = {c.name: c.values for c in study.covariates(model)}
-    random = np.random.default_rng(SEED)
+    random = np.random.default_rng(0)
     found = []
     for index, experiment in enumerate(study.campaign.experiments):
         rows = np.flatnonzero(study.campaign.experiment_of == index)
         places = _windows(study.campaign.positions_m[rows], values['height_fraction'][rows])
         if not len(places):
             continue
-        noise = np.abs(places @ random.normal(size=(len(rows), DRAWS))).max(axis=0)
-        threshold = float(np.quantile(noise, 1.0 - SIGNIFICANCE))
+        noise = np.abs(places @ random.normal(size=(len(rows), 1000))).max(axis=0)
+        # Noise alone gives a part any region with a probability of 2 %.
+        threshold = float(np.quantile(noise, 0.98))
         left = points.residual_um[rows] / points.sigma_um[rows]
-        for _ in range(MOST_REGIONS):
+        for _ in range(6):
             scores = places @ left
             best = int(np.argmax(np.abs(scores)))
             if abs(scores[best]) < threshold:
@@ -103,12 +74,14 @@ def _windows(positions_m: np.ndarray, height: np.ndarray) -> np.ndarray:
     windows can be compared with that of noise (spatial scan: Kulldorff 1997).
     """
     distance = np.linalg.norm(positions_m[:, np.newaxis] - positions_m[np.newaxis], axis=2)
-    discs = [distance < radius for radius in RADII_M]
-    ends = combinations(np.linspace(0.0, 1.0, BANDS + 1), 2)
+    # Discs of these radii about a point [m].
+    discs = [distance < radius for radius in (0.08, 0.12, 0.18, 0.26, 0.36)]
+    # Bands of some sixths of the height.
+    ends = combinations(np.linspace(0.0, 1.0, 7), 2)
     bands = [(height >= low) & (height <= high) for low, high in ends]
     members = np.unique(np.vstack([*discs, *bands]), axis=0).astype(float)
     count = members.sum(axis=1, keepdims=True)
-    enough = (count[:, 0] >= FEWEST) & (count[:, 0] < len(positions_m))
+    enough = (count[:, 0] >= 2) & (count[:, 0] < len(positions_m))
     return (members / np.sqrt(np.maximum(count, 1.0)))[enough]
 
 
@@ -133,16 +106,12 @@ def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) 
     across = values['across_m']
     share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
     left, right = 100.0 * np.quantile(share, [0.1, 0.9])
-    if right - left > MOST_OF_WIDTH or np.ptp(across[rows]) < LEAST_WIDTH_M:
+    # A region that is wider than this share of its part [%] has no place across it, nor has one
+    # of readings that all lie within so little [m].
+    if right - left > 60.0 or np.ptp(across[rows]) < 0.05:
         return vertical
     place = f'{left:.0f}' if right - left < 1.0 else f'{left:.0f} to {right:.0f}'
     return f'{vertical} at {place} % of the width from the left'
-
-
-SMALLEST_RADIUS_M, LARGEST_RADIUS_M = 0.025, 0.09
-RADIUS_OVER_SPACING = 1.8
-# Surface whose normal differs by more than 60 degrees is another side of the part.
-SAME_SIDE_COSINE = 0.5
 
 
 def interpolation_matrix(
@@ -163,7 +132,8 @@ def interpolation_matrix(
         cKDTree(positions_m), radius_m, output_type='ndarray'
     )
     facing = np.einsum('ij,ij->i', surface.normals[near['i']], normals[near['j']])
-    near = near[(facing > SAME_SIDE_COSINE) & (near['v'] < radius_m)]
+    # Surface whose normal differs by more than 60 degrees is another side of the part.
+    near = near[(facing > 0.5) & (near['v'] < radius_m)]
     weight = (1.0 - (near['v'] / radius_m) ** 2) ** 3
     shape = (len(surface.vertices_m), len(positions_m))
     matrix = csr_matrix((weight, (near['i'], near['j'])), shape=shape)
@@ -194,8 +164,8 @@ def radius_of_readings_m(positions_m: np.ndarray) -> float:
 
     Somewhat more than the usual distance between neighbouring readings.
     """
+    largest_m = 0.09
     if len(positions_m) < 2:
-        return LARGEST_RADIUS_M
+        return largest_m
     nearest = cKDTree(positions_m).query(positions_m, k=2)[0][:, 1]
-    usual = RADIUS_OVER_SPACING * float(np.median(nearest))
-    return min(max(usual, SMALLEST_RADIUS_M), LARGEST_RADIUS_M)
+    return min(max(1.8 * float(np.median(nearest)), 0.025), largest_m)

@@ -34,21 +34,11 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import PointMeans, Readings
 
-CANDIDATES = 220
-PROPOSED_POINTS = 8
 # Gauges are not to be trusted next to a free edge [m], and readings are spread out [m].
 EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-# Sprays that are named, single changes of which two at once are tried, and spots before which the
-# gun stands still.
-PROPOSED_SPRAYS, COMBINED, SPOTS = 15, 4, 5
-# What may be changed of a gun that stands still.
-OF_STANDING = ('roll', 'standoff', 'part', 'voltage', 'draught')
-# Chance of settling that one unit of cost is worth, as a share; that of spraying on one spot, and
-# what a film that may sag costs more.
-WORTH_OF_COST, COST_OF_STANDING, COST_OF_SAG = 0.05, 1.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -82,19 +72,22 @@ def propose(
 def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
     part = _part_that_differs_most(study, contenders)
     made = _best([_tried(study, contenders, part, change) for change in MENU])
-    leading = [one.change for one in made[:COMBINED]]
+    # Of the best single changes two at once are tried.
+    leading = [one.change for one in made[:4]]
     made += _best([_tried(study, contenders, part, change) for change in pairs(leading)])
     effects = (contender.fit.model.effect(contender.name) for contender in contenders)
     families = {effect.family for effect in effects if effect is not None}
     if suits(contenders[-1].fit.model, families):
-        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, SPOTS)]
+        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, 5)]
         still = _best(tried)
         made += still
         if still:
-            changes = [change for change in MENU if change.kind in OF_STANDING]
+            # What may be changed of a gun that stands still.
+            kinds = ('roll', 'standoff', 'part', 'voltage', 'draught')
+            changes = [change for change in MENU if change.kind in kinds]
             spot = still[0].spot
             made += _best([_tried(study, contenders, part, change, spot) for change in changes])
-    return [one.spray for one in _best(made)[:PROPOSED_SPRAYS]]
+    return [one.spray for one in _best(made)[:15]]
 
 
 def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
@@ -153,9 +146,10 @@ def _tried(
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
         float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip
-    cost = change.cost + COST_OF_STANDING * (stand is not None)
-    cost += COST_OF_SAG * bool(spray.film_words)
-    return ScoredExperiment(change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
+    # To spray on one spot costs one unit more, and so does a film that may sag.
+    cost = change.cost + (stand is not None) + bool(spray.film_words)
+    # One unit of cost is worth this share of the chance of settling.
+    return ScoredExperiment(change, spray, spray.chance * (1.0 - 0.05 * cost), spot)
 
 
 def _together(study: Study, experiments: Sequence[Experiment]) -> Study:
@@ -197,7 +191,7 @@ def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Pl
     part, positions_m, film_um = part[rows], positions_m[rows], together.measured_um[rows]
     usable = film_um > PAINTED * np.mean(study.measured_um)
     places: list[Place] = []
-    while usable.any() and len(places) < PROPOSED_POINTS:
+    while usable.any() and len(places) < 8:
         pair = placement.nearest()
         best = int(np.argmax(np.where(usable, placement.gains()[pair], -1.0)))
         before = placement.separation(pair)
@@ -217,7 +211,7 @@ def _with_candidates(study: Study, number: int, model: DepositionModel, seed: in
     """A part with further readings at random points, clear of free edges, as a model predicts."""
     experiment, own = study.campaign.experiments[number], study.campaign.experiment_of == number
     surface, here = experiment.surface, experiment.measured_points
-    count = CANDIDATES // len(study.campaign.experiments)
+    count = 220 // len(study.campaign.experiments)
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)

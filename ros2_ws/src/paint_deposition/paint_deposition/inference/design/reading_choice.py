@@ -27,20 +27,8 @@ from paint_deposition.part.gauge_places import (
 )
 from paint_deposition.part.surface import Surface
 
-DEFAULT_REPEATS = 8
 # With fewer points than this the pattern's parameters alone take up all that is read.
 LEAST_POINTS, MOST_POINTS = 12, 400
-# Places from which the points are chosen.
-CANDIDATES = 700
-# Least distance between points, as a share of the side of the square that each stands for.
-APART = 0.5
-# Less than this share of the mean film is hardly painted.
-PAINTED = 0.2
-# Draws of the noise with which the power is simulated.
-DRAWS = 400
-# A point speaks for an effect if it carries this many times its even share of what is seen of it,
-# for as many effects at the most.
-SPEAKS, MOST_NAMED = 1.5, 3
 
 
 @dataclass(frozen=True)
@@ -149,7 +137,7 @@ class ChosenReadings:
 def choose(
     part: UnmeasuredPart,
     count: int,
-    repeats: int = DEFAULT_REPEATS,
+    repeats: int = 8,
     foot_m: float = FOOT_M,
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
@@ -170,10 +158,12 @@ def choose(
     if film_um.max() < NO_PAINT_UM:
         raise ReadingsError('no paint lands on the part; check the trajectory and --part-pose')
     usable = usable_places(surface, film_um, foot_m)
-    places = spread_places(surface, usable, max(CANDIDATES, 4 * count), seed)
+    # The points are chosen from so many places at least.
+    places = spread_places(surface, usable, max(700, 4 * count), seed)
     if len(places) < count:
         raise _no_room(len(places), count, foot_m)
-    apart_m = APART * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
+    # Least distance between points, as a share of the side of the square that each stands for.
+    apart_m = 0.5 * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
     progress('what the effects change')
     marks = marks_at(part, places)
     progress('choosing points')
@@ -206,7 +196,8 @@ def usable_places(surface: Surface, film_um: np.ndarray, foot_m: float = FOOT_M)
     """(V,) bool, vertices that are painted and where the gauge can stand."""
     # The mean over the paint, not over the part: a bare side does not count.
     volume = surface.vertex_areas_m2 * film_um
-    return can_stand(surface, foot_m) & (film_um > PAINTED * (volume @ film_um) / volume.sum())
+    # Less than this share of the mean is hardly painted.
+    return can_stand(surface, foot_m) & (film_um > 0.2 * (volume @ film_um) / volume.sum())
 
 
 def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
@@ -234,7 +225,7 @@ def power_of(
     """
     space = part.space(part.study(vertices), freedom)
     draws = space.null_draws(seed)
-    null, draws = space.evidence(draws), draws[:, :DRAWS]
+    null, draws = space.evidence(draws), draws[:, :400]
     found: dict[str, list[float]] = {}
     for law in (e.law for e in space.explanations if e.law is not None):
         for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
@@ -268,7 +259,8 @@ def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ..
     by_effect = np.column_stack([shares[:, marks.effects == n].mean(axis=1) for n in names])
     even = by_effect.mean(axis=0)
     over = by_effect / np.where(even > 0.0, even, np.inf)
+    # A point speaks for an effect if it carries this many times its even share of what is seen of
+    # it, for as many effects at the most.
     return tuple(
-        tuple(str(names[k]) for k in np.argsort(-point)[:MOST_NAMED] if point[k] > SPEAKS)
-        for point in over
+        tuple(str(names[k]) for k in np.argsort(-point)[:3] if point[k] > 1.5) for point in over
     )

@@ -113,9 +113,6 @@ class UnmeasuredPart:
         return EffectEvidence(null, found, freedom)
 
 
-MOST_ROUNDS = 4
-# A smaller gain in worth is not worth an exchange.
-LEAST_GAIN = 1e-5
 # Step by which the power is differentiated, as a share.
 STEP = 1e-3
 
@@ -235,13 +232,14 @@ def exchanged(
     while len(chosen) < count and (best := best_beside(chosen)[0]) >= 0:
         chosen.append(best)
     worth = marks.around(np.array(chosen)).worth
-    for _ in range(MOST_ROUNDS):
+    for _ in range(4):
         before = worth
         for row in chosen:
             others = [one for one in chosen if one != row]
             best = best_beside(others)[0]
             trial = marks.around(np.array([*others, best])).worth
-            if trial > worth + LEAST_GAIN:
+            # A smaller gain in worth is not worth an exchange.
+            if trial > worth + 1e-5:
                 chosen, worth = [*others, best], trial
         if worth <= before:
             break

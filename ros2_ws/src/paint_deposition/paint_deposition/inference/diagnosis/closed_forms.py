@@ -19,15 +19,8 @@ from scipy.stats import chi2
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.curves import LearnedCurve
 
-# A form whose deviations are as improbable as this does not fit.
-IMPROBABLE = 0.001
-# Forms below this probability are not listed.
-FAINT = 0.01
 # So many knots count at least, where they are off alike: one more than a form's parameters.
 LEAST_KNOTS = 5
-# A power of a value so small beside the largest has no form that readings could tell.
-NEAR_ZERO = 0.02
-TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -86,13 +79,14 @@ class _Shape:
 
 
 _CHANGE = _Shape(0, 'change in all', starts=(-0.3, 0.3))
-_RATE = _Shape(-1, 'rate of the exponential')
-_EXPONENT = _Shape(0, 'exponent of the power', bounds=(-8.0, 8.0))
 # Forms by name: how they change the level, and their parameters. Those that are multiplied have
 # the level as a factor; the others are added to it, to 1 times it where the law is a factor.
 MULTIPLIED = {
-    'power': ('exp({exponent} * log(x / {x0}))', {'exponent': _EXPONENT}),
-    'exponential': ('exp({rate} * (x - {x0}))', {'rate': _RATE}),
+    'power': (
+        'exp({exponent} * log(x / {x0}))',
+        {'exponent': _Shape(0, 'exponent of the power', bounds=(-8.0, 8.0))},
+    ),
+    'exponential': ('exp({rate} * (x - {x0}))', {'rate': _Shape(-1, 'rate of the exponential')}),
 }
 ADDED = {
     'linear': ('{slope} * (x - {x0})', {'slope': _Shape(-1, 'slope')}),
@@ -120,7 +114,6 @@ ADDED = {
 FORMS: dict[str, tuple[str, dict[str, _Shape]]] = {'constant': ('', {})} | MULTIPLIED | ADDED
 # What a form need not say where it is about 0 or 1.
 IDLE = {'(x - 0.0)': 'x', '(0.0 - x)': '-x', '(0.0 + ': '(', '(x / 1.0)': '(x)'}
-POSITIVE = ('power', 'inverse')
 
 
 def variable(law: type[LearnedCurve]) -> tuple[str, str]:
@@ -186,8 +179,10 @@ def fitting_forms(
     criterion = misfit + count * np.log(knots)
     evidence = np.exp(-0.5 * (criterion - criterion.min()))
     probability = evidence / evidence.sum()
-    sound = chi2.sf(misfit, np.maximum(knots - count, 1.0)) > IMPROBABLE
-    sound &= (probability > FAINT) & (criterion < criterion[0])
+    # A form whose deviations are as improbable as this does not fit, and a faint one is not
+    # listed.
+    sound = chi2.sf(misfit, np.maximum(knots - count, 1.0)) > 0.001
+    sound &= (probability > 0.01) & (criterion < criterion[0])
     return tuple(
         _described(fits[k], float(probability[k]), weight, name, unit, addition)
         for k in np.argsort(-probability)
@@ -208,7 +203,8 @@ def _fitted(
 ) -> Iterator[tuple[str, str, Any]]:
     """Name, code and the best fit of a form; none where it cannot be, or ends at a bound."""
     span = float(np.ptp(x))
-    if form in POSITIVE and x.min() < NEAR_ZERO * x.max():
+    # A power of a value so small beside the largest has no form that readings could tell.
+    if form in ('power', 'inverse') and x.min() < 0.02 * x.max():
         return
     code, shapes = _code(form, x, unit, addition), FORMS[form][1].values()
     law = _compiled(code, _names(form, unit, addition))
@@ -238,7 +234,8 @@ def _described(
     name: str, unit: str, addition: bool,
 ) -> ClosedForm:  # fmt: skip
     form, code, fit = fitted
-    half = TWO_SIDED_95 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
+    # The 95 % interval.
+    half = 1.96 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
     level = _Shape(0, 'level of the law; the pattern can take it up', 'amplitude')
     parameters = {}
     for key, shape, value, away in zip(

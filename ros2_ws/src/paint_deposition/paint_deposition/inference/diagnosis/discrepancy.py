@@ -71,11 +71,6 @@ class DiscrepancyPrior:
 PRIOR = DiscrepancyPrior()
 # Knots along the radius of a footprint.
 FINE_RADII = 20
-# Distance between parts that share no field, and step of the pattern's sideways move [m].
-FAR_M, STEP_M = 1e6, 1e-3
-# Paths that keep within this distance [m], angle [rad] and share of the time are the same.
-# They are compared at this many places.
-SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 
 @dataclass(frozen=True)
@@ -178,7 +173,8 @@ class ModelDiscrepancy:
         lengths_m = tuple(length * _width_m(model) for length in PRIOR.lengths)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
-            places = np.column_stack([campaign.positions_m, FAR_M * of])
+            # Parts that are this far from each other share no field [m].
+            places = np.column_stack([campaign.positions_m, 1e6 * of])
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return ModelDiscrepancy(
@@ -283,11 +279,12 @@ def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:
 
 def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
     """(P, 2) change of the readings as the pattern moves along the tool's x and y [um/m]."""
+    step_m = 1e-3
     here = study.forward.predict_um(model)
     offset = model.effect('tcp_offset') or TcpOffset()
     moved = []
     for name in ('offset_x_m', 'offset_y_m'):
-        step = -STEP_M if getattr(offset, name) > 0.0 else STEP_M
+        step = -step_m if getattr(offset, name) > 0.0 else step_m
         shifted = offset.model_copy(update={name: getattr(offset, name) + step})
         moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
     return np.stack(moved, axis=1)
@@ -323,16 +320,18 @@ def _alike(first: Experiment, second: Experiment) -> bool:
     if sameness(first) != sameness(second):
         return False
     clocks = [np.cumsum(e.path.flow * e.path.dwell_s) for e in (first, second)]
-    if abs(clocks[0][-1] - clocks[1][-1]) > SAME_TIME * clocks[0][-1]:
+    # Paths are the same that keep within a share of the time, a distance [m] and an angle [rad].
+    if abs(clocks[0][-1] - clocks[1][-1]) > 0.1 * clocks[0][-1]:
         return False
+    # They are compared at so many places.
     rows = [
-        np.searchsorted(clock, np.linspace(0.0, clock[-1], PLACES)).clip(0, len(clock) - 1)
+        np.searchsorted(clock, np.linspace(0.0, clock[-1], 32)).clip(0, len(clock) - 1)
         for clock in clocks
     ]
     places = [e.path.position_m[r] for e, r in zip((first, second), rows, strict=True)]
     turns = [e.path.rotation[r] for e, r in zip((first, second), rows, strict=True)]
     return bool(
-        np.abs(places[0] - places[1]).max() < SAME_PATH_M
-        and np.abs(turns[0] - turns[1]).max() < SAME_TURN_RAD
-        and np.abs(first.surface.down - second.surface.down).max() < SAME_TURN_RAD
+        np.abs(places[0] - places[1]).max() < 0.01
+        and np.abs(turns[0] - turns[1]).max() < 0.05
+        and np.abs(first.surface.down - second.surface.down).max() < 0.05
     )

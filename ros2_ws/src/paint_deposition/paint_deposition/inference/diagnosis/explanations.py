@@ -31,8 +31,6 @@ from paint_deposition.inference.fitting.study import Study
 
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25
-# Values that are tried for each shape parameter.
-SHAPES = 5
 
 
 @dataclass(frozen=True)
@@ -75,9 +73,7 @@ def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     """The effect at neutral amplitude, for a few values of its shape parameters."""
     info = effect.parameters()
     shapes = [name for name in info if info[name]['role'] == 'shape']
-    grids = [
-        np.geomspace(info[name]['low'], info[name]['high'], SHAPES + 2)[1:-1] for name in shapes
-    ]
+    grids = [np.geomspace(info[name]['low'], info[name]['high'], 7)[1:-1] for name in shapes]
     return [
         effect(**dict(zip(shapes, map(float, values), strict=True))) for values in product(*grids)
     ]
@@ -134,8 +130,6 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
 # The same over all other conditions, and of a law of another form over its own covariates.
 OTHER_ERROR, OTHER_LAW = 0.3, 1.5
-# The size of an effect is what it changes at this share of the points at the most.
-LARGEST = 0.95
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
@@ -333,7 +327,8 @@ def _laws_off(
             curves = effect.free_law and name in CURVES
             if basis := curve_basis(study, model, name, effect.free_law) if curves else None:
                 relative = change if effect.free_law == 'addition' else _share(change, film)
-                size = scale * float(np.quantile(np.abs(relative), LARGEST))
+                # The size of an effect is what it changes at this share of the points at the most.
+                size = scale * float(np.quantile(np.abs(relative), 0.95))
                 curve = basis.random(size, LAW_LENGTH)
                 yield effect, study.has(type(effect))[:, np.newaxis] * curve.change_um, curve
             else:

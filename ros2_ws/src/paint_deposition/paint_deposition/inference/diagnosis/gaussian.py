@@ -15,11 +15,6 @@ from scipy.special import log_ndtr
 
 from paint_deposition.inference.fitting.least_squares import Fit, covariance_factor
 
-# An entry of a fit this close to a bound has been stopped by it.
-AT_BOUND = 1e-6
-# A direction whose squared length, in standard deviations, is less cannot be seen.
-UNSEEN = 1e-9
-
 
 @dataclass(frozen=True)
 class NullModel:
@@ -64,7 +59,7 @@ class NullModel:
         pattern = len(fit.vector) - len(entries)
         kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
         # What the fit has driven to a bound of physics does not go on beyond it.
-        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=AT_BOUND)
+        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=1e-6)
         free = ~ends.any(axis=0)
         # The shape of an effect that is not there contributes nothing; its amplitude does.
         shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
@@ -137,7 +132,8 @@ class OrthogonalDirections:
             return OrthogonalDirections(columns @ axes, axes, axes[known], sides[known])
         wide = columns.shape[1] > len(columns)
         squares, turned = np.linalg.eigh(columns @ columns.T if wide else columns.T @ columns)
-        shown = squares > UNSEEN
+        # A direction whose squared length, in standard deviations, is less cannot be seen.
+        shown = squares > 1e-9
         turned, lengths = turned[:, shown], np.sqrt(squares[shown])
         if wide:
             turned, axes = turned * lengths, columns.T @ (turned / lengths)

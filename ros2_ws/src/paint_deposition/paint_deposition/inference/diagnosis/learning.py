@@ -22,17 +22,13 @@ from paint_deposition.inference.diagnosis.gaussian import (
     OrthogonalDirections,
     simulated,
 )
-from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.inference.diagnosis.model_space import DRAWS, SIZES
 from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 
 MOST_LAWS = 2
-# Degree of the polynomials in the ranks of a covariate.
-DEGREE = 4
-DRAWS = 1000
-CURVE_POINTS = 15
 
 
 @dataclass(frozen=True)
@@ -203,7 +199,7 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
     order = np.argsort(covariate.values)
-    points = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
+    points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
     regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
     shown = [name for name in names if name in {region.experiment for region in regions}]
@@ -226,6 +222,6 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
-    """(P, DEGREE) polynomials of the values' ranks, so that outliers have no leverage."""
+    """(P, 4) polynomials of the values' ranks, so that outliers have no leverage."""
     ranks = np.argsort(np.argsort(values)) / max(len(values) - 1, 1)
-    return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, DEGREE)[:, 1:]
+    return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, 4)[:, 1:]

@@ -44,8 +44,6 @@ COARSENED = 2.0
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
 DRAWS = 1000
-# A deviation of the footprint shows from this many of its standard deviations on.
-SHOWS = 2.0
 # Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
 # the posterior is smaller: with more effects another footprint may be the more probable one.
 MOST_SIZES, LEAST_SHARE = 2, 0.02
@@ -272,11 +270,12 @@ class ModelSpace:
         spread = np.eye(seen.shape[1]) - seen.T @ seen
         sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
         found = [one.sizes for one in self.nature]
+        # A deviation of the footprint shows from this many of its standard deviations on.
         return DiscrepancyFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.discrepancy.lengths_m[one.length] for one in found]),
-            float(np.max(np.abs(mean), where=np.abs(mean) > SHOWS * sd, initial=0.0)),
+            float(np.max(np.abs(mean), where=np.abs(mean) > 2.0 * sd, initial=0.0)),
             FootprintProfile(
                 footprint.radius_m,
                 footprint.flux,

@@ -42,10 +42,6 @@ from paint_deposition.inference.readings.readings import beyond_noise_um, is_wor
 
 # Significance level of the test that something is missing.
 ALPHA = 0.05
-# Effects that are at least this probable are listed, and this many named where none is sure.
-WORTH_LISTING, NAMED = 0.05, 3
-# Errors this many times as large as the noise of gauge and texture need a word.
-BEYOND_NOISE = 1.3
 # The model is not good enough where it misses the readings, beyond gauge and texture, by this part
 # of the thickest film: measured sprays of one setting differ by 0.5 to 2 %.
 MOST_BEYOND = 0.03
@@ -122,7 +118,8 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
             reason = f'{beyond}: {most}. {unknown}'
         return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
     reason = f'{beyond}: sprays of one setting usually differ by as much.'
-    if first.rmse_um < BEYOND_NOISE * noise_um:
+    # Errors this many times as large as the noise of gauge and texture need a word.
+    if first.rmse_um < 1.3 * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
     return state.diagnosis(p_value, 'none_missing', reason)
 
@@ -216,7 +213,7 @@ def _conclude(
             )
         return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
-        f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
+        f'{c.best} ({percent(c.probability)})' for c in others[:3]
     )
     return state.diagnosis(p_value, 'undecided', reason, others)
 
@@ -226,7 +223,8 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
     known = {member for found in state.accepted for member in found.members}
     found = []
     for cause, probability in probabilities.items():
-        if cause in known or probability < WORTH_LISTING:
+        # Effects that are at least this probable are listed.
+        if cause in known or probability < 0.05:
             continue
         effects = [*state.accepted_effects, state.candidates[cause][0]]
         fit = state.fitted_with(effects, state.fit.model)

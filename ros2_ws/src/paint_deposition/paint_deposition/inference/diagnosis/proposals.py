@@ -19,8 +19,6 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 
 KEY = 'standing'
-# A shorter opening of the gun is mostly its trigger's; a longer one no spot needs [s].
-SHORTEST_S, LONGEST_S, STEP_S = 0.5, 20.0, 0.1
 # The gun stands closed for so long before and behind, and its pose is recorded so often [s].
 CLOSED_S, CYCLE_S = 0.6, 0.02
 # Effects of the order of passes, and fog of a whole job, say nothing of a single spot.
@@ -71,8 +69,10 @@ class StationarySpray:
         brush = int(numbers[np.argmax(times_s)])
         peak = model.painting_with(brush).planar.peak_flux_um_per_s
         rate = flow * peak * (projection.model_plane_m / away_m) ** 2
-        dwell = STEP_S * math.floor(most_um / rate / STEP_S + 1e-9)
-        if not SHORTEST_S <= dwell <= LONGEST_S:
+        step_s = 0.1
+        dwell = step_s * math.floor(most_um / rate / step_s + 1e-9)
+        # A shorter opening of the gun is mostly its trigger's; a longer one no spot needs [s].
+        if not 0.5 <= dwell <= 20.0:
             return None
         return StationarySpray(
             points.positions_m[row], normal, across / np.linalg.norm(across), standoff, dwell,
@@ -134,10 +134,6 @@ def suits(model: DepositionModel, families: set[str]) -> bool:
     )
 
 
-# A film so many times as thick as any that was measured may sag.
-MAY_SAG = 1.3
-
-
 @dataclass(frozen=True)
 class Place:
     """A point to measure: position (3,) [m], the film predicted there [um], and why."""
@@ -174,7 +170,8 @@ class Spray:
     @property
     def film_words(self) -> str:
         """A remark on a film that is much thicker than those measured; else nothing."""
-        if not self.peak_um > MAY_SAG * self.peak_now_um:
+        # A film so many times as thick as any that was measured may sag.
+        if not self.peak_um > 1.3 * self.peak_now_um:
             return ''
         return (
             f'the film will reach {self.peak_um:.0f} µm, now {self.peak_now_um:.0f}: see that it '

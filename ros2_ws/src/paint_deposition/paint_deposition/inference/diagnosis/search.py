@@ -49,8 +49,6 @@ TRIALS = 5
 LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
-# So many effects are added at most.
-MOST_EFFECTS = 4
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
@@ -263,7 +261,7 @@ class Search:
         found: list[SearchStage] = []
         here = self._near_best()
         while True:
-            room = len(here.names) < MOST_EFFECTS
+            room = len(here.names) < 4  # so many effects at the most
             stage = SearchStage(
                 here, [self.with_effect(here, name) for name in here.proposed if room]
             )

@@ -7,17 +7,11 @@ import numpy as np
 from paint_deposition.inference.diagnosis.explanations import Sensitivity
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 
-# Smallest signal-to-noise ratio, at the largest amplitude that is physical and with the pattern
-# refitted, at which an effect counts as testable.
-TESTABLE = 2.0
 # An amplitude is detectable if the test that something is missing, at this level, finds it with
 # this power.
 LEVEL, POWER = 0.05, 0.9
 # Signal-to-noise ratios at which the power is simulated, and with how many draws.
 RATIOS, DRAWS = np.geomspace(2.5, 10.0, 10), 200
-# As many explanations as follow an effect most closely are computed with it; the others weigh as
-# much as they do without it.
-FOLLOWING = 6
 
 
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
@@ -36,7 +30,9 @@ def testability(space: EffectEvidence, seed: int) -> Testability:
         most = [np.maximum(np.abs(s.low), np.abs(s.high)) for s in found]
         # Along the combination of amplitudes that shows most.
         seen = (space.null.whiten(s.columns * m) for s, m in zip(found, most, strict=True))
-        if max(np.linalg.norm(columns, 2) for columns in seen) >= TESTABLE:
+        # An effect counts as testable from this signal-to-noise ratio on, at the largest amplitude
+        # that is physical and with the pattern refitted.
+        if max(np.linalg.norm(columns, 2) for columns in seen) >= 2.0:
             detectable[effect_id] = _detectable(space, found, null, draws)
         else:
             not_testable.append(effect_id)
@@ -95,9 +91,9 @@ def power_along(
 
 
 def _following(space: EffectEvidence, direction: np.ndarray) -> Sequence[int]:
-    """Numbers of the explanations that take up most of a direction."""
+    """Numbers of the explanations that take up most of a direction; others weigh as without it."""
     taken = [
         float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))
         for own in space.principal
     ]
-    return np.argsort(taken)[::-1][:FOLLOWING].tolist()
+    return np.argsort(taken)[::-1][:6].tolist()

@@ -47,12 +47,8 @@ from paint_deposition.inference.readings.plausibility import (
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
-STARTS = 8
 # Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
-# Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
-MOST_CHI_SQUARE = 2.0
-SHOWN_CORRELATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -117,7 +113,7 @@ class Calibration:
             },
             'correlations': [
                 {'parameters': [pair.first, pair.second], 'value': pair.value}
-                for pair in self.correlations[:SHOWN_CORRELATIONS]
+                for pair in self.correlations[:10]
             ],
             'experiments': [
                 {
@@ -198,7 +194,7 @@ def calibrate(
         starts.append(model)
 
     def best_fit(study: Study) -> Fit:
-        fits = (study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts)
+        fits = (study.fit(FreeParameters.of(one, *one.effects), 8, seed) for one in starts)
         return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
@@ -268,7 +264,8 @@ def _warnings(
         if pair.too_close
     ]
     freedom = max(len(study) - len(fit.vector), 1)
-    if fit.chi_square > MOST_CHI_SQUARE * freedom:
+    # Above this the gauge's noise does not explain the residuals.
+    if fit.chi_square > 2.0 * freedom:
         warnings.append(
             f'residuals are {np.sqrt(fit.chi_square / freedom):.1f} times the noise of the gauge: '
             'something is missing from the model, see paint diagnose'

@@ -55,7 +55,7 @@ def clean_and_fit(
     Raises:
         ReadingsError: readings in another unit, with the remedy.
     """
-    if len(campaign) > MANY:
+    if len(campaign) > 500:
         rough = _fitted(Study.of(thinned(campaign, seed), effects), start, starts, seed, known)
         campaign, start, starts = condensed(campaign, rough.model), rough.model, 1
     study = Study.of(campaign, effects)
@@ -120,12 +120,8 @@ def _texture(study: Study, misfit: FittedPoints) -> Texture:
     return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
 
 
-# Points in all from which on readings are condensed, and cells that they are condensed to.
-MANY, CELLS = 500, 300
-# Halvings of the range of edges in which that of the cells is searched.
-HALVINGS = 30
-# The scatter is estimated about planes through so many neighbours on average, five at the least.
-NEIGHBOURS, LEAST = 12, 5
+# Cells that readings by the thousand are condensed to.
+CELLS = 300
 
 
 def cells_by_part(points: Sequence[int]) -> list[int]:
@@ -188,7 +184,8 @@ def _in_cells(part: Experiment, off_um: np.ndarray, most: int) -> Experiment:
     def mean(values: np.ndarray) -> np.ndarray:
         return np.stack([np.bincount(cell, v) / count for v in values.T], axis=-1)
 
-    near = _cells(place_m, kind, max(len(readings) // NEIGHBOURS, 1))
+    # The scatter is estimated about planes through so many neighbours on average.
+    near = _cells(place_m, kind, max(len(readings) // 12, 1))
     stated_um = np.nan_to_num(readings.sigma_um)
     noise_um = max(_scatter_um(place_m, off_um, near), float(np.sqrt(np.mean(stated_um**2))))
     if noise_um == 0.0:
@@ -217,7 +214,7 @@ def _cells(place_m: np.ndarray, kind: np.ndarray, most: int) -> np.ndarray:
         return np.unique(keys, axis=0, return_inverse=True)[1].ravel()
 
     small, large = 1e-5, 2.0 * float(np.ptp(place_m, axis=0).max()) + 1e-3
-    for _ in range(HALVINGS):
+    for _ in range(30):
         edge_m = float(np.sqrt(small * large))
         small, large = (edge_m, large) if numbered(edge_m).max() >= most else (small, edge_m)
     return numbered(large)
@@ -228,7 +225,7 @@ def _scatter_um(place_m: np.ndarray, off_um: np.ndarray, near: np.ndarray) -> fl
     squares, freedom = 0.0, 0
     order = np.argsort(near, kind='stable')
     for rows in np.split(order, np.cumsum(np.bincount(near))[:-1]):
-        if len(rows) < LEAST:
+        if len(rows) < 5:
             continue
         design = np.column_stack([np.ones(len(rows)), place_m[rows] - place_m[rows].mean(axis=0)])
         amounts, _, rank, _ = np.linalg.lstsq(design, off_um[rows], rcond=1e-6)

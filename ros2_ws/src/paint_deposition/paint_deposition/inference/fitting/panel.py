@@ -25,15 +25,6 @@ from paint_deposition.inference.readings.readings import Readings, Residuals
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
-# Cosines of the largest angles: between normals of a flat panel, between parallel passes, and
-# between the gun's axis and the panel's normal.
-FLAT_COSINE = np.cos(np.radians(3.0))
-PARALLEL_COSINE = np.cos(np.radians(2.0))
-SQUARE_COSINE = np.cos(np.radians(5.0))
-SHORTEST_PASS_M = 0.05
-# All but the ends of a pass lie this close to one line [m].
-INNER, STRAIGHT_M = (0.05, 0.95), 0.02
-
 
 @dataclass(frozen=True)
 class Panel:
@@ -55,11 +46,11 @@ class Panel:
         positions = experiment.measured_points.positions_m
         outward = normals.mean(axis=0)
         outward /= np.linalg.norm(outward)
-        if (normals @ outward).min() < FLAT_COSINE or len(experiment.brushes) != 1:
+        if (normals @ outward).min() < np.cos(np.radians(3.0)) or len(experiment.brushes) != 1:
             return None
         path = experiment.path.select(experiment.path.flow > 0.0)
         passes = [path.select(path.spray_pass == n) for n in np.unique(path.spray_pass)]
-        passes = [p for p in passes if p.dwell_s @ p.speed_m_per_s > SHORTEST_PASS_M]
+        passes = [p for p in passes if p.dwell_s @ p.speed_m_per_s > 0.05]
         if not passes:
             return None
         travels = np.array([p.dwell_s @ p.velocity_m_per_s for p in passes])
@@ -67,13 +58,15 @@ class Panel:
         travel = travels[0]
         axes = np.array([np.median(p.rotation, axis=0) for p in passes])
         across, turned = np.cross(-outward, travel), axes[:, :, 0] @ axes[0, :, 0]
-        # The first sub-steps of a pass may still be counted with the pass before.
-        spread = [np.ptp(np.quantile(p.position_m @ across, INNER)) for p in passes]
+        # All but the ends of a pass lie close to one line [m]: the first sub-steps of a pass may
+        # still be counted with the pass before.
+        parallel = np.cos(np.radians(2.0))
+        spread = [np.ptp(np.quantile(p.position_m @ across, (0.05, 0.95))) for p in passes]
         if (
-            np.abs(travels @ travel).min() < PARALLEL_COSINE
-            or (-axes[:, :, 2] @ outward).min() < SQUARE_COSINE
-            or np.abs(turned).min() < PARALLEL_COSINE
-            or max(spread) > STRAIGHT_M
+            np.abs(travels @ travel).min() < parallel
+            or (-axes[:, :, 2] @ outward).min() < np.cos(np.radians(5.0))
+            or np.abs(turned).min() < parallel
+            or max(spread) > 0.02
         ):
             return None
         height = np.mean([np.median(p.position_m @ outward) for p in passes])
@@ -114,14 +107,6 @@ class Panel:
         return np.where(self.mirrored, -away, away)
 
 
-# The film has structure if noise alone scatters as much with a smaller probability.
-NO_STRUCTURE_P = 1e-3
-
-
-# A point lies beside a pass from this share of the panel's scale on.
-BESIDE = 0.05
-
-
 def check_panel(
     readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
 ) -> None:
@@ -133,7 +118,8 @@ def check_panel(
     """
     places = panel.places_m
     nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
-    beside = BESIDE * panel.scale_m
+    # A point lies beside a pass from this share of the panel's scale on.
+    beside = 0.05 * panel.scale_m
     if nearest.min() > -beside or nearest.max() < beside:
         missing = 'x < 0' if nearest.min() > -beside else 'x > 0'
         raise ReadingsError(
@@ -143,20 +129,13 @@ def check_panel(
     weights = sigma_um**-2.0
     mean = float(weights @ measured_um) / float(weights.sum())
     scatter = float(weights @ (measured_um - mean) ** 2)
-    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
+    # The film has structure if noise alone scatters as much with a smaller probability.
+    if chdtrc(len(measured_um) - 1, scatter) > 1e-3:
         raise ReadingsError(
             f'{readings.source}: the film varies by no more than the noise of the gauge '
             f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
             'measure beyond the passes or paint at a wider index'
         )
-
-
-# Starts of the search: offset radii and standard deviations in units of the panel's scale.
-RADII = (0.2, 0.35, 0.5)
-SIGMAS = (0.12, 0.22)
-# Residuals beyond this many standard deviations get a smaller weight.
-ROBUST_AT = 2.0
-NARROWEST, WIDEST = 0.02, 1.0
 
 
 @dataclass(frozen=True)
@@ -186,16 +165,18 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
         heights = gains / (3.0 * np.sqrt(2.0 * np.pi) * sigmas)
         return ((heights * np.exp(-0.5 * away**2)).sum(axis=2) * faster).sum(axis=1)
 
-    low = [0.0, 0.0, 0.0, 0.0, 0.0, *3 * [np.log(NARROWEST)]]
-    high = [30.0, 30.0, 30.0, 1.5, 1.5, *3 * [np.log(WIDEST)]]
+    low = [0.0, 0.0, 0.0, 0.0, 0.0, *3 * [np.log(0.02)]]
+    high = [30.0, 30.0, 30.0, 1.5, 1.5, *3 * [np.log(1.0)]]
+    # Starts are offset radii and standard deviations in units of the panel's scale; residuals
+    # beyond ``f_scale`` standard deviations get a smaller weight.
     found = [
         least_squares(
             lambda x: (film(x) - measured_um) / sigma_um,
             [1.0, 1.0, 1.0, radius, radius, *np.log([sigma, sigma, 1.5 * sigma])],
-            bounds=(low, high), loss='soft_l1', f_scale=ROBUST_AT,
+            bounds=(low, high), loss='soft_l1', f_scale=2.0,
             x_scale=[1.0, 1.0, 1.0, 0.2, 0.2, 0.5, 0.5, 0.5], max_nfev=60,
         )
-        for radius, sigma in product(RADII, SIGMAS)
+        for radius, sigma in product((0.2, 0.35, 0.5), (0.12, 0.22))
     ]  # fmt: skip
     best = min(found, key=lambda result: result.cost).x
     gain = best[:3] * area * scale
@@ -209,9 +190,7 @@ def fit_collapse(panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray) ->
 
 
 # Readings reach an edge of the pattern beyond which no more of a pass's paint lands than this.
-MOST_BEYOND = 0.025
-# Width of the strips at the ends without which the fit is repeated [m].
-STRIPS_M = (0.05, 0.1)
+PAINT_BEYOND = 0.025
 
 
 @dataclass(frozen=True)
@@ -246,7 +225,7 @@ def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[Reach, ..
         if panel := Panel.of(one):
             reach = _reach(k, one.name, panel, model.painting_with(panel.brush))
             by_brush.setdefault(panel.brush, []).append(reach)
-    short = (f for f in by_brush.values() if min(max(r.beyond) for r in f) > MOST_BEYOND)
+    short = (f for f in by_brush.values() if min(max(r.beyond) for r in f) > PAINT_BEYOND)
     return tuple(reach for found in short for reach in found)
 
 
@@ -259,7 +238,8 @@ def shifts(
         reaches: panels whose ends are left out, strip by strip.
     """
     moved = []
-    for strip_m in STRIPS_M:
+    # Width of the strips at the ends [m].
+    for strip_m in (0.05, 0.1):
         inside = np.ones(len(study), dtype=bool)
         for reach in reaches:
             low, high = reach.across_m.min() + strip_m, reach.across_m.max() - strip_m
@@ -285,7 +265,7 @@ def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reac
         landed = landed / landed[-1]
         below, above = np.interp([low - line, high - line], x, landed, left=0.0, right=1.0)
         beyond = float(below), float(1.0 - above)
-        ends = np.interp([MOST_BEYOND, 1.0 - MOST_BEYOND], landed, x)
+        ends = np.interp([PAINT_BEYOND, 1.0 - PAINT_BEYOND], landed, x)
         to_ends = float(line - low), float(high - line)
         reaches.append(
             Reach(number, name, panel.across_m, to_ends, beyond, float(np.abs(ends).max()))

@@ -24,9 +24,6 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.brush import Brush, SetPoints, listed
 from paint_deposition.motion.trigger import ONLY_BRUSH
 
-# Settings that differ by a larger share than this are others.
-OTHER_SETTING = 0.05
-
 
 def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> Posterior:
     """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is."""
@@ -103,7 +100,7 @@ def usable(
         'pattern may differ by more than jobs do.'
         for name, then in known.process.items()
         for now in [campaign.settings.get(name, then)]
-        if abs(now - then) > OTHER_SETTING * abs(then)
+        if abs(now - then) > 0.05 * abs(then)
     )
 
 
@@ -112,8 +109,6 @@ def fingerprints(campaign: Campaign) -> tuple[str, ...]:
     return tuple(experiment.taken.fingerprint for experiment in campaign.experiments)
 
 
-# Values of a learned curve so many knots apart have nearly independent errors.
-KNOTS_TOGETHER = 2.0
 # If fewer draws than one in so many are physical, the posterior belongs to another model.
 MOST_ROUNDS = 1000
 
@@ -168,15 +163,11 @@ def _draw_curve(effect: Effect, rng: np.random.Generator) -> Effect:
     if not (isinstance(effect, LearnedCurve) and effect.sd):
         return effect
     knots = np.arange(len(effect.sd))
-    apart = np.subtract.outer(knots, knots) / KNOTS_TOGETHER
+    # Values so many knots apart have nearly independent errors.
+    apart = np.subtract.outer(knots, knots) / 2.0
     covariance = np.exp(-0.5 * apart**2) * np.outer(effect.sd, effect.sd)
     learned = rng.multivariate_normal(effect.learned, covariance, method='eigh')
     return effect.model_copy(update={'learned': tuple(learned.tolist())})
-
-
-# Of jobs that differ as assumed this share lies nearer than what is called usual, and this share
-# nearer than what is warned of.
-USUAL, ALARMING = 0.95, 0.999
 
 
 @dataclass(frozen=True)
@@ -206,12 +197,12 @@ class PatternShift:
     @property
     def usual(self) -> float:
         """Distance that 95 % of jobs stay below if they differ as assumed."""
-        return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - USUAL)))
+        return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - 0.95)))
 
     @property
     def is_alarming(self) -> bool:
-        """Whether hardly any job differs as much."""
-        return bool(self.distance > np.sqrt(chdtri(len(self.by_coordinate), 1.0 - ALARMING)))
+        """Whether one job in a thousand differs as much, if they differ as assumed."""
+        return bool(self.distance > np.sqrt(chdtri(len(self.by_coordinate), 1.0 - 0.999)))
 
     def __str__(self) -> str:
         name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))
@@ -235,10 +226,6 @@ class PatternShift:
             'usual': self.usual,
             'by_coordinate': self.by_coordinate,
         }
-
-
-# What recordings hold of the process beside the flow, which is relative to the brush's.
-RECORDED = ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv')
 
 
 def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionModel:
@@ -271,7 +258,8 @@ def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionMod
 def _set_points(campaign: Campaign, number: int) -> SetPoints:
     """Medians over the recordings with this brush alone."""
     found = {}
-    for name in RECORDED:
+    # What recordings hold of the process beside the flow, which is relative to the brush's.
+    for name in ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv'):
         recorded = [
             abs(e.settings[name])
             for e in campaign.experiments

@@ -26,8 +26,6 @@ OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
-# An amount beyond this many of its standard deviations is worth a mention.
-NOTABLE = 2.0
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ class Amount:
     @property
     def is_notable(self) -> bool:
         """Whether it differs from zero by more than chance would have it."""
-        return abs(self.value) > NOTABLE * self.sd
+        return abs(self.value) > 2.0 * self.sd
 
     def __str__(self) -> str:
         return f'{self.kind} of {self.of}: {self.value:+.2f} ± {self.sd:.2f} {self.unit}'
@@ -119,8 +117,6 @@ def _contrasts(known: np.ndarray) -> np.ndarray:
     return np.diag(1.0 * known) - np.outer(known, known) / max(np.count_nonzero(known), 1)
 
 
-# Roots that are kept: while models change, most places and lengths stay.
-ROOTS_KEPT = 128
 Correlation = Callable[[ArrayLike], np.ndarray]
 
 
@@ -149,7 +145,8 @@ def root_of_field(
     return _root(places.tobytes(), places.shape, length, negligible, correlation)
 
 
-@lru_cache(ROOTS_KEPT)
+# While models change, most places and lengths stay.
+@lru_cache(128)
 def _root(
     places: bytes, shape: tuple[int, int], length: float, negligible: float,
     correlation: Correlation,

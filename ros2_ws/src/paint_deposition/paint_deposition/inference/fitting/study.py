@@ -26,10 +26,6 @@ from paint_deposition.inference.readings.readings import Residuals, root_mean_sq
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-# What facets cost the film is left out below this share of the noise, and reported from this.
-LEAST_FACETS, WORTH_REPORTING = 0.1, 1.0
-# Standard deviation of a reading that a fit does not use [um].
-NOT_USED_UM = 1e9
 
 
 @dataclass(frozen=True)
@@ -102,7 +98,7 @@ class Study:
         """The same with what facets cost under a model, if it shows beside the noise."""
         parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
         facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
-        if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
+        if np.all(np.abs(facet_um) < 0.1 * self.sigma_um):
             return self
         return replace(self, facet_um=facet_um)
 
@@ -242,7 +238,7 @@ class Study:
         own = own if free is None else free
         count, kept = own.shape[1], (~out)[:, np.newaxis]
         found = fit_readings(
-            self.forward, self.measured_um, np.where(out, NOT_USED_UM, self.sigma_um),
+            self.forward, self.measured_um, np.where(out, 1e9, self.sigma_um),
             replace(fit.parameters, start=fit.model), nuisance=kept * np.hstack([own, nuisance]),
             others=(fit.parameters.start,),
         )  # fmt: skip
@@ -276,7 +272,7 @@ class Study:
         for number, name in enumerate(e.name for e in self.campaign.experiments):
             off_um = np.where(owner == number, np.abs(self.facet_um), 0.0)
             worst = int(off_um.argmax())
-            if off_um[worst] > WORTH_REPORTING * self.gauge_um[worst]:
+            if off_um[worst] > self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
                     f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '

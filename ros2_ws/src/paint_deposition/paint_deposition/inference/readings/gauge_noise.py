@@ -12,27 +12,15 @@ from scipy.special import ndtri, stdtrit
 
 from paint_deposition.inference.readings.readings import PointMeans, Readings, root_mean_square
 
-# A usual magnetic or eddy-current gauge, for readings that say nothing of their noise.
-ASSUMED_FLOOR_UM = 0.7
-ASSUMED_SHARE = 0.01
 # Fewer degrees of freedom from repeats than this are not trusted alone.
 ENOUGH_REPEATS = 6
 # An assumed noise counts like an estimate with these degrees of freedom: it may be off by a third.
 ASSUMED_FREEDOM = 5.0
-# Repeats that are off by more standard deviations are gross outliers. Where the standard deviation
-# is estimated from few repeats, the limit is the quantile of Student's t that sound readings
-# exceed with this probability.
-GROSS_SIGMAS = 5.0
-GROSS_PROBABILITY = 1e-4
-# The scale is at least this share of the usual noise: a display in whole um shows many repeats
-# without any scatter.
-LEAST_SCALE = 0.5
-MOST_ROUNDS = 20
 
 
 def usual_noise_um(thickness_um: np.ndarray) -> np.ndarray:
-    """(N,) standard deviation of a usual gauge at these films [um]."""
-    return np.hypot(ASSUMED_FLOOR_UM, ASSUMED_SHARE * thickness_um)
+    """(N,) standard deviation of a usual magnetic or eddy-current gauge at these films [um]."""
+    return np.hypot(0.7, 0.01 * thickness_um)
 
 
 def gross_outliers(readings: Readings) -> np.ndarray:
@@ -99,7 +87,7 @@ class _Repeats:
         if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
             return self._beyond(1.0, ASSUMED_FREEDOM)
         gross = self._beyond(self._robust_scale(), np.inf)
-        for _ in range(MOST_ROUNDS):
+        for _ in range(20):
             before, gross = gross, self._beyond(*self._pooled(~gross))
             if np.array_equal(before, gross):
                 break
@@ -121,8 +109,12 @@ class _Repeats:
         return np.sqrt(squares / freedom), freedom
 
     def _beyond(self, scale: float, freedom: float) -> np.ndarray:
-        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_PROBABILITY)))
-        far = self.distance > sigmas * max(scale, LEAST_SCALE)
+        # Where the standard deviation is estimated from few repeats, the limit is the quantile of
+        # Student's t that sound readings exceed once in ten thousand.
+        sigmas = max(5.0, -float(stdtrit(freedom, 0.5e-4)))
+        # At least this share of the usual noise: a display in whole um shows many repeats without
+        # any scatter.
+        far = self.distance > sigmas * max(scale, 0.5)
         outliers = np.bincount(self.owner, far)
         undecided = 2.0 * outliers >= self.count
         return far | ((outliers > 0.0) & undecided)[self.owner]

@@ -20,14 +20,9 @@ FEWEST_POINTS = 10
 UNITS = {'mils': 25.4, 'mm': 1000.0}  # um in each
 # No paint film is thinner than this everywhere; such numbers are mils or millimetres.
 THINNEST_FILM_UM = 3.0
-THINNEST_MILS = 0.15
 # Two units in one column leave a gap: sorted by size, neighbours differ by more than this factor.
 LEAST_GAP = 6.0
 UNIT_SLACK = 1.8
-NEGATIVE_SIGMAS = 4.0
-MOST_NAMED = 6
-# A film is near a target if the logarithm of their ratio is no larger.
-NEAR = np.log(1.5)
 
 
 def check_enough(points: int) -> None:
@@ -43,7 +38,7 @@ def check_unit(readings: Readings) -> None:
     """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
     if highest < THINNEST_FILM_UM:
-        unit = 'mils' if highest > THINNEST_MILS else 'mm'
+        unit = 'mils' if highest > 0.15 else 'mm'
         raise ReadingsError(
             f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
             f'multiply by {UNITS[unit]:g}'
@@ -57,7 +52,7 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
         sigma_um: (N,) standard deviation of a reading [um].
     """
     film = readings.thickness_um
-    below = film < -NEGATIVE_SIGMAS * sigma_um
+    below = film < -4.0 * sigma_um
     if below.any():
         worst = int(np.argmin(film))
         raise ReadingsError(
@@ -119,7 +114,7 @@ def zeros_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
     rows = (readings.thickness_um == 0.0) & (expected_um > THINNEST_FILM_UM)
     if readings.zero_is_film or not rows.any():
         return ''
-    named = some(list(dict.fromkeys(readings.point[rows].tolist())), MOST_NAMED)
+    named = some(list(dict.fromkeys(readings.point[rows].tolist())), 6)
     low, high = expected_um[rows].min(), expected_um[rows].max()
     return (
         f'{np.count_nonzero(rows)} of {len(readings)} readings are 0 where the model expects '
@@ -170,7 +165,8 @@ def targets_in_doubt(experiment: Experiment, target_um: float) -> Iterator[str]:
     wanted += [(f"zone '{one.name}'", one.target_um, k) for k, one in enumerate(zones)]
     for name, wanted_um, zone in wanted:
         own = film[number == zone]
-        if len(own) and np.all(np.abs(np.log(np.maximum(own, NO_PAINT_UM) / wanted_um)) > NEAR):
+        away = np.abs(np.log(np.maximum(own, NO_PAINT_UM) / wanted_um))
+        if len(own) and np.all(away > np.log(1.5)):
             yield (
                 f'no reading is near the {wanted_um:g} µm of {name}: {own.min():.4g} to '
                 f'{own.max():.4g} µm were read; check the target and the unit of the readings'

@@ -121,10 +121,6 @@ class PointMeans:
         return PointMeans(first[order], repeats, mean, owner)
 
 
-# Repeats further apart than this were not taken at one point [m].
-SAME_POINT_M = 0.03
-
-
 def require_repeats_close(readings: Readings) -> None:
     """Refuse a point label that is used at two places.
 
@@ -136,7 +132,8 @@ def require_repeats_close(readings: Readings) -> None:
         readings.positions_m - readings.positions_m[means.first][means.owner], axis=1
     )
     worst = int(np.argmax(apart)) if len(apart) else 0
-    if len(apart) and apart[worst] > SAME_POINT_M:
+    # Repeats further apart were not taken at one point [m].
+    if len(apart) and apart[worst] > 0.03:
         raise ReadingsError(
             f"{readings.source}: point '{readings.point[worst]}' is used {apart[worst]:.3f} m "
             'apart; give each place a label of its own'
