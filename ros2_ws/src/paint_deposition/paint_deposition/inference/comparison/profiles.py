@@ -45,7 +45,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     """
     found, first = [], 0
     for experiment in study.campaign.experiments:
-        for line in list(_grouped(experiment)) or list(_strips(experiment)):
+        for line in _lines(experiment):
             profile = _profile(experiment, models, *line)
             found.append(replace(profile, rows=first + profile.rows))
         first += len(experiment)
@@ -78,31 +78,21 @@ def _axes(surface: Surface) -> tuple[Axis, Axis]:
     return Axis(words, up, float((surface.vertices_m @ up).min())), across
 
 
-def _coordinates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
-    """(P,) of the points up the part and across it [m]."""
+def _lines(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
+    """Label and members of each group or, without any, of strips that cross the passes.
+
+    With each: whether it is longer upright than across, and whether it is a strip.
+    """
     up, across = _axes(experiment.surface)
     positions_m = experiment.measured_points.positions_m
-    return up.of(positions_m), across.of(positions_m)
-
-
-def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
-    """Label and members of each group, and whether it is longer upright than across."""
-    height_m, across_m = _coordinates(experiment)
-    for label in sorted({str(g) for g in experiment.groups if g}, key=_natural):
+    height_m, across_m = up.of(positions_m), across.of(positions_m)
+    labels = sorted({str(g) for g in experiment.groups if g}, key=_natural)
+    for label in labels:
         members = np.flatnonzero(experiment.groups == label)
         yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False
-
-
-def _natural(label: str) -> tuple:
-    """Sorts 'column 2' before 'column 10'."""
-    digits = ''.join(c if c.isdigit() else ' ' for c in label).split()
-    return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
-
-
-def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
-    """Strips that cross the passes, each with about as many readings."""
+    if labels:
+        return
     upright = passes_are_level(experiment.path, experiment.surface.down)
-    height_m, across_m = _coordinates(experiment)
     aside, what = (across_m, 'across') if upright else (height_m, 'height')
     # About twenty readings to a strip, in six strips at the most.
     count = int(np.clip(round(len(aside) / 20), 1, 6))
@@ -110,6 +100,12 @@ def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, boo
         ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
         label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
         yield label, part, upright, True
+
+
+def _natural(label: str) -> tuple:
+    """Sorts 'column 2' before 'column 10'."""
+    digits = ''.join(c if c.isdigit() else ' ' for c in label).split()
+    return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
 
 
 def _profile(

@@ -70,7 +70,10 @@ def propose(
 
 
 def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
-    part = _part_that_differs_most(study, contenders)
+    # On the part on which the films of what competes differ most.
+    films_um = np.array([contender.fit.predicted_um for contender in contenders])
+    by_part = np.bincount(study.campaign.experiment_of, (films_um / study.sigma_um).var(axis=0))
+    part = study.campaign.experiments[int(by_part.argmax())]
     made = _best([_tried(study, contenders, part, change) for change in MENU])
     # Of the best single changes two at once are tried.
     leading = [one.change for one in made[:4]]
@@ -93,14 +96,6 @@ def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
 def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
     """Those that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
-
-
-def _part_that_differs_most(study: Study, contenders: Sequence[Contender]) -> Experiment:
-    """The experiment on which the films of what competes differ most."""
-    campaign = study.campaign
-    films_um = np.array([contender.fit.predicted_um for contender in contenders])
-    by_part = np.bincount(campaign.experiment_of, (films_um / study.sigma_um).var(axis=0))
-    return campaign.experiments[int(by_part.argmax())]
 
 
 def _tried(

@@ -14,6 +14,7 @@ from paint_deposition.inference.design.reading_exchange import (
     UnmeasuredPart,
     exchanged,
 )
+from paint_deposition.inference.diagnosis.explanations import sensitivity
 from paint_deposition.inference.diagnosis.testability import power_along
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
@@ -151,7 +152,10 @@ def choose(
     Raises:
         ReadingsError: the part has no room for so many points.
     """
-    _refuse_odd(count, repeats)
+    if not LEAST_POINTS <= count <= MOST_POINTS:
+        raise ReadingsError(f'{count} points; ask for {LEAST_POINTS} to {MOST_POINTS}')
+    if not 0 <= repeats <= count:
+        raise ReadingsError(f'{repeats} of {count} points to be read twice; ask for 0 to {count}')
     progress('the film')
     surface = part.surface
     film_um = part.film_um
@@ -171,7 +175,9 @@ def choose(
     if len(rows) < count:
         raise _no_room(len(rows), count, foot_m)
     face = from_edges_m(surface, surface.vertices_m[places[rows]])
-    rows = rows[_walk(face, 2.0 * apart_m)]
+    # The walk goes in rows from the top, to and fro.
+    row = ((face[:, 1].max() - face[:, 1]) / max(2.0 * apart_m, 1e-9)).astype(int)
+    rows = rows[np.lexsort((np.where(row % 2 == 0, face[:, 0], -face[:, 0]), row))]
     speaks_for = _speaks_for(marks, rows)
     progress('how surely effects would be found')
     freedom = float(repeats) if repeats >= ENOUGH_REPEATS else ASSUMED_FREEDOM
@@ -204,7 +210,11 @@ def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     """What readings at these vertices (C,) would show."""
     study = part.study(vertices)
     fit = part.fit(study)
-    laws = part.sensitivities(study, fit)
+    laws = [
+        sensitivity(study.forward, fit, shape, study.sigma_um)
+        for shapes in part.candidates.values()
+        for shape in shapes
+    ]
     return CandidateDesign(
         fit.jacobian @ fit.parameters.prior.factor,
         np.hstack([law.columns for law in laws]),
@@ -234,20 +244,6 @@ def power_of(
             chance = power_along(space, direction, np.array([strength]), null, draws)[0]
             found.setdefault(law.id, []).append(float(chance))
     return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}
-
-
-def _refuse_odd(count: int, repeats: int) -> None:
-    if not LEAST_POINTS <= count <= MOST_POINTS:
-        raise ReadingsError(f'{count} points; ask for {LEAST_POINTS} to {MOST_POINTS}')
-    if not 0 <= repeats <= count:
-        raise ReadingsError(f'{repeats} of {count} points to be read twice; ask for 0 to {count}')
-
-
-def _walk(face_m: np.ndarray, row_m: float) -> np.ndarray:
-    """(P,) order of points (P, 2) on the face: rows from the top, to and fro."""
-    down = face_m[:, 1].max() - face_m[:, 1]
-    row = (down / max(row_m, 1e-9)).astype(int)
-    return np.lexsort((np.where(row % 2 == 0, face_m[:, 0], -face_m[:, 0]), row))
 
 
 def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:

@@ -21,11 +21,9 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.discrepancy import ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import (
-    Sensitivity,
     neutral_shapes,
     nonparametric_laws_of,
     of_effects,
-    sensitivity,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import SIZES, EffectEvidence
@@ -86,14 +84,6 @@ class UnmeasuredPart:
         """The model beside readings that are as it predicts."""
         parameters = FreeParameters.of(self.model, *self.model.effects, known=self.known)
         return study.beside(parameters, parameters.encode(parameters.start))
-
-    def sensitivities(self, study: Study, fit: Fit) -> list[Sensitivity]:
-        """Of the readings to each effect that may be missing, in each of its shapes."""
-        return [
-            sensitivity(study.forward, fit, shape, study.sigma_um)
-            for shapes in self.candidates.values()
-            for shape in shapes
-        ]
 
     def space(self, study: Study, freedom: float) -> EffectEvidence:
         """What the diagnosis would search.

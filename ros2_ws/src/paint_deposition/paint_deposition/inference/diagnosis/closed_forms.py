@@ -136,13 +136,11 @@ def at_knots(law: LearnedCurve) -> np.ndarray:
     return variable_at(law, np.interp(law.knots, law.axis(many), many))
 
 
+@cache
 def forms_of(law: Effect | None) -> tuple[ClosedForm, ...]:
     """The closed forms that fit a learned curve; none for any other effect."""
-    return _of_curve(law) if isinstance(law, LearnedCurve) and law.sd else ()
-
-
-@cache
-def _of_curve(law: LearnedCurve) -> tuple[ClosedForm, ...]:
+    if not isinstance(law, LearnedCurve) or not law.sd:
+        return ()
     name, unit = variable(type(law))
     value, addition = np.array(law.learned), law.kind == 'addition'
     value = value if addition else 1.0 + value
@@ -172,7 +170,10 @@ def fitting_forms(
     sd = np.maximum(sd, 1e-9)
     fits = [fit for form in FORMS for fit in _fitted(form, x, value, sd, unit, addition)]
     deviation = min((fit.fun for _, _, fit in fits), key=lambda z: float(z @ z))
-    knots = _independent(deviation)
+    # So many independent values stand behind deviations that are alike in neighbours.
+    square = float(deviation @ deviation)
+    alike = float(deviation[1:] @ deviation[:-1]) / square if square > 0.0 else 0.0
+    knots = float(np.clip(len(x) * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, len(x)))
     weight = knots / len(x)
     misfit = np.array([weight * float(fit.fun @ fit.fun) for _, _, fit in fits])
     count = np.array([len(fit.x) for _, _, fit in fits])
@@ -188,14 +189,6 @@ def fitting_forms(
         for k in np.argsort(-probability)
         if sound[k]
     )
-
-
-def _independent(deviation: np.ndarray) -> float:
-    """How many independent values stand behind deviations (K,) that are alike in neighbours."""
-    square = float(deviation @ deviation)
-    alike = float(deviation[1:] @ deviation[:-1]) / square if square > 0.0 else 0.0
-    count = len(deviation)
-    return float(np.clip(count * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, count))
 
 
 def _fitted(

@@ -292,15 +292,13 @@ def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
 
 def _width_m(model: DepositionModel) -> float:
     """Root mean square radius of the widest pattern [m]."""
-    return max(_rms_radius_m(pattern) for pattern in model.patterns)
-
-
-def _rms_radius_m(pattern: PlanarPattern) -> float:
-    """Root mean square radius of a pattern [m]."""
-    reach = pattern.r_m + 5.0 * max(pattern.sigma1_m, pattern.sigma2_m)
-    x = np.linspace(-reach, reach, 81)
-    flux = pattern.flux_um_per_s(x[:, np.newaxis], x)
-    return float(np.sqrt(np.sum(flux * (x[:, np.newaxis] ** 2 + x**2)) / flux.sum()))
+    widths = []
+    for pattern in model.patterns:
+        reach = pattern.r_m + 5.0 * max(pattern.sigma1_m, pattern.sigma2_m)
+        x = np.linspace(-reach, reach, 81)
+        flux = pattern.flux_um_per_s(x[:, np.newaxis], x)
+        widths.append(np.sqrt(np.sum(flux * (x[:, np.newaxis] ** 2 + x**2)) / flux.sum()))
+    return float(max(widths))
 
 
 def painted_alike(experiments: Sequence[Experiment]) -> np.ndarray:

@@ -326,7 +326,9 @@ def _laws_off(
         for name in own:
             curves = effect.free_law and name in CURVES
             if basis := curve_basis(study, model, name, effect.free_law) if curves else None:
-                relative = change if effect.free_law == 'addition' else _share(change, film)
+                relative = change
+                if effect.free_law != 'addition':
+                    relative = np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)
                 # The size of an effect is what it changes at this share of the points at the most.
                 size = scale * float(np.quantile(np.abs(relative), 0.95))
                 curve = basis.random(size, LAW_LENGTH)
@@ -334,8 +336,3 @@ def _laws_off(
             else:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None
-
-
-def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:
-    """(P,) change over the film, 0 where there is none."""
-    return np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)

@@ -154,7 +154,10 @@ class LeftOut:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
         state = self.stages[0].here.state
         options = [option for option in self.options if option.learns not in without]
-        found = _found_without(self.stages, out)
+        for stage, following in zip(self.stages, [*self.stages[1:], None], strict=True):
+            found = stage.chosen(~out)
+            if following is None or found.names != following.here.names:
+                break
         nulls = NullModels.around(found, found.fit).select(~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
         learned = [size * options[k].columns for k, size in laws]
@@ -163,15 +166,6 @@ class LeftOut:
             free = np.hstack(learned[:count])
             films_um.append(state.study.predicted_without_um(found.fit, out, free))
         return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
-
-
-def _found_without(stages: Sequence[SearchStage], out: np.ndarray) -> EffectSet:
-    """The set of effects that is found while some readings (P,) are left out."""
-    for stage, following in zip(stages, [*stages[1:], None], strict=True):
-        chosen = stage.chosen(~out)
-        if following is None or chosen.names != following.here.names:
-            break
-    return chosen
 
 
 def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) -> Unknown:

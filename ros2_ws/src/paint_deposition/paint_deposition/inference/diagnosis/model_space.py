@@ -79,7 +79,10 @@ class EffectEvidence:
     def of_readings(self) -> np.ndarray:
         """(K, S) log Bayes factors of each explanation at every size."""
         deviation = self.null.deviation[:, np.newaxis]
-        factors = [self._by_size(k, deviation)[:, 0] for k in range(len(self.principal))]
+        factors = [
+            turned.log_bayes_factors(deviation, SIZES, self.freedom)[:, 0]
+            for turned in self.principal
+        ]
         return np.array(factors).reshape(len(self.principal), len(SIZES))
 
     def evidence(
@@ -96,11 +99,10 @@ class EffectEvidence:
             shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         numbers = range(len(self.explanations)) if chosen is None else chosen
-        terms = [
-            np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + log_share(e)
-            for k in numbers
-            for e in [self.explanations[k]]
-        ]
+        terms = []
+        for k in numbers:
+            by_size = self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
+            terms.append(np.logaddexp.reduce(by_size) + log_share(self.explanations[k]))
         return np.logaddexp.reduce(terms)
 
     def by_law(self, cause: str) -> tuple[float, Effect]:
@@ -116,11 +118,6 @@ class EffectEvidence:
     def null_draws(self, seed: int) -> np.ndarray:
         """(P, DRAWS) whitened deviations if no cause acted."""
         return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
-
-    def _by_size(
-        self, k: int, deviations: np.ndarray, shifts: np.ndarray | None = None
-    ) -> np.ndarray:
-        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
 
 
 def log_share(explanation: Explanation) -> float:
@@ -174,15 +171,10 @@ class ModelSpace:
         self.nature = [one for one in weighed if not one.sizes.is_beyond_nature]
         self.beyond = [one for one in weighed if one.sizes.is_beyond_nature]
         self.evidences = [EffectEvidence(one.null, explanations, freedom) for one in self.nature]
-
-    @cached_property
-    def _log_null(self) -> float:
-        return float(np.logaddexp.reduce([one.log_weight for one in self.nature]))
-
-    @cached_property
-    def share(self) -> np.ndarray:
-        """Posterior probability of each of nature's sizes if nothing is missing."""
-        return np.exp([one.log_weight - self._log_null for one in self.nature])
+        log_weights = [one.log_weight for one in self.nature]
+        self.log_null = float(np.logaddexp.reduce(log_weights))
+        # Posterior probability of each of nature's sizes if nothing is missing.
+        self.share = np.exp(np.array(log_weights) - self.log_null)
 
     @cached_property
     def central(self) -> EffectEvidence:
@@ -197,7 +189,7 @@ class ModelSpace:
             factors = np.array([e.of_readings[k] for e in self.evidences])
             averaged = np.logaddexp.reduce(factors + np.log(self.share)[:, np.newaxis], axis=None)
             terms.setdefault(explanation.cause, []).append(averaged + log_share(explanation))
-        beyond = [one.log_weight - self._log_null for one in self.beyond]
+        beyond = [one.log_weight - self.log_null for one in self.beyond]
         terms[UNKNOWN] = [*terms.get(UNKNOWN, []), *beyond, -np.inf]
         found = {cause: float(np.logaddexp.reduce(values)) for cause, values in terms.items()}
         return dict(sorted(found.items(), key=lambda item: -item[1]))

@@ -33,7 +33,8 @@ from paint_deposition.inference.diagnosis.learning import (
     locate_unexplained,
 )
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
-from paint_deposition.inference.diagnosis.state import DiagnosisState
+from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
+from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.posterior import Posterior
@@ -70,12 +71,13 @@ def diagnose(
     """
     progress('fitting the model')
     state = DiagnosisState.begin(campaign, start, library, seed, known)
-    if state.trouble:
-        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
+    if trouble := trouble_with(state.study, state.fit):
+        return state.diagnosis(np.nan, 'fit_broken', trouble)
     progress('computing the evidence of what may be missing')
     search = Search(state)
     nothing = search.nothing
-    state = replace(state, testable=search.testability, figures=nothing.space.figures)
+    testable = testability(nothing.space.central, seed)
+    state = replace(state, testable=testable, figures=nothing.space.figures)
     p_value = nothing.p_value
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
@@ -226,7 +228,7 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
         # Effects that are at least this probable are listed.
         if cause in known or probability < 0.05:
             continue
-        effects = [*state.accepted_effects, state.candidates[cause][0]]
+        effects = [*state.candidates_in(state.fit), state.candidates[cause][0]]
         fit = state.fitted_with(effects, state.fit.model)
         found.append(state.described((cause,), probability, state.history[-1], fit))
     return tuple(found)

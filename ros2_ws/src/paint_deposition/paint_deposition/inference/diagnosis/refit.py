@@ -23,7 +23,7 @@ from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclus
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.search import EffectSet, Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
-from paint_deposition.inference.diagnosis.state import DiagnosisState
+from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
@@ -58,8 +58,8 @@ def refit(
     candidates = dict(library) | ({added.id: added} if added and not law else {})
     progress('fitting the model')
     state = DiagnosisState.begin(campaign, start, candidates, seed, known)
-    if state.trouble:
-        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
+    if trouble := trouble_with(state.study, state.fit):
+        return state.diagnosis(np.nan, 'fit_broken', trouble)
     search = Search(state)
     nothing = search.nothing
     state = _beside(state, nothing)

@@ -39,7 +39,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
-from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many proposals are refitted each time.
@@ -72,7 +71,8 @@ class EffectSet:
         """A set, and the discrepancy around its own fit, at the sizes that matter."""
         usual = ModelDiscrepancy.of(state.study, fit)
         laws = [*of_effects(state.study, fit, state.candidates)]
-        sizes = probable_hyperparameters(state.plain(fit), usual, laws, state.freedom)
+        plain = NullModel.around(fit, state.study.nuisance)
+        sizes = probable_hyperparameters(plain, usual, laws, state.freedom)
         return EffectSet(state, names, fit, usual, sizes)
 
     @property
@@ -218,11 +218,6 @@ class Search:
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
         self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
-
-    @cached_property
-    def testability(self) -> Testability:
-        """What the readings can show beside the model as it is."""
-        return testability(self.nothing.space.central, self.state.seed)
 
     def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
         """A set with one effect more, whose first amplitudes are those of its law alone."""

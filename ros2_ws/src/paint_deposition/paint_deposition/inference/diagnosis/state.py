@@ -20,7 +20,6 @@ from paint_deposition.inference.diagnosis.explanations import (
     nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
@@ -96,11 +95,6 @@ class DiagnosisState:
         first = (Step.of(study, '', fit),)
         return DiagnosisState(study, start, prior, remarks, candidates, seed, fit, first)
 
-    @cached_property
-    def trouble(self) -> str:
-        """Why the fit cannot be right, '' if it can."""
-        return trouble_with(self.study, self.fit)
-
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
         return FreeParameters.of(start, *start.effects, known=self.known)
@@ -116,15 +110,6 @@ class DiagnosisState:
     def freedom(self) -> float:
         """Degrees of freedom of the noise estimate."""
         return self.study.noise.degrees_of_freedom
-
-    def plain(self, fit: Fit) -> NullModel:
-        """The model of a fit as it is, with nothing missing."""
-        return NullModel.around(fit, self.study.nuisance)
-
-    @property
-    def accepted_effects(self) -> list[Effect]:
-        """The candidates that the newest model has."""
-        return self.candidates_in(self.fit)
 
     def candidates_in(self, fit: Fit) -> list[Effect]:
         """The candidates that the model of a fit has."""
@@ -263,7 +248,7 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 
 def trouble_with(study: Study, fit: Fit) -> str:
-    """Why the fit cannot be right, or nothing."""
+    """Why the fit cannot be right, '' if it can."""
     if wrong := [mistake.sentence for mistake in study.mistakes if mistake.stops]:
         return '; '.join(wrong)
     mean = float(np.mean(study.measured_um))

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import ReadingsError
 from paint_deposition.film.paint_used import efficiency, impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
@@ -39,7 +40,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import (
-    check_enough,
+    FEWEST_POINTS,
     check_readings,
     check_units_against_fit,
     geometry_by_experiment,
@@ -178,7 +179,11 @@ def calibrate(
     """
     model = with_brushes_of(campaign, start or DepositionModel())
     study = Study.of(campaign, model.effects)
-    check_enough(len(study))
+    if len(study) < FEWEST_POINTS:
+        raise ReadingsError(
+            f'readings at {len(study)} points; the pattern has 7 parameters, measure at least '
+            f'{FEWEST_POINTS} points, better 30'
+        )
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
@@ -222,29 +227,22 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
 
 
 def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionModel:
-    """Each pattern from the first panel of its brush."""
-    patterns = list(model.patterns)
-    for panel in reversed(panels):
-        row = int(model.pattern_rows(np.array([panel.panel.brush]))[0])
-        patterns[row] = started_from(model.painting_with(panel.panel.brush), panel).planar
-    return model.with_patterns(patterns)
-
-
-def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
-    """First values of the 2D model from the 1D fit, as in the paper.
+    """First values of each pattern from the first panel of its brush, as in the paper.
 
     The greater offset radius is the ring's, the greatest standard deviation that of both
     Gaussians; lengths are taken back from the panel's distance to the model plane. K1 is put
     right by the fit.
     """
-    collapse = panel.collapse.collapse
-    projection = model.projection
-    distance = panel.panel.distance_m + projection.emission_offset_m
-    shrink = projection.model_plane_m / distance
-    sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
-    r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
-    lengths = {'r_m': r, 'sigma1_m': sigma, 'sigma2_m': sigma}
-    return model.model_copy(update={'planar': model.planar.model_copy(update=lengths)})
+    patterns, projection = list(model.patterns), model.projection
+    for fitted in reversed(panels):
+        panel, collapse = fitted.panel, fitted.collapse.collapse
+        shrink = projection.model_plane_m / (panel.distance_m + projection.emission_offset_m)
+        sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
+        r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
+        lengths = {'r_m': r, 'sigma1_m': sigma, 'sigma2_m': sigma}
+        row = int(model.pattern_rows(np.array([panel.brush]))[0])
+        patterns[row] = model.painting_with(panel.brush).planar.model_copy(update=lengths)
+    return model.with_patterns(patterns)
 
 
 def _warnings(
@@ -261,7 +259,7 @@ def _warnings(
         f'{pair.first} and {pair.second} can hardly be separated (correlation '
         f'{pair.value:+.2f}): trust their combination, not each'
         for pair in pairs
-        if pair.too_close
+        if abs(pair.value) > 0.95
     ]
     freedom = max(len(study) - len(fit.vector), 1)
     # Above this the gauge's noise does not explain the residuals.

@@ -34,11 +34,6 @@ class Correlation:
     second: str
     value: float
 
-    @property
-    def too_close(self) -> bool:
-        """Whether one can compensate for the other."""
-        return abs(self.value) > 0.95
-
 
 def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
     """Every varied parameter with its uncertainty.

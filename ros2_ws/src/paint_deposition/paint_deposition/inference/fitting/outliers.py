@@ -49,13 +49,6 @@ class FittedPoints:
         """Leave-one-out predictions of the readings by all models."""
         return LeaveOneOut.of(self)
 
-    def with_swapped(self, i: int, j: int) -> 'FittedPoints':
-        """The same with two readings in each other's place."""
-        residual = self.residual_um.copy()
-        more = self.predicted_um[j] + residual[j] - self.predicted_um[i] - residual[i]
-        residual[[i, j]] += more, -more
-        return replace(self, residual_um=residual)
-
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
         names = [one.name for one in fields(self) if one.name != 'covariates']
@@ -78,12 +71,16 @@ class LeaveOneOut:
     def of(misfit: FittedPoints) -> 'LeaveOneOut':
         """Compute all models."""
         log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
-        found = []
+        found, residual = [], misfit.residual_um
         for field, log_share in _fields(misfit):
             directions = np.hstack([misfit.free_um, field])
             for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
                 variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
-                likelihood, mean, sigma = _leave_one_out(misfit.residual_um, variance, directions)
+                solved, log_det = _solved(variance, directions)
+                weighted = residual / variance - solved.T @ (solved @ residual)
+                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+                likelihood = float(-0.5 * (residual @ weighted + log_det))
+                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
                 found.append((likelihood + log_share + log_texture, texture, mean, sigma))
         log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
         return LeaveOneOut(log_weight, textures, mean, sigma, misfit.residual_um)
@@ -114,17 +111,6 @@ def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0)
     """Logarithm of the normal density."""
     away = np.subtract(value, mean) / sigma
     return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
-
-
-def _leave_one_out(
-    residual: np.ndarray, variance: np.ndarray, directions: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
-    solved, log_det = _solved(variance, directions)
-    weighted = residual / variance - solved.T @ (solved @ residual)
-    diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
-    likelihood = -0.5 * (residual @ weighted + log_det)
-    return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
 
 
 def _solved(variance: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
@@ -261,7 +247,10 @@ def _swapped(
     gain, i, j = _best_swap(misfit)
     if gain < 8.0:
         return {}
-    swapped = misfit.with_swapped(i, j)
+    residual_um = misfit.residual_um.copy()
+    more_um = misfit.predicted_um[j] + residual_um[j] - misfit.predicted_um[i] - residual_um[i]
+    residual_um[[i, j]] += more_um, -more_um
+    swapped = replace(misfit, residual_um=residual_um)
     after = swapped.leave_one_out
     found = {i: (after.predicted(i), j), j: (after.predicted(j), i)}
     for row, ((mean, sigma), _) in found.items():

@@ -86,19 +86,17 @@ class _Repeats:
         """(N,) outliers, from a robust scale and iterated until the set no longer changes."""
         if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
             return self._beyond(1.0, ASSUMED_FREEDOM)
-        gross = self._beyond(self._robust_scale(), np.inf)
+        order = np.lexsort((self.distance, self.owner))
+        # At each point one distance is redundant: half of a pair, or the median of three itself.
+        own = np.diff(self.owner[order], prepend=-1) == 0
+        # The median of the distances is consistent for normal noise.
+        scale = float(np.median(self.distance[order][own]) / ndtri(0.75))
+        gross = self._beyond(scale, np.inf)
         for _ in range(20):
             before, gross = gross, self._beyond(*self._pooled(~gross))
             if np.array_equal(before, gross):
                 break
         return gross
-
-    def _robust_scale(self) -> float:
-        """Median of the distances, consistent for normal noise."""
-        order = np.lexsort((self.distance, self.owner))
-        # At each point one distance is redundant: half of a pair, or the median of three itself.
-        own = np.diff(self.owner[order], prepend=-1) == 0
-        return float(np.median(self.distance[order][own]) / ndtri(0.75))
 
     def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
         """Pooled scale of the kept readings within points, and its degrees of freedom."""

@@ -25,15 +25,6 @@ LEAST_GAP = 6.0
 UNIT_SLACK = 1.8
 
 
-def check_enough(points: int) -> None:
-    """Refuse a campaign with hardly more points than the pattern has parameters."""
-    if points < FEWEST_POINTS:
-        raise ReadingsError(
-            f'readings at {points} points; the pattern has 7 parameters, measure at least '
-            f'{FEWEST_POINTS} points, better 30'
-        )
-
-
 def check_unit(readings: Readings) -> None:
     """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
