@@ -39,7 +39,7 @@ WAVY = Explanation(UNKNOWN, CHANGE, np.zeros(CHANGE.shape[1]), 1.0, random=CURVE
 def nulls(change: np.ndarray, **others: np.ndarray) -> NullModels:
     """Beside noise that a change (P,) has moved; for some kinds of law more (P, n) may vary."""
     base = null_of(linear_fit(np.random.default_rng(0), POINTS))
-    null = NullModel.of(base.columns, base.raw + change)
+    null = NullModel.of(base.columns, base.scaled_deviation + change)
     beside = {kind: null.beside(columns) for kind, columns in others.items()}
     kinds = ('footprint', 'correction', 'place', 'nonparametric_laws')
     return NullModels(**{kind: beside.get(kind, null) for kind in kinds})

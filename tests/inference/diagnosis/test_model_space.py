@@ -111,7 +111,7 @@ def of_cause(found: list[Explanation], cause: str) -> list[Explanation]:
 
 def shifted(null: NullModel, change: np.ndarray) -> NullModel:
     """The same noise on readings that a change (P,), over the noise, has moved."""
-    return NullModel.of(null.columns, null.raw + change)
+    return NullModel.of(null.columns, null.scaled_deviation + change)
 
 
 def space_of(
@@ -195,9 +195,9 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes(plain, discrepancy,
         ).lower
         covariance = covariance @ covariance.T
         if np.isinf(freedom):
-            value = multivariate_normal.logpdf(there.raw, cov=covariance)
+            value = multivariate_normal.logpdf(there.scaled_deviation, cov=covariance)
         else:
-            value = multivariate_t.logpdf(there.raw, shape=covariance, df=freedom)
+            value = multivariate_t.logpdf(there.scaled_deviation, shape=covariance, df=freedom)
         return float(value) + one.log_prior
 
     none = np.zeros((READINGS, 1))

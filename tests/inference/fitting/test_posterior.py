@@ -16,7 +16,7 @@ from paint_deposition.inference.fitting.posterior import (
     PatternShift,
     fingerprints,
     posterior_of,
-    usable,
+    prior_for,
 )
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.coordinates import EFFECT_BETWEEN_JOBS, PATTERN
@@ -68,14 +68,14 @@ def test_no_reading_counts_twice(campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
     assert posterior.readings == fingerprints(campaign)
-    known, remarks = usable(posterior, campaign)
+    known, remarks = prior_for(posterior, campaign)
     assert known is None
     assert 'panel' in remarks[0]
     (panel,) = campaign.experiments
     thicker = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
     other = Campaign((replace(panel, taken=thicker),))
-    assert usable(posterior, other) == (posterior, ())
-    assert usable(None, campaign) == (None, ())
+    assert prior_for(posterior, other) == (posterior, ())
+    assert prior_for(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
     assert posterior_of(later, other).readings == (*posterior.readings, *fingerprints(other))
 
@@ -90,11 +90,11 @@ def test_other_settings_of_the_process_are_told(campaign):
     calibrated = Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
-    known, (remark,) = usable(posterior, at(voltage_kv=0.0, flow=1.01))
+    known, (remark,) = prior_for(posterior, at(voltage_kv=0.0, flow=1.01))
     assert known == posterior
     assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
-    assert usable(posterior, at(voltage_kv=61.0)) == (posterior, ())
-    assert usable(posterior, at()) == (posterior, ())
+    assert prior_for(posterior, at(voltage_kv=61.0)) == (posterior, ())
+    assert prior_for(posterior, at()) == (posterior, ())
 
 
 # How far a pattern moved from the calibration.

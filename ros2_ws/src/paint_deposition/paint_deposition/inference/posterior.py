@@ -35,7 +35,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
     def of(
         names: Sequence[str], centre: np.ndarray, matrix: np.ndarray, **more: object
     ) -> 'Posterior':
-        """That of k coordinates with mean (k,) and covariance (k, k)."""
+        """Normal distribution of k coordinates with mean (k,) and covariance (k, k)."""
         mean = dict(zip(names, centre.tolist(), strict=True))
         return Posterior.model_validate(
             {'mean': mean, 'covariance': dict(zip(names, matrix.tolist(), strict=True))} | more
@@ -43,7 +43,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the k coordinates."""
+        """Names of the k coordinates."""
         return tuple(self.mean)
 
     @property

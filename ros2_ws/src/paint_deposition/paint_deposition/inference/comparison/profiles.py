@@ -112,7 +112,7 @@ def _profile(
     experiment: Experiment, models: Sequence[DepositionModel], label: str, members: np.ndarray,
     upright: bool, is_strip: bool,
 ) -> Profile:  # fmt: skip
-    """Of some of an experiment's points, in order upright or across."""
+    """Profile of some of an experiment's points, in order upright or across."""
     up, across = _axes(experiment.surface)
     axis, other = (up, across) if upright else (across, up)
     along = axis.of(experiment.measured_points.positions_m[members])

@@ -171,7 +171,7 @@ class Forecast:
         for contender in contenders:
             null = contender.null(study, usual).select(order)
             mean, factor = null.predicted(known)
-            expected = (study.measured_um / study.sigma_um)[order] - null.raw
+            expected = (study.measured_um / study.sigma_um)[order] - null.scaled_deviation
             here = null.select(np.arange(known))
             deviation, freedom = here.deviation[:, np.newaxis], study.noise.degrees_of_freedom
             prior = LOG_PRIOR.get(contender.name, log_odds(PRIOR_EFFECT))

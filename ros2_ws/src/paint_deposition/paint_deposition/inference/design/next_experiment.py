@@ -94,7 +94,7 @@ def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
 
 
 def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
-    """Those that can be done, best first."""
+    """Experiments that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
 
 

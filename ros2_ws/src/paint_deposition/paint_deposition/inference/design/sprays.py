@@ -30,7 +30,7 @@ class Change:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Of the single changes."""
+        """Keys of the single changes."""
         return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
 
 
@@ -146,7 +146,7 @@ def _open_longer(path: SprayPath) -> SprayPath:
 
 
 def _passes_turned(experiment: Experiment) -> Experiment | None:
-    """The same passes turned by 90 deg and fitted to the part's other side, at the same speed."""
+    """Turn the passes by 90 deg and fit them to the part's other side, at the same speed."""
     surface, path = experiment.surface, experiment.path
     outward = surface.outward
     across = across_axis(outward, surface.down)

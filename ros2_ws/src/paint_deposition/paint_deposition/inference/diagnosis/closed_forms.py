@@ -58,7 +58,7 @@ class ClosedForm:
         return law(x, *(found.value for found in self.parameters.values()))
 
     def to_dict(self) -> dict[str, Any]:
-        """As ``diagnosis.json`` has it."""
+        """An entry of ``forms`` in ``diagnosis.json``."""
         shown = {
             name: {'value': found.value, 'low': found.low, 'high': found.high}
             for name, found in self.parameters.items()

@@ -40,8 +40,8 @@ class DiscrepancyPrior:
     twentieth of it), and 40 panels of clearcoat. Shares are standard deviations.
     """
 
-    # Shares of its peak by which the footprint may deviate at any place. What readings allow a
-    # footprint to show as well is no effect; they also tell how far it goes.
+    # Shares of its peak by which the footprint may deviate at any place. What a footprint explains
+    # as well is not taken for an effect; the readings tell which share it is.
     footprints: tuple[float, ...] = (0.02, 0.06, 0.2)
     # The same for the difference between its two sides: 0.5 to 2 % were measured.
     sides: float = 0.02
@@ -189,7 +189,7 @@ class ModelDiscrepancy:
         )
 
     def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':
-        """The same where pattern and place of a spray vary as around another fit."""
+        """The discrepancy where pattern and place of a spray vary as around another fit."""
         return replace(self, shapes=_shapes(study, fit, self.setting_of))
 
     def choices(self) -> list[DiscrepancyHyperparameters]:
@@ -215,7 +215,7 @@ class ModelDiscrepancy:
         ]
 
     def usual(self, sizes: DiscrepancyHyperparameters) -> DiscrepancyHyperparameters:
-        """The same with settings and parts that differ by as much as usual sprays do at most."""
+        """Hyperparameters with settings and parts that differ by the most that usual sprays do."""
         return replace(
             sizes, setting=PRIOR.most_usual, part=PRIOR.most_usual if sizes.part else 0.0
         )
@@ -242,7 +242,7 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
 def _flux_and_tails(
     patterns: Sequence[PlanarPattern], reach_m: float, radii: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of a footprint (radii,) mean flux over the peak's, and at its K knots (K, 2) its changes.
+    """Mean flux (radii,) of a footprint over the peak's, and its changes (K, 2) at K knots.
 
     The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
     exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.

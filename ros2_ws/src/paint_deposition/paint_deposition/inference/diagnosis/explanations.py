@@ -162,7 +162,7 @@ class Explanation:
         return self.random.basis.law.covariate if self.random else ''
 
     def select(self, rows: np.ndarray) -> 'Explanation':
-        """The same for some of the readings; its law stays that of all."""
+        """The explanation for some of the readings; its law stays that of all."""
         return replace(self, columns=self.columns[rows])
 
 

@@ -48,7 +48,7 @@ class NullModels:
 
     @staticmethod
     def around(best: EffectSet, fit: Fit) -> 'NullModels':
-        """Those beside a set of effects, and a fit of the model with it."""
+        """Null hypotheses beside a set of effects, and a fit of the model with it."""
         study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
         plain = NullModel.around(fit, study.nuisance)
         off = law_errors(study, fit, best.names, best.usual.model)
@@ -61,18 +61,18 @@ class NullModels:
         )
 
     def of(self, explanation: Explanation) -> NullModel:
-        """That for an explanation."""
+        """The null hypothesis for an explanation."""
         if explanation.corrects:
             return self.correction
         kinds = {FOOTPRINT: self.footprint, PLACE: self.place}
         return kinds.get(explanation.learns, self.nonparametric_laws)
 
     def beside(self, columns: np.ndarray) -> 'NullModels':
-        """The same where some directions (P, n) may vary, too."""
+        """Null hypotheses where some directions (P, n) may vary, too."""
         return self._each(lambda null: null.beside(columns))
 
     def select(self, rows: np.ndarray) -> 'NullModels':
-        """The same for some of the readings."""
+        """Null hypotheses for some of the readings."""
         return self._each(lambda null: null.select(rows))
 
     def _each(self, change: Callable[[NullModel], NullModel]) -> 'NullModels':

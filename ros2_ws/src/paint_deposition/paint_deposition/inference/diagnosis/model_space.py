@@ -207,9 +207,9 @@ class ModelSpace:
         random = np.random.default_rng(seed)
         draws = []
         for one, count in zip(self.nature, random.multinomial(DRAWS, self.share), strict=True):
-            noise = simulated(len(one.null.raw), self.freedom, count, random)
+            noise = simulated(len(one.null.scaled_deviation), self.freedom, count, random)
             draws.append(one.null.lower @ noise)
-        found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
+        found = self._evidence(self.nature[0].null.scaled_deviation[:, np.newaxis])[0]
         by_chance = self._evidence(np.hstack(draws))
         return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
 
@@ -294,7 +294,7 @@ def probable_hyperparameters(
         precision = 1.0 + np.multiply.outer(SIZES**2, square)
         explained = (SIZES**2)[:, np.newaxis] * score**2 / precision
         if np.isfinite(freedom):
-            count = freedom + len(plain.raw)
+            count = freedom + len(plain.scaled_deviation)
             whole = freedom + one.null.deviation @ one.null.deviation
             gain = -0.5 * count * np.log1p(-explained / whole)
         else:

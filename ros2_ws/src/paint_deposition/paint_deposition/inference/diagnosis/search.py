@@ -77,7 +77,7 @@ class EffectSet:
 
     @property
     def effects(self) -> dict[str, Effect]:
-        """Those of the set, as fitted."""
+        """The effects of the set, as fitted."""
         return {effect.id: effect for effect in self.state.candidates_in(self.fit)}
 
     @cached_property
@@ -106,7 +106,7 @@ class EffectSet:
 
     @cached_property
     def best(self) -> WeightedNull:
-        """That with nature's most probable discrepancy."""
+        """The null hypothesis with nature's most probable discrepancy."""
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
@@ -117,7 +117,7 @@ class EffectSet:
 
     @property
     def p_value(self) -> float:
-        """The same, or of fields over the parts larger than those of usual sprays.
+        """Probability of so much evidence, or of larger fields on the parts than usual ones.
 
         Two tests are made, each with its share of the significance level (Bonferroni).
         """
@@ -131,7 +131,7 @@ class EffectSet:
 
     @cached_property
     def log_weight_unknown(self) -> float:
-        """The same if something unknown acts beside it."""
+        """Logarithm of the weight of this set if something unknown acts beside it."""
         return self.log_weight + self.of_unknown.alone[UNKNOWN]
 
     @cached_property
@@ -180,7 +180,7 @@ class EffectSet:
         return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
 
     def log_weight_of(self, rows: np.ndarray) -> float:
-        """The same weight with some of the readings (P,), at the best size of the discrepancy."""
+        """Logarithm of the weight by some readings (P,), at the best size of the discrepancy."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
         return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior

@@ -77,11 +77,11 @@ class RandomLaw:
 
     @property
     def centred(self) -> 'RandomLaw':
-        """The same laws, each leaving the film as a whole as it is."""
+        """Random laws of this form, each leaving the film as a whole as it is."""
         return RandomLaw(self.basis, self.basis.centred(self.at_knots))
 
     def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
-        """The same where another model says what arrives where."""
+        """The random law where another model says what arrives where."""
         bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
         maps = self.basis.settings.get('maps')
         (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)

@@ -33,7 +33,7 @@ from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.posterior import usable
+from paint_deposition.inference.fitting.posterior import prior_for
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
@@ -89,7 +89,7 @@ class DiagnosisState:
             for key, effect in library.items()
             if start.effect(key) is None
         }
-        prior, remarks = usable(known, campaign)
+        prior, remarks = prior_for(known, campaign)
         effects = (*start.effects, *(shapes[0] for shapes in candidates.values()))
         study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior)
         first = (Step.of(study, '', fit),)

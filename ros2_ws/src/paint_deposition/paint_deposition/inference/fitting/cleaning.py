@@ -71,7 +71,7 @@ def _cleaned(
     study: Study, fit: Fit, start: DepositionModel, starts: int, seed: int,
     known: Posterior | None,
 ) -> tuple[Study, Fit]:  # fmt: skip
-    """The same without outliers, with the film's texture and what facets cost."""
+    """The study without outliers, with the film's texture and what facets cost."""
     misfit = fitted_points(study, fit)
     if found := _outliers(study, fit, misfit):
         study = study.without(found)

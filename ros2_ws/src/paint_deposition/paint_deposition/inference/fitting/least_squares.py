@@ -45,7 +45,7 @@ class Fit:
 
     @cached_property
     def marginal(self) -> 'Fit':
-        """The same fit with residual and Jacobian whitened by nuisance and discrepancy, too."""
+        """The fit with residual and Jacobian whitened by nuisance and discrepancy, too."""
         factor = covariance_factor(self.nuisance, self.discrepancy)
         return replace(
             self,
@@ -244,7 +244,7 @@ class _Problem:
         return np.vstack([self.whitened(slopes), self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
-        """The same with the K1s scaled so that the mean film is right."""
+        """The vector with the K1s scaled so that the mean film is right."""
         predicted = self.predict(vector)
         weights = self.sigma**-2.0
         most = float(np.sum(weights * predicted**2))
@@ -255,7 +255,7 @@ class _Problem:
         return np.clip(scaled, self.low, self.high)
 
     def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
-        """The same with the best K1, K2, K3 and phi, as far as other effects are linear.
+        """The vector with the best K1, K2, K3 and phi, as far as other effects are linear.
 
         Of several brushes K3 and phi are those that are best for the first.
         """

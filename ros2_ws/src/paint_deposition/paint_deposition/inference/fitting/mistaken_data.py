@@ -91,7 +91,7 @@ class Weighed:
 
     @property
     def displaced(self) -> 'Weighed':
-        """The same readings, fitted with all effects that displace the film."""
+        """The readings, fitted with all effects that displace the film."""
         fit, own = self.fit, self.fit.model.effects
         effects = (
             effect()
@@ -115,7 +115,7 @@ class Weighed:
 
     @property
     def rough_log_weight(self) -> float:
-        """The same if the model lacks nothing, up to a constant."""
+        """Logarithm of the likelihood if the model lacks nothing, up to a constant."""
         spread = float(np.log(self.study.sigma_um).sum())
         return -0.5 * self.fit.objective - spread - self.log_scale + self.log_size()
 

@@ -184,7 +184,7 @@ class Outlier:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """As results name it."""
+        """An entry of ``left_out`` in the files of results."""
         names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um', 'swapped_with')
         return {name: getattr(self, name) for name in names}
 

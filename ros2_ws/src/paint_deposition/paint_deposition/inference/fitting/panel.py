@@ -194,7 +194,7 @@ PAINT_BEYOND = 0.025
 
 
 @dataclass(frozen=True)
-class Reach:
+class FootprintCoverage:
     """How far the readings of a panel reach to both sides of the pass that they cover best."""
 
     experiment: int  # its number
@@ -214,23 +214,23 @@ class Reach:
         )
 
 
-def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[Reach, ...]:
+def short_reaches(campaign: Campaign, model: DepositionModel) -> tuple[FootprintCoverage, ...]:
     """The panels of a campaign on which no pass was measured to both edges of its pattern.
 
     Of a brush there are none if one of its panels shows both edges, or where no part is a flat
     panel.
     """
-    by_brush: dict[int, list[Reach]] = {}
+    by_brush: dict[int, list[FootprintCoverage]] = {}
     for k, one in enumerate(campaign.experiments):
         if panel := Panel.of(one):
-            reach = _reach(k, one.name, panel, model.painting_with(panel.brush))
+            reach = _coverage(k, one.name, panel, model.painting_with(panel.brush))
             by_brush.setdefault(panel.brush, []).append(reach)
     short = (f for f in by_brush.values() if min(max(r.beyond) for r in f) > PAINT_BEYOND)
     return tuple(reach for found in short for reach in found)
 
 
 def shifts(
-    study: Study, fit: Fit, reaches: tuple[Reach, ...], fitted: Callable[[Study], Fit]
+    study: Study, fit: Fit, reaches: tuple[FootprintCoverage, ...], fitted: Callable[[Study], Fit]
 ) -> np.ndarray:
     """(n, k) by how much the fit's vector moves without the readings at the ends.
 
@@ -253,7 +253,7 @@ def shifts(
     return np.array(moved).reshape(len(moved), len(fit.vector))
 
 
-def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reach:
+def _coverage(number: int, name: str, panel: Panel, model: DepositionModel) -> FootprintCoverage:
     reaches = []
     low, high = panel.across_m.min(), panel.across_m.max()
     passes = zip(panel.passes_m, panel.speed_m_per_s, panel.mirrored, strict=True)
@@ -267,7 +267,6 @@ def _reach(number: int, name: str, panel: Panel, model: DepositionModel) -> Reac
         beyond = float(below), float(1.0 - above)
         ends = np.interp([PAINT_BEYOND, 1.0 - PAINT_BEYOND], landed, x)
         to_ends = float(line - low), float(high - line)
-        reaches.append(
-            Reach(number, name, panel.across_m, to_ends, beyond, float(np.abs(ends).max()))
-        )
+        needed_m = float(np.abs(ends).max())
+        reaches.append(FootprintCoverage(number, name, panel.across_m, to_ends, beyond, needed_m))
     return min(reaches, key=lambda reach: max(reach.beyond))

@@ -164,14 +164,14 @@ class FreeParameters:
 
     @property
     def weak_prior(self) -> Prior:
-        """Of the vector where nothing is known of this bell."""
+        """Prior of the vector where nothing is known of this bell."""
         of_pattern = [(c.centre, c.width) for c in self.pattern.coordinates]
         centre, width = np.array(of_pattern + [(0.0, 1.0)] * len(self.varied)).T
         return Prior(centre, np.diag(width))
 
     @cached_property
     def prior(self) -> Prior:
-        """Of the vector: weak, but for what is known, widened by what differs between jobs."""
+        """Prior of the vector: weak, but for what is known, widened by how jobs differ."""
         weak, known = self.weak_prior, self.known
         if known is None:
             return weak

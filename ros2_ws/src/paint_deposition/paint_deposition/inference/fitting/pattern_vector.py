@@ -39,7 +39,7 @@ class PatternVector:
 
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Of each entry; those of several brushes are named 'brush_2.K2' say."""
+        """Coordinate of each entry; those of several brushes are named 'brush_2.K2' say."""
         if self.count == 1:
             return PATTERN
         own = (*PATTERN[:COS], RATIO, *PATTERN[SIN + 1 :])
@@ -51,7 +51,7 @@ class PatternVector:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the 7 B parameters in the model's units."""
+        """Names of the 7 B parameters in the model's units."""
         return tuple(f'{self._prefix(row)}{n}' for row in range(self.count) for n in PATTERN_NAMES)
 
     def _prefix(self, row: int) -> str:

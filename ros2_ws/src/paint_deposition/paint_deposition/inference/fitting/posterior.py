@@ -78,7 +78,7 @@ def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Post
     return Posterior.of(new, mean, matrix, readings=known.readings, process=known.process)
 
 
-def usable(
+def prior_for(
     known: Posterior | None, campaign: Campaign
 ) -> tuple[Posterior | None, tuple[str, ...]]:
     """What may serve as the prior for a campaign, and a remark where it may not.
@@ -105,7 +105,7 @@ def usable(
 
 
 def fingerprints(campaign: Campaign) -> tuple[str, ...]:
-    """Of the readings of each experiment."""
+    """Fingerprint of the readings of each experiment."""
     return tuple(experiment.taken.fingerprint for experiment in campaign.experiments)
 
 
@@ -181,7 +181,7 @@ class PatternShift:
 
     @staticmethod
     def of(fit: Fit) -> PatternShift | None:
-        """Of a fit; None where no readings stand behind what is known."""
+        """Distance of a fit; None where no readings stand behind what is known."""
         known, pattern = fit.parameters.known, fit.parameters.pattern
         if known is None or not known.readings:
             return None
@@ -220,7 +220,7 @@ class PatternShift:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """As in ``diagnosis.json``."""
+        """The entry ``pattern_shift`` in ``diagnosis.json``."""
         return {
             'standard_deviations': self.distance,
             'usual': self.usual,

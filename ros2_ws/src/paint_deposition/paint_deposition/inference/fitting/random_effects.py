@@ -126,7 +126,7 @@ def smooth(away: ArrayLike) -> np.ndarray:
 
 
 def with_edges(away: ArrayLike) -> np.ndarray:
-    """The same of a field that may bend sharply: Matérn's with smoothness 3/2."""
+    """Correlation of a field that may bend sharply: Matérn's with smoothness 3/2."""
     scaled = np.sqrt(3.0) * np.asarray(away)
     return (1.0 + scaled) * np.exp(-scaled)
 

@@ -95,7 +95,7 @@ class Study:
         return np.hypot(np.hypot(self.gauge_um, self.texture.share * self.measured_um), facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
-        """The same with what facets cost under a model, if it shows beside the noise."""
+        """The study with what facets cost under a model, if it shows beside the noise."""
         parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
         facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
         if np.all(np.abs(facet_um) < 0.1 * self.sigma_um):
@@ -103,12 +103,12 @@ class Study:
         return replace(self, facet_um=facet_um)
 
     def without(self, outliers: dict[int, Outlier]) -> 'Study':
-        """The same without some points, by their row."""
+        """The study without some points, by their row."""
         kept = ~np.isin(np.arange(len(self)), list(outliers))
         return replace(self.of_points(kept), outliers=tuple(outliers.values()))
 
     def of_points(self, kept: np.ndarray) -> 'Study':
-        """The same with some of the points only, (P,) bool.
+        """The study with some of the points only, (P,) bool.
 
         Raises:
             ReadingsError: an experiment has no reading left.
@@ -159,7 +159,7 @@ class Study:
         return Residuals(self.measured_um, levelled_um, self.sigma_um)
 
     def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
-        """The same for each experiment on its own."""
+        """Residuals of each experiment on its own."""
         residuals, owner = self.residuals(predicted_um), self.campaign.experiment_of
         return tuple(residuals.select(owner == k) for k in range(len(self.campaign.experiments)))
 
