@@ -216,6 +216,9 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes(plain, discrepancy,
 
 
 def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found, discrepancy):
+    nothing = space_of(plain, found, discrepancy, SMALL, LARGE, BEYOND)
+    assert nothing.p_value(seed=0) > 0.05
+    assert all(probability(nothing, cause) < 0.3 for cause in nothing.alone)
     planted = of_cause(found, 'corner_slowdown')[1]
     space = space_of(shifted(plain, 1.5 * planted.columns[:, 0]), found, discrepancy)
     assert space.p_value(seed=0) < 0.01
@@ -225,12 +228,6 @@ def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found,
     assert effect.length_m == planted.law.effect.length_m
     typical = CornerSlowdown.parameters()['gain']['typical']
     assert effect.gain / typical == pytest.approx(1.5, abs=0.35)
-
-
-def test_nothing_is_proposed_where_nothing_acts(plain, found, discrepancy):
-    space = space_of(plain, found, discrepancy, SMALL, LARGE, BEYOND)
-    assert space.p_value(seed=0) > 0.05
-    assert all(probability(space, cause) < 0.3 for cause in space.alone)
 
 
 def test_odds_do_not_depend_on_the_number_of_shapes(plain, found, discrepancy):

@@ -74,13 +74,18 @@ def _cleaned(
     """The study without outliers, with the film's texture and what facets cost."""
     misfit = fitted_points(study, fit)
     if found := _outliers(study, fit, misfit):
-        study = study.without(found)
+        kept = ~np.isin(np.arange(len(study)), list(found))
+        study = replace(study.of_points(kept), outliers=tuple(found.values()))
         fit = _fitted(study, start, starts, seed, known)
         misfit = fitted_points(study, fit)
-    texture = _texture(study, misfit)
-    if texture != study.texture:
-        study = replace(study, texture=texture)
-        fit = _fitted(study, fit.model, 1, seed, known)
+    # The texture is estimated where the gauge's noise is known. Only one finer than usual is
+    # accepted: a coarser one looks like anything that is missing from the model and narrower than
+    # the distance between readings.
+    if study.noise.source != 'assumed':
+        share = misfit.leave_one_out.texture_share
+        if share < TEXTURE_SHARE:
+            study = replace(study, texture=Texture(share, 'neighbours'))
+            fit = _fitted(study, fit.model, 1, seed, known)
     faceted = study.with_facets(fit.model)
     if faceted is not study:
         return faceted, _fitted(faceted, fit.model, 1, seed, known)
@@ -106,18 +111,6 @@ def _outliers(study: Study, fit: Fit, misfit: FittedPoints) -> dict[int, Outlier
         for row, (residual_um, sigma_um, other) in
         find_outliers(misfit, means.repeats == 1).items()
     }  # fmt: skip
-
-
-def _texture(study: Study, misfit: FittedPoints) -> Texture:
-    """Estimated where the gauge's noise is known.
-
-    Only a texture finer than usual is accepted: a coarser one looks like anything that is missing
-    from the model and narrower than the distance between readings.
-    """
-    if study.noise.source == 'assumed':
-        return study.texture
-    share = misfit.leave_one_out.texture_share
-    return Texture(share, 'neighbours') if share < TEXTURE_SHARE else study.texture
 
 
 # Cells that readings by the thousand are condensed to.

@@ -1,6 +1,6 @@
 """Fitted parameters with their uncertainties, and what no law explains, in figures for people."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -164,10 +164,6 @@ class FootprintProfile:
     found: np.ndarray
     sd: np.ndarray
 
-    def to_dict(self) -> dict[str, list[float]]:
-        """Its figures, for JSON."""
-        return {field.name: getattr(self, field.name).tolist() for field in fields(self)}
-
 
 @dataclass(frozen=True)
 class DiscrepancyFigures:
@@ -190,7 +186,7 @@ class DiscrepancyFigures:
     @property
     def footprint(self) -> dict[str, Any]:
         """How far the footprint is from eq. (1), for JSON."""
-        profile = self.profile.to_dict()
+        profile = {name: values.tolist() for name, values in vars(self.profile).items()}
         return {'deviation_of_peak': self.footprint_of_peak, 'profile': profile}
 
     def __str__(self) -> str:

@@ -31,9 +31,10 @@ def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None)
     scale = parameters.scale
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
+    own = (experiment.taken.fingerprint for experiment in campaign.experiments)
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,
-        0.5 * (covariance + covariance.T), readings=(*known, *fingerprints(campaign)),
+        0.5 * (covariance + covariance.T), readings=(*known, *own),
         process=campaign.settings,
     )  # fmt: skip
 
@@ -102,11 +103,6 @@ def prior_for(
         for now in [campaign.settings.get(name, then)]
         if abs(now - then) > 0.05 * abs(then)
     )
-
-
-def fingerprints(campaign: Campaign) -> tuple[str, ...]:
-    """Fingerprint of the readings of each experiment."""
-    return tuple(experiment.taken.fingerprint for experiment in campaign.experiments)
 
 
 # If fewer draws than one in so many are physical, the posterior belongs to another model.

@@ -102,11 +102,6 @@ class Study:
             return self
         return replace(self, facet_um=facet_um)
 
-    def without(self, outliers: dict[int, Outlier]) -> 'Study':
-        """The study without some points, by their row."""
-        kept = ~np.isin(np.arange(len(self)), list(outliers))
-        return replace(self.of_points(kept), outliers=tuple(outliers.values()))
-
     def of_points(self, kept: np.ndarray) -> 'Study':
         """The study with some of the points only, (P,) bool.
 
