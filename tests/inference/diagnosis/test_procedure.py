@@ -207,11 +207,11 @@ def test_a_second_effect_is_found_beside_the_first(two_missing):
     # A footprint that the readings learned beside them is no effect.
     named = set(two_missing.accepted) - {'learned:footprint'}
     assert named == {'fog_gradient', 'flow_drift'}
-    assert [c.best for c in two_missing.classes[:2]] == list(two_missing.accepted)
-    assert all(c.probability > SURE for c in two_missing.classes[:2])
+    accepted = two_missing.classes[: len(two_missing.accepted)]
+    assert [c.best for c in accepted] == list(two_missing.accepted)
+    assert all(c.probability > SURE for c in accepted)
     assert {effect.id for effect in two_missing.model.effects} == set(two_missing.accepted)
-    for name in two_missing.accepted:
-        assert name in two_missing.reason
+    assert all(name in two_missing.reason for name in named)
 
 
 def test_each_accepted_effect_has_a_step_that_improves_the_prediction(two_missing):

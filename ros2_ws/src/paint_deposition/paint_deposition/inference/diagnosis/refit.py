@@ -53,7 +53,8 @@ def refit(
     law = added if added is not None and issubclass(added, LearnedLaw) else None
     if added and start.effect(added.id):
         raise ModelError(
-            f'{added.id} is in the model already; to fit it anew, add none, or take it out'
+            f'{added.id} is in the model already; add no effect to refit the model as it is, or '
+            'take it out of the model'
         )
     candidates = dict(library) | ({added.id: added} if added and not law else {})
     progress('fitting the model')
@@ -102,9 +103,16 @@ def _with_learned(
     options, nulls = _options(state, law), NullModels.around(nothing, state.fit)
     weights = _log_bayes_factors(state, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
-    before = state.history[-1]
-    fit = state.learned([_best(options, weights)])
-    state = state.with_step(law.id, fit, _holdout_um(state, nulls, options))
+    before, fit = state.history[-1], state.learned([_best(options, weights)])
+
+    def without(out: np.ndarray) -> np.ndarray:
+        # The law's kind, length and size are chosen without these readings, too.
+        kept = [explanation.select(~out) for explanation in options]
+        others = _log_bayes_factors(state, nulls.select(~out), kept)
+        explanation, size = _best(options, others)
+        return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
+
+    state = state.with_step(law.id, fit, float(state.study.errors_left_out_um(without)))
     state = state.accepting((law.id,), probability, before)
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
@@ -144,15 +152,3 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
     """The law and the size of the greatest weight (n, S)."""
     number, size = np.unravel_index(weights.argmax(), weights.shape)
     return options[int(number)], float(SIZES[size])
-
-
-def _holdout_um(state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]) -> float:
-    """Error on points left out [um], the law's kind, length and size chosen without them."""
-
-    def without(out: np.ndarray) -> np.ndarray:
-        kept = [explanation.select(~out) for explanation in options]
-        weights = _log_bayes_factors(state, nulls.select(~out), kept)
-        explanation, size = _best(options, weights)
-        return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
-
-    return float(state.study.errors_left_out_um(without))
