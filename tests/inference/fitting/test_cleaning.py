@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inference.fitting.panels import ORDERS, column, painted_by, passes
+from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes
 from paint_deposition.api.inference import compare
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -166,7 +166,7 @@ def test_a_typing_error_does_not_change_the_verdict(campaign):
 def test_a_thick_film_without_texture_is_no_broken_fit():
     """A gauge of 0.5 µm on 80 µm of even film: the usual texture alone would be 0.8 µm."""
     model, path = DepositionModel(), passes([0.2, 0.6, 1.0, 1.4, 1.8])
-    at = grid(8, 24)
+    at = grid_m(8, 24)
     even = painted_by(model, path, at, noise_um=0.0, repeats=1)
     film = even.readings.thickness_um * 80.0 / even.readings.thickness_um.mean()
     readings = film + 0.5 * np.random.default_rng(8).normal(size=len(film))
@@ -179,14 +179,9 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
 
 
 def test_an_assumed_noise_leaves_the_texture_assumed():
-    experiment = painted_by(DepositionModel(), passes([0.55, 1.35]), grid(), repeats=1)
+    experiment = painted_by(DepositionModel(), passes([0.55, 1.35]), grid_m(), repeats=1)
     study, _ = clean_and_fit(Campaign((experiment,)), DepositionModel(), starts=1)
     assert (study.texture.share, study.texture.source) == (0.01, 'assumed')
-
-
-def grid(columns: int = 5, rows: int = 14) -> np.ndarray:
-    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.1, 1.9, rows))
-    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
 
 
 MODEL, NOISE_UM, SCANNED = DepositionModel(), 0.4, 6000

@@ -32,7 +32,7 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.readings import Readings
 
 # Gauges are not to be trusted next to a free edge [m], and readings are spread out [m].
 EDGE_MARGIN_M = 0.012
@@ -128,7 +128,7 @@ def _tried(
     if film_um.mean() < PAINTED * study.measured_um.mean():
         return None
     noise_um = np.full(len(film_um), study.noise.typical_um)
-    new = _read(new, Readings.of(new.measured_points.positions_m, film_um, sigma_um=noise_um))
+    new = new.read_as(Readings.of(new.measured_points.positions_m, film_um, sigma_um=noise_um))
     together = _together(study, (*study.campaign.experiments, new))
     if len(together) != len(study) + len(film_um):
         return None
@@ -162,12 +162,6 @@ def _in_words(
         otherwise = '' if change.kind == 'standoff' else change.words
         what = f'{stand.words}; {otherwise}'.removesuffix('; ')
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
-
-
-def _read(experiment: Experiment, readings: Readings) -> Experiment:
-    """The experiment with other films read at the same places."""
-    return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
-                   used=np.ones(len(readings), dtype=bool))  # fmt: skip
 
 
 def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Place]:
@@ -224,4 +218,4 @@ def _with_candidates(study: Study, number: int, model: DepositionModel, seed: in
     new = experiment.with_readings(readings)
     film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(model)
     film_um[: len(here)] = readings.thickness_um[: len(here)]
-    return _read(new, replace(readings, thickness_um=film_um))
+    return new.read_as(replace(readings, thickness_um=film_um))

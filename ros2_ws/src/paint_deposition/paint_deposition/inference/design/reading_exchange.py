@@ -34,7 +34,7 @@ from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 
@@ -76,8 +76,7 @@ class UnmeasuredPart:
         neutral = tuple(shapes[0] for shapes in self.candidates.values())
         effects = (*self.model.effects, *neutral)
         film_um = Forward(Campaign((bare,)), effects).predict_um(self.model)
-        taken = replace(readings, thickness_um=film_um)
-        painted = replace(bare, readings=taken, means=PointMeans.of(taken), taken=taken)
+        painted = bare.read_as(replace(readings, thickness_um=film_um))
         return Study.of(Campaign((painted,)), effects)
 
     def fit(self, study: Study) -> Fit:
@@ -101,10 +100,6 @@ class UnmeasuredPart:
             *nonparametric_laws_of(study, fit.model),
         ]
         return EffectEvidence(null, found, freedom)
-
-
-# Step by which the power is differentiated, as a share.
-STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -197,7 +192,7 @@ def power(noncentrality: np.ndarray, tests: int) -> np.ndarray:
 
 def slope(noncentrality: np.ndarray, tests: int) -> np.ndarray:
     """(m,) derivative of ``power`` by the noncentrality."""
-    step = STEP * (STEP + noncentrality)
+    step = 1e-3 * (1e-3 + noncentrality)
     return (power(noncentrality + step, tests) - power(noncentrality, tests)) / step
 
 

@@ -93,6 +93,11 @@ class Experiment:
         )  # fmt: skip
         return replace(found, layer=self.layer, zones=self.zones)
 
+    def read_as(self, readings: Readings) -> 'Experiment':
+        """The part with other films read at the same points; nothing is matched anew."""
+        means, used = PointMeans.of(readings), np.ones(len(readings), dtype=bool)
+        return replace(self, readings=readings, means=means, taken=readings, used=used)
+
     def without(self, left_out: np.ndarray) -> 'Experiment':
         """The part without some of the readings (N,) that were used.
 
