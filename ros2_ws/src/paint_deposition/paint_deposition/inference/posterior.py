@@ -12,7 +12,7 @@ from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.model.coordinates import PATTERN
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-# What coordinates of a brush begin with, and its asymmetry over that of the first.
+# What coordinates of a brush begin with.
 BRUSH = 'brush_'
 REMEDY = 'copy the whole section from the file that was written, or take it out'
 

@@ -89,29 +89,25 @@ def _described(
     values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray, readings: int,
     mean_um: float,
 ) -> str:  # fmt: skip
-    incidence = values['incidence_deg'][region]
-    return (
-        f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} µm '
-        f'{"low" if mean_um > 0 else "high"}, incidence {incidence.min():.0f}-'
-        f'{incidence.max():.0f} deg'
-    )
-
-
-def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
-    """The thirds of the part's height, and the share of its width from the left, if not all."""
+    """The region by thirds of the part's height, share of its width from the left, and misfit."""
     low, high = np.quantile(values['height_fraction'][region], [0.1, 0.9])
     first, last = (int(min(2, max(0, 3 * value))) for value in (low, high))
     thirds = ['lower third', 'middle third', 'upper third'][first : last + 1]
-    vertical = 'full height' if len(thirds) == 3 else ' and '.join(thirds)
+    place = 'full height' if len(thirds) == 3 else ' and '.join(thirds)
     across = values['across_m']
     share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
     left, right = 100.0 * np.quantile(share, [0.1, 0.9])
     # A region that is wider than this share of its part [%] has no place across it, nor has one
     # of readings that all lie within so little [m].
-    if right - left > 60.0 or np.ptp(across[rows]) < 0.05:
-        return vertical
-    place = f'{left:.0f}' if right - left < 1.0 else f'{left:.0f} to {right:.0f}'
-    return f'{vertical} at {place} % of the width from the left'
+    if right - left <= 60.0 and np.ptp(across[rows]) >= 0.05:
+        from_left = f'{left:.0f}' if right - left < 1.0 else f'{left:.0f} to {right:.0f}'
+        place += f' at {from_left} % of the width from the left'
+    incidence = values['incidence_deg'][region]
+    return (
+        f'{place}, {readings} readings, model {abs(mean_um):.1f} µm '
+        f'{"low" if mean_um > 0 else "high"}, incidence {incidence.min():.0f}-'
+        f'{incidence.max():.0f} deg'
+    )
 
 
 def interpolation_matrix(

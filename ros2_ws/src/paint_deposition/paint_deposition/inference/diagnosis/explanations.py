@@ -128,7 +128,7 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
-# The same over all other conditions, and of a law of another form over its own covariates.
+# Relative error over all other conditions, and that of a law of another form over its own ones.
 OTHER_ERROR, OTHER_LAW = 0.3, 1.5
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7

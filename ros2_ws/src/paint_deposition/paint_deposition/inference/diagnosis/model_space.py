@@ -43,6 +43,7 @@ SURE = 0.7
 COARSENED = 2.0
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
+# Simulations behind a p-value.
 DRAWS = 1000
 # Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
 # the posterior is smaller: with more effects another footprint may be the more probable one.

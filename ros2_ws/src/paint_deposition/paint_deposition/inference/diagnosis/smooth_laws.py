@@ -25,7 +25,7 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 KNOTS, TIME_KNOTS = 12, 40
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
-# Steps between the knots of a map [m], and of the radius of a footprint.
+# Distance between the knots of a map [m], and number of them along the radius of a footprint.
 MAP_STEP_M, RADII = 0.06, 10
 # Angles at which a pattern is averaged.
 ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)

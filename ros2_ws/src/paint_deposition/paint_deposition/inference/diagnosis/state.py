@@ -38,6 +38,7 @@ from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
+# Starts of the first fit.
 STARTS = 10
 
 

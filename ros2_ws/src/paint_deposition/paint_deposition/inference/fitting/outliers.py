@@ -23,7 +23,7 @@ from scipy.special import expit, logsumexp
 from paint_deposition.inference.fitting.random_effects import field_over_values, root_of_field
 from paint_deposition.inference.readings.covariates import Covariate
 
-# The film's texture, as a share of it: what is usual, within a factor, and what is considered.
+# The film's texture, as a share of it: what is usual, within a factor of two, and what may be.
 USUAL_TEXTURE = 0.01
 TEXTURES = np.array([0.001, 0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.045])
 # Sizes of a field as a share of the film.

@@ -93,18 +93,16 @@ class _Repeats:
         scale = float(np.median(self.distance[order][own]) / ndtri(0.75))
         gross = self._beyond(scale, np.inf)
         for _ in range(20):
-            before, gross = gross, self._beyond(*self._pooled(~gross))
+            # The scale of the kept readings, pooled within points, and its degrees of freedom.
+            kept, before = ~gross, gross
+            count = np.bincount(self.owner, kept)
+            mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
+            freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)
+            squares = float(np.sum(kept * (self.scaled - mean[self.owner]) ** 2))
+            gross = self._beyond(np.sqrt(squares / freedom), freedom)
             if np.array_equal(before, gross):
                 break
         return gross
-
-    def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
-        """Pooled scale of the kept readings within points, and its degrees of freedom."""
-        count = np.bincount(self.owner, kept)
-        mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
-        freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)
-        squares = float(np.sum(kept * (self.scaled - mean[self.owner]) ** 2))
-        return np.sqrt(squares / freedom), freedom
 
     def _beyond(self, scale: float, freedom: float) -> np.ndarray:
         # Where the standard deviation is estimated from few repeats, the limit is the quantile of

@@ -9,7 +9,7 @@ from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import box_words
 from paint_deposition.part.surface import Surface
 
-# Readings further from the surface, or facing more away from it, do not belong to the part.
+# Readings further from the surface do not belong to the part.
 MAX_DISTANCE_M = 0.02
 # Ways in which a file may have been meant, by the factor on its positions.
 OTHER_UNITS = {
