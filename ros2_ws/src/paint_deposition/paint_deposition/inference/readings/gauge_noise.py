@@ -33,9 +33,7 @@ def gross_outliers(readings: Readings) -> np.ndarray:
     stated, gross = readings.sigma_um, np.zeros(len(readings), dtype=bool)
     for pool in (np.isnan(stated), np.isfinite(stated)):
         if pool.any():
-            own = readings.select(pool)
-            repeats = _Repeats(own.thickness_um, own.sigma_um, PointMeans.of(own).owner)
-            gross[pool] = repeats.gross()
+            gross[pool] = _gross(readings.select(pool))
     return gross
 
 
@@ -63,57 +61,46 @@ def _listed(thickness_um: np.ndarray) -> str:
     return ', '.join(f'{value:.4g}' for value in thickness_um)
 
 
-class _Repeats:
-    """Readings of one gauge at K points.
+def _gross(readings: Readings) -> np.ndarray:
+    """(N,) outliers of one gauge, from a robust scale and iterated until the set stays."""
+    owner = PointMeans.of(readings).owner
+    count = np.bincount(owner)
+    middle = median(readings.thickness_um, owner, np.arange(len(count)))[owner]
+    scaled = (readings.thickness_um - middle) / np.fmax(usual_noise_um(middle), readings.sigma_um)
+    # From the point's median, or from the other of two, over its usual error.
+    number = count[owner]
+    error = np.sqrt(number / np.maximum(number - 1, 1))
+    distance = np.where(number == 2, 2.0, 1.0) * np.abs(scaled) / error
 
-    Attributes:
-        owner: (N,) point of each reading. count: (K,) readings at each point.
-        scaled: (N,) readings over the usual noise at their point.
-        distance: (N,) from the point's median, or from the other of two, over its usual error.
-    """
-
-    def __init__(self, thickness_um: np.ndarray, stated_um: np.ndarray, owner: np.ndarray):
-        self.owner, self.count = owner, np.bincount(owner)
-        middle = median(thickness_um, owner, np.arange(len(self.count)))[owner]
-        usual = np.fmax(usual_noise_um(middle), stated_um)
-        number = self.count[owner]
-        self.scaled = (thickness_um - middle) / usual
-        reference = np.where(number == 2, 2.0, 1.0)
-        error = np.sqrt(number / np.maximum(number - 1, 1))
-        self.distance = reference * np.abs(self.scaled) / error
-
-    def gross(self) -> np.ndarray:
-        """(N,) outliers, from a robust scale and iterated until the set no longer changes."""
-        if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
-            return self._beyond(1.0, ASSUMED_FREEDOM)
-        order = np.lexsort((self.distance, self.owner))
-        # At each point one distance is redundant: half of a pair, or the median of three itself.
-        own = np.diff(self.owner[order], prepend=-1) == 0
-        # The median of the distances is consistent for normal noise.
-        scale = float(np.median(self.distance[order][own]) / ndtri(0.75))
-        gross = self._beyond(scale, np.inf)
-        for _ in range(20):
-            # The scale of the kept readings, pooled within points, and its degrees of freedom.
-            kept, before = ~gross, gross
-            count = np.bincount(self.owner, kept)
-            mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
-            freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)
-            squares = float(np.sum(kept * (self.scaled - mean[self.owner]) ** 2))
-            gross = self._beyond(np.sqrt(squares / freedom), freedom)
-            if np.array_equal(before, gross):
-                break
-        return gross
-
-    def _beyond(self, scale: float, freedom: float) -> np.ndarray:
+    def beyond(scale: float, freedom: float) -> np.ndarray:
         # Where the standard deviation is estimated from few repeats, the limit is the quantile of
         # Student's t that sound readings exceed once in ten thousand.
         sigmas = max(5.0, -float(stdtrit(freedom, 0.5e-4)))
         # At least this share of the usual noise: a display in whole um shows many repeats without
         # any scatter.
-        far = self.distance > sigmas * max(scale, 0.5)
-        outliers = np.bincount(self.owner, far)
-        undecided = 2.0 * outliers >= self.count
-        return far | ((outliers > 0.0) & undecided)[self.owner]
+        far = distance > sigmas * max(scale, 0.5)
+        outliers = np.bincount(owner, far)
+        undecided = 2.0 * outliers >= count
+        return far | ((outliers > 0.0) & undecided)[owner]
+
+    if len(owner) - len(count) < ENOUGH_REPEATS:
+        return beyond(1.0, ASSUMED_FREEDOM)
+    order = np.lexsort((distance, owner))
+    # At each point one distance is redundant: half of a pair, or the median of three itself.
+    own = np.diff(owner[order], prepend=-1) == 0
+    # The median of the distances is consistent for normal noise.
+    gross = beyond(float(np.median(distance[order][own]) / ndtri(0.75)), np.inf)
+    for _ in range(20):
+        # The scale of the kept readings, pooled within points, and its degrees of freedom.
+        kept, before = ~gross, gross
+        left = np.bincount(owner, kept)
+        mean = np.bincount(owner, kept * scaled) / np.maximum(left, 1.0)
+        freedom = max(float(np.maximum(left - 1.0, 0.0).sum()), 1.0)
+        squares = float(np.sum(kept * (scaled - mean[owner]) ** 2))
+        gross = beyond(np.sqrt(squares / freedom), freedom)
+        if np.array_equal(before, gross):
+            break
+    return gross
 
 
 @dataclass(frozen=True)
