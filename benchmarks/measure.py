@@ -24,14 +24,14 @@ from tests.virtual_paint_shop.truths import choose as choose_truths
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.procedure import diagnose
-from paint_deposition.inference.diagnosis.reading_choice import (
+from paint_deposition.inference.design.reading_choice import (
     ChosenReadings,
     choose,
     power_of,
     usable_places,
 )
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
+from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import PlanarPattern

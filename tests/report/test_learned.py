@@ -10,7 +10,7 @@ from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, LearnedMap, PartGrid
 from paint_deposition.inference.comparison.comparison import compare
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.page.learned import (

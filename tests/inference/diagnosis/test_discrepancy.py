@@ -15,6 +15,7 @@ from inference.diagnosis.readings_on_door import (
 )
 from paint_deposition.effects.learned.law import WAVES
 from paint_deposition.effects.library.tcp_offset import TcpOffset
+from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.diagnosis.discrepancy import (
     FINE_RADII,
     PRIOR,
@@ -22,7 +23,6 @@ from paint_deposition.inference.diagnosis.discrepancy import (
     painted_alike,
 )
 from paint_deposition.inference.diagnosis.smooth_laws import footprint_basis
-from paint_deposition.inference.diagnosis.sprays import MENU
 from paint_deposition.inference.fitting.study import Study
 
 # Parts of the study: a door, and a panel twice.

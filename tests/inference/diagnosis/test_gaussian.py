@@ -11,21 +11,16 @@ from inference.diagnosis.linear import (
     KNOWN,
     PARAMETERS,
     deviation,
-    fit_linear,
     linear_fit,
     null_of,
 )
 from inference.diagnosis.linear import prior_covariance as covariance_of
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.diagnosis.gaussian import (
     NullModel,
     OrthogonalDirections,
     simulated,
 )
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.model.eq1_pattern import PATTERN
 
 READINGS = 30
 
@@ -71,7 +66,7 @@ def test_the_null_model_has_the_covariance_of_pattern_nuisance_and_discrepancy(
         part = null.select(rows)
         expected = (covariance + discrepancy)[np.ix_(rows, rows)]
         assert part.lower @ part.lower.T == pytest.approx(expected)
-        assert part.lower @ part.deviation == pytest.approx(null.raw[rows])
+        assert part.lower @ part.deviation == pytest.approx(null.scaled_deviation[rows])
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 9.0])
@@ -84,27 +79,6 @@ def test_log_evidence_is_the_log_density_up_to_a_constant(fit, columns, discrepa
         density = log_density(data.T, null.lower @ null.lower.T, freedom)
         differences.append(density - null.log_evidence(null.whiten(data), freedom))
     assert np.ptp(differences) == pytest.approx(0.0, abs=1e-9)
-
-
-@pytest.mark.parametrize('of_the_pattern', [PARAMETERS, KNOWN], ids=['weak', 'known'])
-def test_what_an_effect_of_the_fit_adds_is_a_deviation_when_it_is_set_apart(of_the_pattern):
-    """Its directions are no longer the null's, and the data are compared with those without it."""
-    random = np.random.default_rng(5)
-    known = of_the_pattern.known
-    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(), known=known)
-    names = parameters.names[len(PATTERN) :]
-    assert set(names) == {'corner_slowdown.gain', 'corner_slowdown.length_m'}
-    prior = parameters.prior
-    jacobian = random.normal(size=(READINGS, len(parameters))) @ prior.whitening
-    jacobian[:, parameters.names.index('corner_slowdown.length_m')] = 0.0
-    data = jacobian @ (prior.centre + prior.factor @ random.normal(size=len(parameters)))
-    fit = fit_linear(jacobian, data, parameters)
-    apart = NullModel.around(fit, fit.nuisance, frozenset(['corner_slowdown']))
-    without = fit_linear(jacobian[:, : len(PATTERN)], data, of_the_pattern)
-    assert apart.raw == pytest.approx(deviation(without))
-    assert apart.lower @ apart.lower.T == pytest.approx(covariance_of(without))
-    kept = NullModel.around(fit, fit.nuisance)
-    assert kept.lower @ kept.lower.T == pytest.approx(covariance_of(fit))
 
 
 @pytest.mark.parametrize('side', [1.0, -1.0])
@@ -142,7 +116,7 @@ def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
     columns = fit.jacobian[:, rest] @ prior.factor[rest, rest]
     assert null.columns == pytest.approx(columns)
     away = (stopped.vector - prior.centre)[rest]
-    assert null.raw == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)
+    assert null.scaled_deviation == pytest.approx(fit.residual + fit.jacobian[:, rest] @ away)
 
 
 @pytest.mark.parametrize('freedom', [np.inf, 6.0])

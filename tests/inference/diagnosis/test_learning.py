@@ -27,7 +27,7 @@ from paint_deposition.inference.diagnosis.search import EffectSet, Search, Searc
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import root_mean_square
 
 POINTS, KNOTS = 80, 8
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
@@ -39,7 +39,7 @@ WAVY = Explanation(UNKNOWN, CHANGE, np.zeros(CHANGE.shape[1]), 1.0, random=CURVE
 def nulls(change: np.ndarray, **others: np.ndarray) -> NullModels:
     """Beside noise that a change (P,) has moved; for some kinds of law more (P, n) may vary."""
     base = null_of(linear_fit(np.random.default_rng(0), POINTS))
-    null = NullModel.of(base.columns, base.raw + change)
+    null = NullModel.of(base.columns, base.scaled_deviation + change)
     beside = {kind: null.beside(columns) for kind, columns in others.items()}
     kinds = ('footprint', 'correction', 'place', 'nonparametric_laws')
     return NullModels(**{kind: beside.get(kind, null) for kind in kinds})

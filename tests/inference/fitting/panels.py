@@ -81,6 +81,12 @@ def column(low_m=0.1, high_m=1.9, count=40, x_m=0.0) -> np.ndarray:
     return np.stack([np.full(count, x_m), np.zeros(count), z], axis=1)
 
 
+def grid_m(columns=5, rows=14, low_m=0.1, high_m=1.9) -> np.ndarray:
+    """(N, 3) points over the panel."""
+    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(low_m, high_m, rows))
+    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+
+
 ORDERS = ((0.3, 1.1, 0.7, 1.5), (1.5, 0.7, 1.1, 0.3))
 
 
@@ -97,15 +103,14 @@ def gauged(
         columns: of readings.
         orders: heights of the passes on each panel, in their order [m].
     """
-    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.03, 1.97, 20))
-    points_m = np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
+    points_m = grid_m(columns, 20, 0.03, 1.97)
     panels = []
     for number, heights_m in enumerate(orders):
         path, _ = spray_path(passes(heights_m, samples=80))
         integrator = FilmIntegrator(PANEL.at(points_m), model, 'double')
         integrator.add(path)
         random = np.random.default_rng([seed, 1 + number])
-        film_um = integrator.gauge_um * random.normal(1.0, TEXTURE_SHARE, x.size)
+        film_um = integrator.gauge_um * random.normal(1.0, TEXTURE_SHARE, len(points_m))
         readings = readings_at(points_m, film_um, noise_um=0.7, seed=seed + 100 * number)
         panels.append(Experiment.of(f'panel {number + 1}', PANEL, path, readings))
     return Campaign(tuple(panels))

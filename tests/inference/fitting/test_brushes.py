@@ -14,10 +14,10 @@ from paint_deposition.api.inference import calibrate, compare, diagnose
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
+from paint_deposition.inference.fitting.calibration import brush_figures
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
-from paint_deposition.inference.fitting.posterior import of_brushes
+from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inference.fitting.panels import PANEL, painted_by, passes
+from inference.fitting.panels import PANEL, grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
@@ -29,12 +29,6 @@ TRUTH = DepositionModel(
     )
 )
 SIGMA_UM = 0.15
-
-
-def grid_m(columns: int = 5, rows: int = 14) -> np.ndarray:
-    """(N, 3) points over the panel."""
-    x, z = np.meshgrid(np.linspace(-0.35, 0.35, columns), np.linspace(0.1, 1.9, rows))
-    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
 
 
 @pytest.fixture(scope='module')

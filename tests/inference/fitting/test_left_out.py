@@ -12,7 +12,7 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import root_mean_square
 
 BASE = DepositionModel()
 # Heights of the passes on each panel [m], and how much more paint it got than the model says.

@@ -11,7 +11,7 @@ from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.fitting.calibration import Calibration, calibrate
 from paint_deposition.inference.fitting.estimates import estimates
-from paint_deposition.inference.fitting.panel_fit import short_reaches
+from paint_deposition.inference.fitting.panel import short_reaches
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path

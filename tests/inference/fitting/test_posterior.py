@@ -1,23 +1,25 @@
-"""What one job told, as the prior of the next."""
+"""What one job told, as the prior of the next, and models drawn from it."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2, kstest
+from scipy.stats import chi2, kstest, truncnorm
 
 from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, linear_fit
 from inference.fitting.panels import painted_by, passes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
+from paint_deposition.errors import ModelError
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.posterior import (
     PatternShift,
-    fingerprints,
+    draw_models,
     posterior_of,
-    usable,
+    prior_for,
 )
+from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
@@ -67,17 +69,17 @@ def test_what_nothing_is_known_of_keeps_its_weak_prior():
 def test_no_reading_counts_twice(campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
-    assert posterior.readings == fingerprints(campaign)
-    known, remarks = usable(posterior, campaign)
+    (panel,) = campaign.experiments
+    assert posterior.readings == (panel.taken.fingerprint,)
+    known, remarks = prior_for(posterior, campaign)
     assert known is None
     assert 'panel' in remarks[0]
-    (panel,) = campaign.experiments
     thicker = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
     other = Campaign((replace(panel, taken=thicker),))
-    assert usable(posterior, other) == (posterior, ())
-    assert usable(None, campaign) == (None, ())
+    assert prior_for(posterior, other) == (posterior, ())
+    assert prior_for(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
-    assert posterior_of(later, other).readings == (*posterior.readings, *fingerprints(other))
+    assert posterior_of(later, other).readings == (*posterior.readings, thicker.fingerprint)
 
 
 def test_other_settings_of_the_process_are_told(campaign):
@@ -90,11 +92,11 @@ def test_other_settings_of_the_process_are_told(campaign):
     calibrated = Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
-    known, (remark,) = usable(posterior, at(voltage_kv=0.0, flow=1.01))
+    known, (remark,) = prior_for(posterior, at(voltage_kv=0.0, flow=1.01))
     assert known == posterior
     assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
-    assert usable(posterior, at(voltage_kv=61.0)) == (posterior, ())
-    assert usable(posterior, at()) == (posterior, ())
+    assert prior_for(posterior, at(voltage_kv=61.0)) == (posterior, ())
+    assert prior_for(posterior, at()) == (posterior, ())
 
 
 # How far a pattern moved from the calibration.
@@ -110,11 +112,8 @@ def moved_by(away: np.ndarray) -> PatternShift:
     return shift
 
 
-def test_nothing_known_is_no_distance():
+def test_the_calibrated_pattern_has_not_moved_and_without_one_there_is_no_distance():
     assert PatternShift.of(linear_fit(np.random.default_rng(0), 20, parameters=PARAMETERS)) is None
-
-
-def test_the_calibrated_pattern_has_not_moved():
     still = moved_by(np.zeros(len(PATTERN)))
     assert still.distance == pytest.approx(0.0)
     assert not still.is_alarming
@@ -138,3 +137,41 @@ def test_a_bell_of_another_kind_is_warned_of_by_what_differs_most():
     assert other.is_alarming
     assert 'most in r_m (+8.0)' in other.warning
     assert other.to_dict()['by_coordinate']['r_m'] == pytest.approx(8.0)
+
+
+COUNT = 4000
+GAIN = 'corner_slowdown.gain'
+MODEL = DepositionModel(effects=(CornerSlowdown(gain=0.1, length_m=0.1),))
+
+
+def known(means: dict[str, float], deviations: dict[str, float]) -> Posterior:
+    """Of a well known pattern but for these coordinates, all independent."""
+    centres = {c.name: c.centre for c in PATTERN} | {GAIN: 0.1} | means
+    rows = np.diag([deviations.get(name, 1e-4) ** 2 for name in centres])
+    return Posterior(mean=centres, covariance=dict(zip(centres, rows.tolist(), strict=True)))
+
+
+def test_draws_near_a_bound_follow_the_truncated_normal():
+    """The mean of what is left of the normal, not that of one whose tail lies at the bound."""
+    posterior = known({'K2': 0.05, GAIN: 0.1}, {'K2': 0.1, GAIN: 0.3})
+    models = draw_models(MODEL, posterior, COUNT, seed=1)
+    k2 = np.array([model.planar.K2 for model in models])
+    gain = np.array([model.effect('corner_slowdown').gain for model in models])
+    low, high = (CornerSlowdown.parameters()['gain'][end] for end in ('low', 'high'))
+    for values, mean, sd, ends in ((k2, 0.05, 0.1, (0.0, 1.0)), (gain, 0.1, 0.3, (low, high))):
+        told = truncnorm(*((end - mean) / sd for end in ends), loc=mean, scale=sd)
+        assert len(np.unique(values)) == COUNT
+        assert values.mean() == pytest.approx(told.mean(), abs=4.0 * told.std() / COUNT**0.5)
+        assert values.std() == pytest.approx(told.std(), rel=4.0 / (2 * COUNT) ** 0.5)
+
+
+def test_the_asymmetry_of_a_draw_is_at_most_one():
+    wide = known({'K3_cos_phi': 0.7}, {'K3_cos_phi': 0.3, 'K3_sin_phi': 0.6})
+    asymmetry = np.array([model.planar.K3 for model in draw_models(MODEL, wide, COUNT, seed=2)])
+    assert len(np.unique(asymmetry)) == COUNT
+    assert asymmetry.max() <= 1.0
+
+
+def test_a_posterior_that_is_nowhere_physical_is_refused():
+    with pytest.raises(ModelError, match='posterior: of 1000 draws 0 are within the bounds'):
+        draw_models(MODEL, known({'K2': -0.5}, {'K2': 0.01}), 1, seed=3)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from inference.diagnosis.linear import fit_linear
-from inference.fitting.panels import painted_by, passes
+from inference.fitting.panels import grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.random_effects import (
@@ -21,14 +21,9 @@ from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.model.eq1_pattern import PATTERN
 
 
-def grid_m() -> np.ndarray:
-    """(40, 3) points from the middle of the pass to where hardly any paint arrives."""
-    x, z = np.meshgrid(np.linspace(-0.35, 0.35, 4), np.linspace(1.0, 1.5, 10))
-    return np.stack([x.ravel(), np.zeros(x.size), z.ravel()], axis=1)
-
-
 def part(name: str, session: str = '') -> Experiment:
-    one = painted_by(DepositionModel(), passes([1.0]), grid_m())
+    """Read from the middle of the pass to where hardly any paint arrives."""
+    one = painted_by(DepositionModel(), passes([1.0]), grid_m(4, 10, 1.0, 1.5))
     readings = replace(one.readings, session=np.full(len(one.readings), session))
     return Experiment.of(name, one.surface, one.path, readings)
 

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from paint_deposition.inference.fitting.panel_fit import CollapseFit, fit_collapse
-from paint_deposition.inference.readings.panel import Panel
+from paint_deposition.inference.fitting.panel import CollapseFit, Panel, fit_collapse
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
 from paint_deposition.part.points import SurfacePoints

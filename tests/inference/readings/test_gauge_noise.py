@@ -15,9 +15,9 @@ from paint_deposition.inference.readings.gauge_noise import (
 from paint_deposition.inference.readings.readings import (
     PointMeans,
     Readings,
+    Residuals,
     require_repeats_close,
 )
-from paint_deposition.inference.readings.residuals import Residuals
 
 # Numbers of readings at each point.
 LAYOUTS = {'20 pairs': [2] * 20, 'mixed': [1] * 30 + [2] * 10 + [3] * 5 + [5] * 2}

@@ -54,7 +54,7 @@ from paint_deposition.inference.comparison.comparison import (
 from paint_deposition.inference.comparison.comparison import (
     SideBySide as SideBySide,
 )
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings as ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings as ChosenReadings
 from paint_deposition.inference.diagnosis.verdict import Diagnosis as Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration as Calibration
 from paint_deposition.inference.readings.campaign import Campaign as Campaign

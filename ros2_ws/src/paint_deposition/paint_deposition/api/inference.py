@@ -14,19 +14,18 @@ from paint_deposition.files.model_text import needs_file, source_of
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
+from paint_deposition.inference.design.next_experiment import with_proposals
+from paint_deposition.inference.design.reading_choice import ChosenReadings, choose
+from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import discrepancy_of
-from paint_deposition.inference.diagnosis.next_experiment import with_proposals
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose
 from paint_deposition.inference.diagnosis.refit import refit as refitted
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
-from paint_deposition.inference.fitting.brushes import with_brushes_of
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.inference.fitting.calibration import calibrate as calibrated
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.panel_fit import short_reaches
-from paint_deposition.inference.fitting.posterior import of_brushes
+from paint_deposition.inference.fitting.panel import short_reaches
+from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import require_paint

@@ -12,10 +12,8 @@ from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.model.eq1_pattern import PATTERN
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
-# Largest relative difference between two entries that should be the same.
-SAME = 1e-6
-# What coordinates of a brush begin with, and its asymmetry over that of the first.
-BRUSH, K3_RATIO = 'brush_', 'log_K3_ratio'
+# What coordinates of a brush begin with.
+BRUSH = 'brush_'
 REMEDY = 'copy the whole section from the file that was written, or take it out'
 
 
@@ -37,7 +35,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
     def of(
         names: Sequence[str], centre: np.ndarray, matrix: np.ndarray, **more: object
     ) -> 'Posterior':
-        """That of k coordinates with mean (k,) and covariance (k, k)."""
+        """Normal distribution of k coordinates with mean (k,) and covariance (k, k)."""
         mean = dict(zip(names, centre.tolist(), strict=True))
         return Posterior.model_validate(
             {'mean': mean, 'covariance': dict(zip(names, matrix.tolist(), strict=True))} | more
@@ -45,7 +43,7 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the k coordinates."""
+        """Names of the k coordinates."""
         return tuple(self.mean)
 
     @property
@@ -79,7 +77,8 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
                 )
         matrix = self.matrix
         scale = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
-        skew = np.abs(matrix - matrix.T) > SAME * scale
+        # Largest relative difference between two entries that should be the same.
+        skew = np.abs(matrix - matrix.T) > 1e-6 * scale
         if skew.any():
             i, j = np.argwhere(skew)[0]
             raise ValueError(
@@ -99,7 +98,9 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
             ModelError: naming the first one.
         """
         shared = [c.name for c in PATTERN]
-        known = [f'{BRUSH}{b.number}.{n}' for b in model.brushes for n in (*shared, K3_RATIO)]
+        known = [
+            f'{BRUSH}{b.number}.{n}' for b in model.brushes for n in (*shared, 'log_K3_ratio')
+        ]
         known += shared if len(model.brushes) <= 1 else []
         known += [f'{e.id}.{name}' for e in model.effects for name in e.coordinates().values()]
         for name in self.names:

@@ -12,11 +12,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 from paint_deposition.errors import PaintError, ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.film.colour_scales import ColourScale, residual_scale
-from paint_deposition.inference.comparison.residual_field import interpolation_matrix, reached
+from paint_deposition.inference.comparison.regions import interpolation_matrix, reached
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.gauge_noise import gauge_noise
 from paint_deposition.inference.readings.plausibility import readings_in_doubt, zeros_in_doubt
-from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.nodes.painting.film_display import legend
 from paint_deposition.nodes.painting.health import painting_tasks

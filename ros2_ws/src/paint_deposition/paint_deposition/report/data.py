@@ -19,7 +19,7 @@ from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
 from paint_deposition.report.writers.models import history_as_list
 

@@ -1,10 +1,13 @@
-"""Comparison of model and readings: residuals, their dependence on covariates, regions."""
+"""Comparison of model and readings: residuals, their dependence on covariates, zones.
+
+Zones stand beside their targets as on an acceptance sheet.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import combinations
-from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -12,118 +15,86 @@ from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.comparison.zone_readings import ZoneReadings, zone_readings
+from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
+from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
-from paint_deposition.inference.readings.residuals import Residuals
-
-# Regions are discs of these radii about a point [m], or bands of some sixths of the height.
-RADII_M = (0.08, 0.12, 0.18, 0.26, 0.36)
-BANDS = 6
-FEWEST = 2
-MOST_REGIONS = 6
-# A region that is wider than this share of its part has no place across it [%].
-MOST_OF_WIDTH = 60.0
-# Readings within this width have none [m].
-LEAST_WIDTH_M = 0.05
-# Significance level: the probability that noise alone gives a part any region.
-SIGNIFICANCE = 0.02
-DRAWS = 1000
-SEED = 0
+from paint_deposition.inference.readings.readings import Residuals
+from paint_deposition.part.zones import Zone
 
 
 @dataclass(frozen=True)
-class Region:
-    """Neighbouring points whose mean residual is significant."""
+class ZoneReadings:
+    """The readings of a zone of a part; figures are None where it has none."""
 
-    description: str  # in words, for a report
     experiment: str  # name
-    rows: np.ndarray  # (n,) points of the study
-    readings: int  # single readings at those points
-    mean_residual_um: float  # measured minus predicted [um]
+    name: str  # of the zone
+    target_um: float
+    tolerance_um: float
+    readings: int
+    mean_um: float | None = None  # measured
+    min_um: float | None = None
+    max_um: float | None = None
+    mean_predicted_um: float | None = None
+    within: float | None = None  # share of the readings within the tolerance, 0 to 1
+    # The reading furthest from the target, and its point.
+    worst_um: float | None = None
+    worst_point: str | None = None
+
+    @staticmethod
+    def of(experiment: str, zone: Zone, found: Residuals, points: np.ndarray) -> ZoneReadings:
+        """The readings (n,) of a zone, and the points (n,) where they were taken."""
+        wanted = experiment, zone.name, zone.target_um, zone.tolerance_um
+        measured = found.measured_um
+        if not len(measured):
+            return ZoneReadings(*wanted, 0)
+        off = np.abs(measured - zone.target_um)
+        return ZoneReadings(
+            *wanted, len(measured), float(measured.mean()), float(measured.min()),
+            float(measured.max()), float(found.predicted_um.mean()),
+            float(np.mean(off <= zone.tolerance_um)), float(measured[off.argmax()]),
+            str(points[off.argmax()]),
+        )  # fmt: skip
+
+    @property
+    def verdict(self) -> str:
+        """'accepted', how many readings are out, or that there are none."""
+        if self.within is None:
+            return 'not measured'
+        out = self.readings - round(self.within * self.readings)
+        return f'{out} of {self.readings} out' if out else 'accepted'
+
+    @property
+    def sentence(self) -> str:
+        """The zone in a line."""
+        band = f'{self.name}, {self.target_um:g} ± {self.tolerance_um:g} µm'
+        if self.within is None:
+            return f'{self.experiment}: {band}: no readings'
+        return (
+            f'{self.experiment}: {band}: {self.readings} readings, {self.mean_um:.1f} µm measured '
+            f'and {self.mean_predicted_um:.1f} µm predicted on average, '
+            f'{100 * self.within:.0f} % within, worst {self.worst_um:.1f} µm at {self.worst_point}'
+        )
 
     def to_dict(self) -> dict[str, Any]:
-        """An entry of ``regions`` in the files of results."""
-        names = ('description', 'experiment', 'readings', 'mean_residual_um')
-        return {name: getattr(self, name) for name in names}
+        """An entry of ``zones`` in the files of results."""
+        return asdict(self) | {'verdict': self.verdict}
 
 
-def misfit_regions(study: Study, points: Residuals, model: DepositionModel) -> list[Region]:
-    """Significant regions, strongest first.
-
-    Args:
-        points: residuals of the study's P points.
-        model: gives the incidence that the descriptions quote.
-    """
-    values = {c.name: c.values for c in study.covariates(model)}
-    random = np.random.default_rng(SEED)
-    found = []
-    for index, experiment in enumerate(study.campaign.experiments):
-        rows = np.flatnonzero(study.campaign.experiment_of == index)
-        places = _windows(study.campaign.positions_m[rows], values['height_fraction'][rows])
-        if not len(places):
+def zone_readings(campaign: Campaign, readings: Residuals) -> tuple[ZoneReadings, ...]:
+    """The zones of each experiment, by the residuals of all N readings used."""
+    owner, found = campaign.experiment_of[campaign.means.owner], []
+    for number, experiment in enumerate(campaign.experiments):
+        of, own = experiment.zones_of_points, readings.select(owner == number)
+        if of is None:
             continue
-        noise = np.abs(places @ random.normal(size=(len(rows), DRAWS))).max(axis=0)
-        threshold = float(np.quantile(noise, 1.0 - SIGNIFICANCE))
-        left = points.residual_um[rows] / points.sigma_um[rows]
-        for _ in range(MOST_REGIONS):
-            scores = places @ left
-            best = int(np.argmax(np.abs(scores)))
-            if abs(scores[best]) < threshold:
-                break
-            members = places[best] > 0.0
-            region = rows[members]
-            readings = int(study.campaign.means.repeats[region].sum())
-            mean = float(np.mean(points.residual_um[region]))
-            words = _described(values, region, rows, readings, mean)
-            described = Region(words, experiment.name, region, readings, mean)
-            found.append((-abs(scores[best]), described))
-            # The next region is sought among the other points.
-            left = np.where(members, 0.0, left)
-    return [region for _, region in sorted(found, key=itemgetter(0))]
-
-
-def _windows(positions_m: np.ndarray, height: np.ndarray) -> np.ndarray:
-    """(W, P) windows over the points: discs about each and bands of height, of unit length.
-
-    A window's product with independent deviations is standard normal, so the largest over all
-    windows can be compared with that of noise (spatial scan: Kulldorff 1997).
-    """
-    distance = np.linalg.norm(positions_m[:, np.newaxis] - positions_m[np.newaxis], axis=2)
-    discs = [distance < radius for radius in RADII_M]
-    ends = combinations(np.linspace(0.0, 1.0, BANDS + 1), 2)
-    bands = [(height >= low) & (height <= high) for low, high in ends]
-    members = np.unique(np.vstack([*discs, *bands]), axis=0).astype(float)
-    count = members.sum(axis=1, keepdims=True)
-    enough = (count[:, 0] >= FEWEST) & (count[:, 0] < len(positions_m))
-    return (members / np.sqrt(np.maximum(count, 1.0)))[enough]
-
-
-def _described(
-    values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray, readings: int,
-    mean_um: float,
-) -> str:  # fmt: skip
-    incidence = values['incidence_deg'][region]
-    return (
-        f'{_place(values, region, rows)}, {readings} readings, model {abs(mean_um):.1f} µm '
-        f'{"low" if mean_um > 0 else "high"}, incidence {incidence.min():.0f}-'
-        f'{incidence.max():.0f} deg'
-    )
-
-
-def _place(values: dict[str, np.ndarray], region: np.ndarray, rows: np.ndarray) -> str:
-    """The thirds of the part's height, and the share of its width from the left, if not all."""
-    low, high = np.quantile(values['height_fraction'][region], [0.1, 0.9])
-    first, last = (int(min(2, max(0, 3 * value))) for value in (low, high))
-    thirds = ['lower third', 'middle third', 'upper third'][first : last + 1]
-    vertical = 'full height' if len(thirds) == 3 else ' and '.join(thirds)
-    across = values['across_m']
-    share = (across[region] - across[rows].min()) / max(np.ptp(across[rows]), 1e-9)
-    left, right = 100.0 * np.quantile(share, [0.1, 0.9])
-    if right - left > MOST_OF_WIDTH or np.ptp(across[rows]) < LEAST_WIDTH_M:
-        return vertical
-    place = f'{left:.0f}' if right - left < 1.0 else f'{left:.0f} to {right:.0f}'
-    return f'{vertical} at {place} % of the width from the left'
+        points = experiment.readings.point
+        for k, zone in enumerate(of.zones.zones):
+            inside = (of.number == k)[experiment.means.owner]
+            found.append(
+                ZoneReadings.of(experiment.name, zone, own.select(inside), points[inside])
+            )
+    return tuple(found)
 
 
 @dataclass(frozen=True)

@@ -18,18 +18,6 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import STANDING_COSINE, across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
-# Model lines are drawn through points this close along the surface [m].
-LINE_STEP_M = 0.01
-# Beyond the first and last reading lines go on for as far as readings are apart, but not off the
-# surface by more [m].
-OFF_SURFACE_M = 0.003
-# Between readings a line breaks where it is this far off the surface, at a cut-out say, or where
-# the nearest surface faces another way, a hem say.
-OFF_SKIN_M, SKIN_COSINE = 0.02, 0.5
-# Readings without rows or columns are shown in strips of the part, about this many to a strip.
-READINGS_A_STRIP = 20
-MOST_STRIPS = 6
-
 
 @dataclass(frozen=True)
 class Profile:
@@ -59,7 +47,7 @@ def profiles_of(study: Study, models: Sequence[DepositionModel]) -> list[Profile
     """
     found, first = [], 0
     for experiment in study.campaign.experiments:
-        for line in list(_grouped(experiment)) or list(_strips(experiment)):
+        for line in _lines(experiment):
             profile = _profile(experiment, models, *line)
             found.append(replace(profile, rows=first + profile.rows))
         first += len(experiment)
@@ -92,19 +80,28 @@ def _axes(surface: Surface) -> tuple[Axis, Axis]:
     return Axis(words, up, float((surface.vertices_m @ up).min())), across
 
 
-def _coordinates(experiment: Experiment) -> tuple[np.ndarray, np.ndarray]:
-    """(P,) of the points up the part and across it [m]."""
+def _lines(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
+    """Label and members of each group or, without any, of strips that cross the passes.
+
+    With each: whether it is longer upright than across, and whether it is a strip.
+    """
     up, across = _axes(experiment.surface)
     positions_m = experiment.measured_points.positions_m
-    return up.of(positions_m), across.of(positions_m)
-
-
-def _grouped(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
-    """Label and members of each group, and whether it is longer upright than across."""
-    height_m, across_m = _coordinates(experiment)
-    for label in sorted({str(g) for g in experiment.groups if g}, key=_natural):
+    height_m, across_m = up.of(positions_m), across.of(positions_m)
+    labels = sorted({str(g) for g in experiment.groups if g}, key=_natural)
+    for label in labels:
         members = np.flatnonzero(experiment.groups == label)
         yield label, members, np.ptp(height_m[members]) >= np.ptp(across_m[members]), False
+    if labels:
+        return
+    upright = passes_are_level(experiment.path, experiment.surface.down)
+    aside, what = (across_m, 'across') if upright else (height_m, 'height')
+    # About twenty readings to a strip, in six strips at the most.
+    count = int(np.clip(round(len(aside) / 20), 1, 6))
+    for part in np.array_split(np.argsort(aside, kind='stable'), count):
+        ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
+        label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
+        yield label, part, upright, True
 
 
 def _natural(label: str) -> tuple:
@@ -113,23 +110,11 @@ def _natural(label: str) -> tuple:
     return (label.rstrip('0123456789'), int(digits[-1]) if digits else 0, label)
 
 
-def _strips(experiment: Experiment) -> Iterator[tuple[str, np.ndarray, bool, bool]]:
-    """Strips that cross the passes, each with about as many readings."""
-    upright = passes_are_level(experiment.path, experiment.surface.down)
-    height_m, across_m = _coordinates(experiment)
-    aside, what = (across_m, 'across') if upright else (height_m, 'height')
-    count = int(np.clip(round(len(aside) / READINGS_A_STRIP), 1, MOST_STRIPS))
-    for part in np.array_split(np.argsort(aside, kind='stable'), count):
-        ends = 1e3 * aside[part].min(), 1e3 * aside[part].max()
-        label = f'{what} {ends[0]:.0f} to {ends[1]:.0f} mm' if count > 1 else 'all readings'
-        yield label, part, upright, True
-
-
 def _profile(
     experiment: Experiment, models: Sequence[DepositionModel], label: str, members: np.ndarray,
     upright: bool, is_strip: bool,
 ) -> Profile:  # fmt: skip
-    """Of some of an experiment's points, in order upright or across."""
+    """Profile of some of an experiment's points, in order upright or across."""
     up, across = _axes(experiment.surface)
     axis, other = (up, across) if upright else (across, up)
     along = axis.of(experiment.measured_points.positions_m[members])
@@ -153,7 +138,8 @@ def _film_along(
     """Positions, films of the models and of each pass alone, through places and normals (n, 3)."""
     low, high = position_m[[0, -1]]
     beyond = (high - low) / (len(position_m) - 1)
-    steps = max(2, int(np.ceil((high - low + 2.0 * beyond) / LINE_STEP_M)) + 1)
+    # Model lines are drawn through points this close along the surface [m].
+    steps = max(2, int(np.ceil((high - low + 2.0 * beyond) / 0.01)) + 1)
     at = np.unique(np.concatenate([np.linspace(low - beyond, high + beyond, steps), position_m]))
     line = np.column_stack([
         np.interp(at, position_m, column) for column in np.hstack([places, normals]).T
@@ -162,10 +148,13 @@ def _film_along(
         way = axis.direction - (axis.direction @ normals[end]) * normals[end]
         way /= way @ axis.direction
         line[outside, :3] += np.outer(at[outside] - position_m[end], way)
+    # Beyond the first and last reading lines go on for as far as readings are apart, but not off
+    # the surface by more than 3 mm. Between readings they break where they are 20 mm off it, at a
+    # cut-out say, or where the nearest surface faces another way, a hem say.
     nearest = experiment.surface.locate(line[:, :3], line[:, 3:])
     between, off_m = (low <= at) & (at <= high), nearest.distance_m
-    facing = np.einsum('ij,ij->i', nearest.normals, line[:, 3:]) > SKIN_COSINE
-    on = facing & (off_m < np.where(between, OFF_SKIN_M, OFF_SURFACE_M))
+    facing = np.einsum('ij,ij->i', nearest.normals, line[:, 3:]) > 0.5
+    on = facing & (off_m < np.where(between, 0.02, 0.003))
     at, line, on = at[between | on], line[on], on[between | on]
     slopes = any(effect.needs_slope for model in models for effect in model.effects)
     points = experiment.surface.at(line[:, :3], line[:, 3:], STENCIL_M if slopes else None)

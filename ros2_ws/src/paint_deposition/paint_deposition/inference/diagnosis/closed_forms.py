@@ -19,15 +19,8 @@ from scipy.stats import chi2
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.curves import LearnedCurve
 
-# A form whose deviations are as improbable as this does not fit.
-IMPROBABLE = 0.001
-# Forms below this probability are not listed.
-FAINT = 0.01
 # So many knots count at least, where they are off alike: one more than a form's parameters.
 LEAST_KNOTS = 5
-# A power of a value so small beside the largest has no form that readings could tell.
-NEAR_ZERO = 0.02
-TWO_SIDED_95 = 1.96
 
 
 @dataclass(frozen=True)
@@ -65,7 +58,7 @@ class ClosedForm:
         return law(x, *(found.value for found in self.parameters.values()))
 
     def to_dict(self) -> dict[str, Any]:
-        """As ``diagnosis.json`` has it."""
+        """An entry of ``forms`` in ``diagnosis.json``."""
         shown = {
             name: {'value': found.value, 'low': found.low, 'high': found.high}
             for name, found in self.parameters.items()
@@ -86,13 +79,14 @@ class _Shape:
 
 
 _CHANGE = _Shape(0, 'change in all', starts=(-0.3, 0.3))
-_RATE = _Shape(-1, 'rate of the exponential')
-_EXPONENT = _Shape(0, 'exponent of the power', bounds=(-8.0, 8.0))
 # Forms by name: how they change the level, and their parameters. Those that are multiplied have
 # the level as a factor; the others are added to it, to 1 times it where the law is a factor.
 MULTIPLIED = {
-    'power': ('exp({exponent} * log(x / {x0}))', {'exponent': _EXPONENT}),
-    'exponential': ('exp({rate} * (x - {x0}))', {'rate': _RATE}),
+    'power': (
+        'exp({exponent} * log(x / {x0}))',
+        {'exponent': _Shape(0, 'exponent of the power', bounds=(-8.0, 8.0))},
+    ),
+    'exponential': ('exp({rate} * (x - {x0}))', {'rate': _Shape(-1, 'rate of the exponential')}),
 }
 ADDED = {
     'linear': ('{slope} * (x - {x0})', {'slope': _Shape(-1, 'slope')}),
@@ -120,7 +114,6 @@ ADDED = {
 FORMS: dict[str, tuple[str, dict[str, _Shape]]] = {'constant': ('', {})} | MULTIPLIED | ADDED
 # What a form need not say where it is about 0 or 1.
 IDLE = {'(x - 0.0)': 'x', '(0.0 - x)': '-x', '(0.0 + ': '(', '(x / 1.0)': '(x)'}
-POSITIVE = ('power', 'inverse')
 
 
 def variable(law: type[LearnedCurve]) -> tuple[str, str]:
@@ -143,13 +136,11 @@ def at_knots(law: LearnedCurve) -> np.ndarray:
     return variable_at(law, np.interp(law.knots, law.axis(many), many))
 
 
+@cache
 def forms_of(law: Effect | None) -> tuple[ClosedForm, ...]:
     """The closed forms that fit a learned curve; none for any other effect."""
-    return _of_curve(law) if isinstance(law, LearnedCurve) and law.sd else ()
-
-
-@cache
-def _of_curve(law: LearnedCurve) -> tuple[ClosedForm, ...]:
+    if not isinstance(law, LearnedCurve) or not law.sd:
+        return ()
     name, unit = variable(type(law))
     value, addition = np.array(law.learned), law.kind == 'addition'
     value = value if addition else 1.0 + value
@@ -179,15 +170,20 @@ def fitting_forms(
     sd = np.maximum(sd, 1e-9)
     fits = [fit for form in FORMS for fit in _fitted(form, x, value, sd, unit, addition)]
     deviation = min((fit.fun for _, _, fit in fits), key=lambda z: float(z @ z))
-    knots = _independent(deviation)
+    # So many independent values stand behind deviations that are alike in neighbours.
+    square = float(deviation @ deviation)
+    alike = float(deviation[1:] @ deviation[:-1]) / square if square > 0.0 else 0.0
+    knots = float(np.clip(len(x) * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, len(x)))
     weight = knots / len(x)
     misfit = np.array([weight * float(fit.fun @ fit.fun) for _, _, fit in fits])
     count = np.array([len(fit.x) for _, _, fit in fits])
     criterion = misfit + count * np.log(knots)
     evidence = np.exp(-0.5 * (criterion - criterion.min()))
     probability = evidence / evidence.sum()
-    sound = chi2.sf(misfit, np.maximum(knots - count, 1.0)) > IMPROBABLE
-    sound &= (probability > FAINT) & (criterion < criterion[0])
+    # A form whose deviations are as improbable as this does not fit, and a faint one is not
+    # listed.
+    sound = chi2.sf(misfit, np.maximum(knots - count, 1.0)) > 0.001
+    sound &= (probability > 0.01) & (criterion < criterion[0])
     return tuple(
         _described(fits[k], float(probability[k]), weight, name, unit, addition)
         for k in np.argsort(-probability)
@@ -195,20 +191,13 @@ def fitting_forms(
     )
 
 
-def _independent(deviation: np.ndarray) -> float:
-    """How many independent values stand behind deviations (K,) that are alike in neighbours."""
-    square = float(deviation @ deviation)
-    alike = float(deviation[1:] @ deviation[:-1]) / square if square > 0.0 else 0.0
-    count = len(deviation)
-    return float(np.clip(count * (1.0 - alike) / (1.0 + alike), LEAST_KNOTS, count))
-
-
 def _fitted(
     form: str, x: np.ndarray, value: np.ndarray, sd: np.ndarray, unit: str, addition: bool
 ) -> Iterator[tuple[str, str, Any]]:
     """Name, code and the best fit of a form; none where it cannot be, or ends at a bound."""
     span = float(np.ptp(x))
-    if form in POSITIVE and x.min() < NEAR_ZERO * x.max():
+    # A power of a value so small beside the largest has no form that readings could tell.
+    if form in ('power', 'inverse') and x.min() < 0.02 * x.max():
         return
     code, shapes = _code(form, x, unit, addition), FORMS[form][1].values()
     law = _compiled(code, _names(form, unit, addition))
@@ -238,7 +227,8 @@ def _described(
     name: str, unit: str, addition: bool,
 ) -> ClosedForm:  # fmt: skip
     form, code, fit = fitted
-    half = TWO_SIDED_95 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
+    # The 95 % interval.
+    half = 1.96 * np.sqrt(np.diag(np.linalg.pinv(fit.jac.T @ fit.jac)) / weight)
     level = _Shape(0, 'level of the law; the pattern can take it up', 'amplitude')
     parameters = {}
     for key, shape, value, away in zip(

@@ -25,7 +25,7 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
     footprint_basis,
 )
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.smooth_fields import smooth
+from paint_deposition.inference.fitting.random_effects import smooth
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PlanarPattern
@@ -40,8 +40,8 @@ class DiscrepancyPrior:
     twentieth of it), and 40 panels of clearcoat. Shares are standard deviations.
     """
 
-    # Shares of its peak by which the footprint may deviate at any place. What readings allow a
-    # footprint to show as well is no effect; they also tell how far it goes.
+    # Shares of its peak by which the footprint may deviate at any place. What a footprint explains
+    # as well is not taken for an effect; the readings tell which share it is.
     footprints: tuple[float, ...] = (0.02, 0.06, 0.2)
     # The same for the difference between its two sides: 0.5 to 2 % were measured.
     sides: float = 0.02
@@ -71,11 +71,6 @@ class DiscrepancyPrior:
 PRIOR = DiscrepancyPrior()
 # Knots along the radius of a footprint.
 FINE_RADII = 20
-# Distance between parts that share no field, and step of the pattern's sideways move [m].
-FAR_M, STEP_M = 1e6, 1e-3
-# Paths that keep within this distance [m], angle [rad] and share of the time are the same.
-# They are compared at this many places.
-SAME_PATH_M, SAME_TURN_RAD, SAME_TIME, PLACES = 0.01, 0.05, 0.1, 32
 
 
 @dataclass(frozen=True)
@@ -178,7 +173,8 @@ class ModelDiscrepancy:
         lengths_m = tuple(length * _width_m(model) for length in PRIOR.lengths)
 
         def field(of: np.ndarray, size: np.ndarray, length_m: float) -> np.ndarray:
-            places = np.column_stack([campaign.positions_m, FAR_M * of])
+            # Parts that are this far from each other share no field [m].
+            places = np.column_stack([campaign.positions_m, 1e6 * of])
             return np.outer(size, size) * smooth(cdist(places, places) / length_m)
 
         return ModelDiscrepancy(
@@ -193,7 +189,7 @@ class ModelDiscrepancy:
         )
 
     def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':
-        """The same where pattern and place of a spray vary as around another fit."""
+        """The discrepancy where pattern and place of a spray vary as around another fit."""
         return replace(self, shapes=_shapes(study, fit, self.setting_of))
 
     def choices(self) -> list[DiscrepancyHyperparameters]:
@@ -219,7 +215,7 @@ class ModelDiscrepancy:
         ]
 
     def usual(self, sizes: DiscrepancyHyperparameters) -> DiscrepancyHyperparameters:
-        """The same with settings and parts that differ by as much as usual sprays do at most."""
+        """Hyperparameters with settings and parts that differ by the most that usual sprays do."""
         return replace(
             sizes, setting=PRIOR.most_usual, part=PRIOR.most_usual if sizes.part else 0.0
         )
@@ -246,7 +242,7 @@ def _log_prior(value: float, usual: float, factor: float) -> float:
 def _flux_and_tails(
     patterns: Sequence[PlanarPattern], reach_m: float, radii: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Of a footprint (radii,) mean flux over the peak's, and at its K knots (K, 2) its changes.
+    """Mean flux (radii,) of a footprint over the peak's, and its changes (K, 2) at K knots.
 
     The latter are relative, as the tails of ring and centre become shorter or longer: a Gaussian
     exp(-u) becomes exp(-u^p), and its derivative by the power p is -u log u of itself.
@@ -283,11 +279,12 @@ def _shapes(study: Study, fit: Fit, group: np.ndarray) -> np.ndarray:
 
 def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
     """(P, 2) change of the readings as the pattern moves along the tool's x and y [um/m]."""
+    step_m = 1e-3
     here = study.forward.predict_um(model)
     offset = model.effect('tcp_offset') or TcpOffset()
     moved = []
     for name in ('offset_x_m', 'offset_y_m'):
-        step = -STEP_M if getattr(offset, name) > 0.0 else STEP_M
+        step = -step_m if getattr(offset, name) > 0.0 else step_m
         shifted = offset.model_copy(update={name: getattr(offset, name) + step})
         moved.append((study.forward.predict_um(model.with_effect(shifted)) - here) / step)
     return np.stack(moved, axis=1)
@@ -295,15 +292,13 @@ def _sideways(study: Study, model: DepositionModel) -> np.ndarray:
 
 def _width_m(model: DepositionModel) -> float:
     """Root mean square radius of the widest pattern [m]."""
-    return max(_rms_radius_m(pattern) for pattern in model.patterns)
-
-
-def _rms_radius_m(pattern: PlanarPattern) -> float:
-    """Root mean square radius of a pattern [m]."""
-    reach = pattern.r_m + 5.0 * max(pattern.sigma1_m, pattern.sigma2_m)
-    x = np.linspace(-reach, reach, 81)
-    flux = pattern.flux_um_per_s(x[:, np.newaxis], x)
-    return float(np.sqrt(np.sum(flux * (x[:, np.newaxis] ** 2 + x**2)) / flux.sum()))
+    widths = []
+    for pattern in model.patterns:
+        reach = pattern.r_m + 5.0 * max(pattern.sigma1_m, pattern.sigma2_m)
+        x = np.linspace(-reach, reach, 81)
+        flux = pattern.flux_um_per_s(x[:, np.newaxis], x)
+        widths.append(np.sqrt(np.sum(flux * (x[:, np.newaxis] ** 2 + x**2)) / flux.sum()))
+    return float(max(widths))
 
 
 def painted_alike(experiments: Sequence[Experiment]) -> np.ndarray:
@@ -323,16 +318,18 @@ def _alike(first: Experiment, second: Experiment) -> bool:
     if sameness(first) != sameness(second):
         return False
     clocks = [np.cumsum(e.path.flow * e.path.dwell_s) for e in (first, second)]
-    if abs(clocks[0][-1] - clocks[1][-1]) > SAME_TIME * clocks[0][-1]:
+    # Paths are the same that keep within a share of the time, a distance [m] and an angle [rad].
+    if abs(clocks[0][-1] - clocks[1][-1]) > 0.1 * clocks[0][-1]:
         return False
+    # They are compared at so many places.
     rows = [
-        np.searchsorted(clock, np.linspace(0.0, clock[-1], PLACES)).clip(0, len(clock) - 1)
+        np.searchsorted(clock, np.linspace(0.0, clock[-1], 32)).clip(0, len(clock) - 1)
         for clock in clocks
     ]
     places = [e.path.position_m[r] for e, r in zip((first, second), rows, strict=True)]
     turns = [e.path.rotation[r] for e, r in zip((first, second), rows, strict=True)]
     return bool(
-        np.abs(places[0] - places[1]).max() < SAME_PATH_M
-        and np.abs(turns[0] - turns[1]).max() < SAME_TURN_RAD
-        and np.abs(first.surface.down - second.surface.down).max() < SAME_TURN_RAD
+        np.abs(places[0] - places[1]).max() < 0.01
+        and np.abs(turns[0] - turns[1]).max() < 0.05
+        and np.abs(first.surface.down - second.surface.down).max() < 0.05
     )

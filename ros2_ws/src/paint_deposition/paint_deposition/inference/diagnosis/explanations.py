@@ -25,13 +25,11 @@ from paint_deposition.inference.diagnosis.smooth_laws import (
 )
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit
-from paint_deposition.inference.fitting.smooth_fields import field_over_values
+from paint_deposition.inference.fitting.random_effects import field_over_values
 from paint_deposition.inference.fitting.study import Study
 
 # Amplitudes are stepped by this share of their typical size.
 STEP = 0.25
-# Values that are tried for each shape parameter.
-SHAPES = 5
 
 
 @dataclass(frozen=True)
@@ -74,9 +72,7 @@ def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     """The effect at neutral amplitude, for a few values of its shape parameters."""
     info = effect.parameters()
     shapes = [name for name in info if info[name]['role'] == 'shape']
-    grids = [
-        np.geomspace(info[name]['low'], info[name]['high'], SHAPES + 2)[1:-1] for name in shapes
-    ]
+    grids = [np.geomspace(info[name]['low'], info[name]['high'], 7)[1:-1] for name in shapes]
     return [
         effect(**dict(zip(shapes, map(float, values), strict=True))) for values in product(*grids)
     ]
@@ -131,10 +127,8 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 # Relative error of a law, as a standard deviation, and its length of correlation in standard
 # deviations of the covariate.
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
-# The same over all other conditions, and of a law of another form over its own covariates.
+# Relative error over all other conditions, and that of a law of another form over its own ones.
 OTHER_ERROR, OTHER_LAW = 0.3, 1.5
-# The size of an effect is what it changes at this share of the points at the most.
-LARGEST = 0.95
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
@@ -167,7 +161,7 @@ class Explanation:
         return self.random.basis.law.covariate if self.random else ''
 
     def select(self, rows: np.ndarray) -> 'Explanation':
-        """The same for some of the readings; its law stays that of all."""
+        """The explanation for some of the readings; its law stays that of all."""
         return replace(self, columns=self.columns[rows])
 
 
@@ -331,15 +325,13 @@ def _laws_off(
         for name in own:
             curves = effect.free_law and name in CURVES
             if basis := curve_basis(study, model, name, effect.free_law) if curves else None:
-                relative = change if effect.free_law == 'addition' else _share(change, film)
-                size = scale * float(np.quantile(np.abs(relative), LARGEST))
+                relative = change
+                if effect.free_law != 'addition':
+                    relative = np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)
+                # The size of an effect is what it changes at this share of the points at the most.
+                size = scale * float(np.quantile(np.abs(relative), 0.95))
                 curve = basis.random(size, LAW_LENGTH)
                 yield effect, study.has(type(effect))[:, np.newaxis] * curve.change_um, curve
             else:
                 root = field_over_values(covariates[name], LAW_LENGTH, NEGLIGIBLE)
                 yield effect, scale * change[:, np.newaxis] * root, None
-
-
-def _share(change: np.ndarray, film: np.ndarray) -> np.ndarray:
-    """(P,) change over the film, 0 where there is none."""
-    return np.divide(change, film, out=np.zeros_like(film), where=film > 0.0)

@@ -15,11 +15,6 @@ from scipy.special import log_ndtr
 
 from paint_deposition.inference.fitting.least_squares import Fit, covariance_factor
 
-# An entry of a fit this close to a bound has been stopped by it.
-AT_BOUND = 1e-6
-# A direction whose squared length, in standard deviations, is less cannot be seen.
-UNSEEN = 1e-9
-
 
 @dataclass(frozen=True)
 class NullModel:
@@ -29,7 +24,7 @@ class NullModel:
     # the noise.
     columns: np.ndarray
     # (P,) deviations over the noise from the base model at the centre of its priors.
-    raw: np.ndarray
+    scaled_deviation: np.ndarray
     # (P, P) covariance of the discrepancy, or None if nothing is.
     discrepancy: np.ndarray | None
     lower: np.ndarray  # (P, P) Cholesky factor of the deviations' covariance
@@ -37,18 +32,17 @@ class NullModel:
 
     @staticmethod
     def of(
-        columns: np.ndarray, raw: np.ndarray, discrepancy: np.ndarray | None = None
+        columns: np.ndarray, scaled_deviation: np.ndarray, discrepancy: np.ndarray | None = None
     ) -> 'NullModel':
         """From directions (P, m), deviations (P,) and what is left over."""
         lower = covariance_factor(columns, discrepancy)
-        deviation = solve_triangular(lower, raw, lower=True, check_finite=False)
-        return NullModel(columns, raw, discrepancy, lower, deviation)
+        deviation = solve_triangular(lower, scaled_deviation, lower=True, check_finite=False)
+        return NullModel(columns, scaled_deviation, discrepancy, lower, deviation)
 
     @staticmethod
     def around(
         fit: Fit,
         nuisance: np.ndarray,
-        apart: frozenset[str] = frozenset(),
         discrepancy: np.ndarray | None = None,
     ) -> 'NullModel':
         """Linear around a fit, with nuisance directions (P, n) over the noise.
@@ -56,33 +50,27 @@ class NullModel:
         Args:
             fit: of the model.
             nuisance: directions that carry no meaning.
-            apart: ids of effects in it that the null hypothesis does not have: what they
-                contribute to the film counts as deviation.
             discrepancy: (P, P) covariance of the discrepancy.
         """
-        prior, entries = fit.parameters.prior, fit.parameters.of_effects
-        pattern = len(fit.vector) - len(entries)
-        kept = np.array([True] * pattern + [entry.effect not in apart for entry in entries])
+        prior = fit.parameters.prior
         # What the fit has driven to a bound of physics does not go on beyond it.
-        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=AT_BOUND)
+        ends = np.isclose(fit.vector, fit.parameters.bounds, rtol=0.0, atol=1e-6)
         free = ~ends.any(axis=0)
-        # The shape of an effect that is not there contributes nothing; its amplitude does.
-        shape = np.array([False] * pattern + [entry.is_shape for entry in entries])
-        counted = free & (kept | ~shape)
-        kept &= free
-        raw = fit.residual + fit.jacobian[:, counted] @ (fit.vector - prior.centre)[counted]
-        directions = fit.jacobian[:, kept] @ prior.factor[np.ix_(kept, kept)]
+        raw = fit.residual + fit.jacobian[:, free] @ (fit.vector - prior.centre)[free]
+        directions = fit.jacobian[:, free] @ prior.factor[np.ix_(free, free)]
         return NullModel.of(np.hstack([directions, nuisance]), raw, discrepancy)
 
     def beside(self, more: np.ndarray) -> 'NullModel':
-        """The same where some more directions (P, n), if any, may vary."""
+        """The null hypothesis with some more directions (P, n), if any, that may vary."""
         if not more.size:
             return self
-        return NullModel.of(np.hstack([self.columns, more]), self.raw, self.discrepancy)
+        return NullModel.of(
+            np.hstack([self.columns, more]), self.scaled_deviation, self.discrepancy
+        )
 
     def with_discrepancy(self, discrepancy: np.ndarray) -> 'NullModel':
-        """The same with another covariance (P, P) of the discrepancy."""
-        return NullModel.of(self.columns, self.raw, discrepancy)
+        """The null hypothesis with another covariance (P, P) of the discrepancy."""
+        return NullModel.of(self.columns, self.scaled_deviation, discrepancy)
 
     def log_evidence(self, deviations: np.ndarray, freedom: float) -> np.ndarray:
         """(D,) log likelihood of whitened deviations (P, D), the noise's scale integrated out.
@@ -94,7 +82,10 @@ class NullModel:
         squares = np.sum(deviations**2, axis=0)
         if not np.isfinite(freedom):
             return -0.5 * squares - half_log_det
-        return -0.5 * (freedom + len(self.raw)) * np.log1p(squares / freedom) - half_log_det
+        return (
+            -0.5 * (freedom + len(self.scaled_deviation)) * np.log1p(squares / freedom)
+            - half_log_det
+        )
 
     def predicted(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Deviations of the last Q readings, given the first so many.
@@ -110,9 +101,9 @@ class NullModel:
         return solve_triangular(self.lower, columns, lower=True, check_finite=False)
 
     def select(self, rows: np.ndarray) -> 'NullModel':
-        """The same for some of the readings."""
+        """The null hypothesis for some of the readings."""
         kept = None if self.discrepancy is None else self.discrepancy[np.ix_(rows, rows)]
-        return NullModel.of(self.columns[rows], self.raw[rows], kept)
+        return NullModel.of(self.columns[rows], self.scaled_deviation[rows], kept)
 
 
 @dataclass(frozen=True)
@@ -137,7 +128,8 @@ class OrthogonalDirections:
             return OrthogonalDirections(columns @ axes, axes, axes[known], sides[known])
         wide = columns.shape[1] > len(columns)
         squares, turned = np.linalg.eigh(columns @ columns.T if wide else columns.T @ columns)
-        shown = squares > UNSEEN
+        # A direction whose squared length, in standard deviations, is less cannot be seen.
+        shown = squares > 1e-9
         turned, lengths = turned[:, shown], np.sqrt(squares[shown])
         if wide:
             turned, axes = turned * lengths, columns.T @ (turned / lengths)

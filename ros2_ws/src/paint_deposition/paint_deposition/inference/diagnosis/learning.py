@@ -10,7 +10,7 @@ from functools import partial
 
 import numpy as np
 
-from paint_deposition.inference.comparison.comparison import misfit_regions
+from paint_deposition.inference.comparison.regions import misfit_regions
 from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     PLACE,
@@ -22,17 +22,13 @@ from paint_deposition.inference.diagnosis.gaussian import (
     OrthogonalDirections,
     simulated,
 )
-from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.inference.diagnosis.model_space import DRAWS, SIZES
 from paint_deposition.inference.diagnosis.search import EffectSet, SearchStage
 from paint_deposition.inference.diagnosis.verdict import Unknown
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 
 MOST_LAWS = 2
-# Degree of the polynomials in the ranks of a covariate.
-DEGREE = 4
-DRAWS = 1000
-CURVE_POINTS = 15
 
 
 @dataclass(frozen=True)
@@ -52,7 +48,7 @@ class NullModels:
 
     @staticmethod
     def around(best: EffectSet, fit: Fit) -> 'NullModels':
-        """Those beside a set of effects, and a fit of the model with it."""
+        """Null hypotheses beside a set of effects, and a fit of the model with it."""
         study, sizes, discrepancy = best.state.study, best.best.sizes, best.discrepancy
         plain = NullModel.around(fit, study.nuisance)
         off = law_errors(study, fit, best.names, best.usual.model)
@@ -65,18 +61,18 @@ class NullModels:
         )
 
     def of(self, explanation: Explanation) -> NullModel:
-        """That for an explanation."""
+        """The null hypothesis for an explanation."""
         if explanation.corrects:
             return self.correction
         kinds = {FOOTPRINT: self.footprint, PLACE: self.place}
         return kinds.get(explanation.learns, self.nonparametric_laws)
 
     def beside(self, columns: np.ndarray) -> 'NullModels':
-        """The same where some directions (P, n) may vary, too."""
+        """Null hypotheses where some directions (P, n) may vary, too."""
         return self._each(lambda null: null.beside(columns))
 
     def select(self, rows: np.ndarray) -> 'NullModels':
-        """The same for some of the readings."""
+        """Null hypotheses for some of the readings."""
         return self._each(lambda null: null.select(rows))
 
     def _each(self, change: Callable[[NullModel], NullModel]) -> 'NullModels':
@@ -158,7 +154,10 @@ class LeftOut:
         """(n, P) films with 0 to n - 1 laws, found without some readings (P,) [um]."""
         state = self.stages[0].here.state
         options = [option for option in self.options if option.learns not in without]
-        found = _found_without(self.stages, out)
+        for stage, following in zip(self.stages, [*self.stages[1:], None], strict=True):
+            found = stage.chosen(~out)
+            if following is None or found.names != following.here.names:
+                break
         nulls = NullModels.around(found, found.fit).select(~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
         learned = [size * options[k].columns for k, size in laws]
@@ -167,15 +166,6 @@ class LeftOut:
             free = np.hstack(learned[:count])
             films_um.append(state.study.predicted_without_um(found.fit, out, free))
         return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
-
-
-def _found_without(stages: Sequence[SearchStage], out: np.ndarray) -> EffectSet:
-    """The set of effects that is found while some readings (P,) are left out."""
-    for stage, following in zip(stages, [*stages[1:], None], strict=True):
-        chosen = stage.chosen(~out)
-        if following is None or chosen.names != following.here.names:
-            break
-    return chosen
 
 
 def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) -> Unknown:
@@ -203,7 +193,7 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
     weights = 1.0 / study.sigma_um[:, np.newaxis]
     coefficients, *_ = np.linalg.lstsq(smooth * weights, fit.residual, rcond=None)
     order = np.argsort(covariate.values)
-    points = order[np.linspace(0, len(order) - 1, CURVE_POINTS).astype(int)]
+    points = order[np.linspace(0, len(order) - 1, 15).astype(int)]
     regions = misfit_regions(study, study.residuals(fit.predicted_um), fit.model)
     names = [experiment.name for experiment in study.campaign.experiments]
     shown = [name for name in names if name in {region.experiment for region in regions}]
@@ -226,6 +216,6 @@ def locate_unexplained(study: Study, fit: Fit, nothing: EffectSet, seed: int) ->
 
 
 def _smooth(values: np.ndarray) -> np.ndarray:
-    """(P, DEGREE) polynomials of the values' ranks, so that outliers have no leverage."""
+    """(P, 4) polynomials of the values' ranks, so that outliers have no leverage."""
     ranks = np.argsort(np.argsort(values)) / max(len(values) - 1, 1)
-    return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, DEGREE)[:, 1:]
+    return np.polynomial.legendre.legvander(2.0 * ranks - 1.0, 4)[:, 1:]

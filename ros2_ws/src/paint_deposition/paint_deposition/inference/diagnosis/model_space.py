@@ -26,7 +26,7 @@ from paint_deposition.inference.diagnosis.gaussian import (
     OrthogonalDirections,
     simulated,
 )
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures, FootprintProfile
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 
@@ -43,9 +43,8 @@ SURE = 0.7
 COARSENED = 2.0
 # Probability that a group holds the cause, if one of the alternatives is it.
 CREDIBLE = 0.95
+# Simulations behind a p-value.
 DRAWS = 1000
-# A deviation of the footprint shows from this many of its standard deviations on.
-SHOWS = 2.0
 # Of each size of the footprint so many sizes of fields are kept at most, and none whose share of
 # the posterior is smaller: with more effects another footprint may be the more probable one.
 MOST_SIZES, LEAST_SHARE = 2, 0.02
@@ -81,7 +80,10 @@ class EffectEvidence:
     def of_readings(self) -> np.ndarray:
         """(K, S) log Bayes factors of each explanation at every size."""
         deviation = self.null.deviation[:, np.newaxis]
-        factors = [self._by_size(k, deviation)[:, 0] for k in range(len(self.principal))]
+        factors = [
+            turned.log_bayes_factors(deviation, SIZES, self.freedom)[:, 0]
+            for turned in self.principal
+        ]
         return np.array(factors).reshape(len(self.principal), len(SIZES))
 
     def evidence(
@@ -98,11 +100,10 @@ class EffectEvidence:
             shifts: (P, R), each of which is added to all deviations: R times as many.
         """
         numbers = range(len(self.explanations)) if chosen is None else chosen
-        terms = [
-            np.logaddexp.reduce(self._by_size(k, deviations, shifts)) + log_share(e)
-            for k in numbers
-            for e in [self.explanations[k]]
-        ]
+        terms = []
+        for k in numbers:
+            by_size = self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
+            terms.append(np.logaddexp.reduce(by_size) + log_share(self.explanations[k]))
         return np.logaddexp.reduce(terms)
 
     def by_law(self, cause: str) -> tuple[float, Effect]:
@@ -118,11 +119,6 @@ class EffectEvidence:
     def null_draws(self, seed: int) -> np.ndarray:
         """(P, DRAWS) whitened deviations if no cause acted."""
         return simulated(len(self.null.deviation), self.freedom, DRAWS, seed)
-
-    def _by_size(
-        self, k: int, deviations: np.ndarray, shifts: np.ndarray | None = None
-    ) -> np.ndarray:
-        return self.principal[k].log_bayes_factors(deviations, SIZES, self.freedom, shifts)
 
 
 def log_share(explanation: Explanation) -> float:
@@ -176,15 +172,10 @@ class ModelSpace:
         self.nature = [one for one in weighed if not one.sizes.is_beyond_nature]
         self.beyond = [one for one in weighed if one.sizes.is_beyond_nature]
         self.evidences = [EffectEvidence(one.null, explanations, freedom) for one in self.nature]
-
-    @cached_property
-    def _log_null(self) -> float:
-        return float(np.logaddexp.reduce([one.log_weight for one in self.nature]))
-
-    @cached_property
-    def share(self) -> np.ndarray:
-        """Posterior probability of each of nature's sizes if nothing is missing."""
-        return np.exp([one.log_weight - self._log_null for one in self.nature])
+        log_weights = [one.log_weight for one in self.nature]
+        self.log_null = float(np.logaddexp.reduce(log_weights))
+        # Posterior probability of each of nature's sizes if nothing is missing.
+        self.share = np.exp(np.array(log_weights) - self.log_null)
 
     @cached_property
     def central(self) -> EffectEvidence:
@@ -199,7 +190,7 @@ class ModelSpace:
             factors = np.array([e.of_readings[k] for e in self.evidences])
             averaged = np.logaddexp.reduce(factors + np.log(self.share)[:, np.newaxis], axis=None)
             terms.setdefault(explanation.cause, []).append(averaged + log_share(explanation))
-        beyond = [one.log_weight - self._log_null for one in self.beyond]
+        beyond = [one.log_weight - self.log_null for one in self.beyond]
         terms[UNKNOWN] = [*terms.get(UNKNOWN, []), *beyond, -np.inf]
         found = {cause: float(np.logaddexp.reduce(values)) for cause, values in terms.items()}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
@@ -217,9 +208,9 @@ class ModelSpace:
         random = np.random.default_rng(seed)
         draws = []
         for one, count in zip(self.nature, random.multinomial(DRAWS, self.share), strict=True):
-            noise = simulated(len(one.null.raw), self.freedom, count, random)
+            noise = simulated(len(one.null.scaled_deviation), self.freedom, count, random)
             draws.append(one.null.lower @ noise)
-        found = self._evidence(self.nature[0].null.raw[:, np.newaxis])[0]
+        found = self._evidence(self.nature[0].null.scaled_deviation[:, np.newaxis])[0]
         by_chance = self._evidence(np.hstack(draws))
         return float((1 + np.count_nonzero(by_chance >= found)) / (1 + DRAWS))
 
@@ -272,11 +263,12 @@ class ModelSpace:
         spread = np.eye(seen.shape[1]) - seen.T @ seen
         sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
         found = [one.sizes for one in self.nature]
+        # A deviation of the footprint shows from this many of its standard deviations on.
         return DiscrepancyFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.discrepancy.lengths_m[one.length] for one in found]),
-            float(np.max(np.abs(mean), where=np.abs(mean) > SHOWS * sd, initial=0.0)),
+            float(np.max(np.abs(mean), where=np.abs(mean) > 2.0 * sd, initial=0.0)),
             FootprintProfile(
                 footprint.radius_m,
                 footprint.flux,
@@ -303,7 +295,7 @@ def probable_hyperparameters(
         precision = 1.0 + np.multiply.outer(SIZES**2, square)
         explained = (SIZES**2)[:, np.newaxis] * score**2 / precision
         if np.isfinite(freedom):
-            count = freedom + len(plain.raw)
+            count = freedom + len(plain.scaled_deviation)
             whole = freedom + one.null.deviation @ one.null.deviation
             gain = -0.5 * count * np.log1p(-explained / whole)
         else:

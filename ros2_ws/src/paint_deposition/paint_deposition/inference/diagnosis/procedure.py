@@ -33,19 +33,16 @@ from paint_deposition.inference.diagnosis.learning import (
     locate_unexplained,
 )
 from paint_deposition.inference.diagnosis.search import EffectSet, Group, Search, SearchStage
-from paint_deposition.inference.diagnosis.state import DiagnosisState
+from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
+from paint_deposition.inference.diagnosis.testability import testability
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, percent
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.residuals import beyond_noise_um, is_worse
+from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 
 # Significance level of the test that something is missing.
 ALPHA = 0.05
-# Effects that are at least this probable are listed, and this many named where none is sure.
-WORTH_LISTING, NAMED = 0.05, 3
-# Errors this many times as large as the noise of gauge and texture need a word.
-BEYOND_NOISE = 1.3
 # The model is not good enough where it misses the readings, beyond gauge and texture, by this part
 # of the thickest film: measured sprays of one setting differ by 0.5 to 2 %.
 MOST_BEYOND = 0.03
@@ -74,12 +71,13 @@ def diagnose(
     """
     progress('fitting the model')
     state = DiagnosisState.begin(campaign, start, library, seed, known)
-    if state.trouble:
-        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
+    if trouble := trouble_with(state.study, state.fit):
+        return state.diagnosis(np.nan, 'fit_broken', trouble)
     progress('computing the evidence of what may be missing')
     search = Search(state)
     nothing = search.nothing
-    state = replace(state, testable=search.testability, figures=nothing.space.figures)
+    testable = testability(nothing.space.central, seed)
+    state = replace(state, testable=testable, figures=nothing.space.figures)
     p_value = nothing.p_value
     if p_value >= ALPHA:
         return _nothing_missing(state, nothing, p_value)
@@ -122,7 +120,8 @@ def _nothing_missing(state: DiagnosisState, nothing: EffectSet, p_value: float) 
             reason = f'{beyond}: {most}. {unknown}'
         return state.diagnosis(p_value, 'unknown_effect', reason, (), unknown)
     reason = f'{beyond}: sprays of one setting usually differ by as much.'
-    if first.rmse_um < BEYOND_NOISE * noise_um:
+    # Errors this many times as large as the noise of gauge and texture need a word.
+    if first.rmse_um < 1.3 * noise_um:
         reason = 'The readings agree with the model to within the noise of the gauge.'
     return state.diagnosis(p_value, 'none_missing', reason)
 
@@ -216,7 +215,7 @@ def _conclude(
             )
         return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
     reason = 'These may be missing: ' + ', or '.join(
-        f'{c.best} ({percent(c.probability)})' for c in others[:NAMED]
+        f'{c.best} ({percent(c.probability)})' for c in others[:3]
     )
     return state.diagnosis(p_value, 'undecided', reason, others)
 
@@ -226,9 +225,10 @@ def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[
     known = {member for found in state.accepted for member in found.members}
     found = []
     for cause, probability in probabilities.items():
-        if cause in known or probability < WORTH_LISTING:
+        # Effects that are at least this probable are listed.
+        if cause in known or probability < 0.05:
             continue
-        effects = [*state.accepted_effects, state.candidates[cause][0]]
+        effects = [*state.candidates_in(state.fit), state.candidates[cause][0]]
         fit = state.fitted_with(effects, state.fit.model)
         found.append(state.described((cause,), probability, state.history[-1], fit))
     return tuple(found)

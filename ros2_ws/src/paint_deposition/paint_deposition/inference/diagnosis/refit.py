@@ -23,7 +23,7 @@ from paint_deposition.inference.diagnosis.model_space import SIZES, SURE, inclus
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.search import EffectSet, Search
 from paint_deposition.inference.diagnosis.smooth_laws import bases_over
-from paint_deposition.inference.diagnosis.state import DiagnosisState
+from paint_deposition.inference.diagnosis.state import DiagnosisState, trouble_with
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.posterior import Posterior
@@ -53,13 +53,14 @@ def refit(
     law = added if added is not None and issubclass(added, LearnedLaw) else None
     if added and start.effect(added.id):
         raise ModelError(
-            f'{added.id} is in the model already; to fit it anew, add none, or take it out'
+            f'{added.id} is in the model already; add no effect to refit the model as it is, or '
+            'take it out of the model'
         )
     candidates = dict(library) | ({added.id: added} if added and not law else {})
     progress('fitting the model')
     state = DiagnosisState.begin(campaign, start, candidates, seed, known)
-    if state.trouble:
-        return state.diagnosis(np.nan, 'fit_broken', state.trouble)
+    if trouble := trouble_with(state.study, state.fit):
+        return state.diagnosis(np.nan, 'fit_broken', trouble)
     search = Search(state)
     nothing = search.nothing
     state = _beside(state, nothing)
@@ -102,9 +103,16 @@ def _with_learned(
     options, nulls = _options(state, law), NullModels.around(nothing, state.fit)
     weights = _log_bayes_factors(state, nulls, options)
     probability = float(expit(logsumexp(weights) - np.log(weights.size)))
-    before = state.history[-1]
-    fit = state.learned([_best(options, weights)])
-    state = state.with_step(law.id, fit, _holdout_um(state, nulls, options))
+    before, fit = state.history[-1], state.learned([_best(options, weights)])
+
+    def without(out: np.ndarray) -> np.ndarray:
+        # The law's kind, length and size are chosen without these readings, too.
+        kept = [explanation.select(~out) for explanation in options]
+        others = _log_bayes_factors(state, nulls.select(~out), kept)
+        explanation, size = _best(options, others)
+        return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
+
+    state = state.with_step(law.id, fit, float(state.study.errors_left_out_um(without)))
     state = state.accepting((law.id,), probability, before)
     reason = (
         f'A learned law over {law.over} was added as asked; the film depends on it with a '
@@ -144,15 +152,3 @@ def _best(options: Sequence[Explanation], weights: np.ndarray) -> tuple[Explanat
     """The law and the size of the greatest weight (n, S)."""
     number, size = np.unravel_index(weights.argmax(), weights.shape)
     return options[int(number)], float(SIZES[size])
-
-
-def _holdout_um(state: DiagnosisState, nulls: NullModels, options: Sequence[Explanation]) -> float:
-    """Error on points left out [um], the law's kind, length and size chosen without them."""
-
-    def without(out: np.ndarray) -> np.ndarray:
-        kept = [explanation.select(~out) for explanation in options]
-        weights = _log_bayes_factors(state, nulls.select(~out), kept)
-        explanation, size = _best(options, weights)
-        return state.study.predicted_without_um(state.fit, out, size * explanation.columns)
-
-    return float(state.study.errors_left_out_um(without))

@@ -39,7 +39,6 @@ from paint_deposition.inference.diagnosis.model_space import (
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
-from paint_deposition.inference.diagnosis.testability import Testability, testability
 from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many proposals are refitted each time.
@@ -49,8 +48,6 @@ TRIALS = 5
 LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
-# So many effects are added at most.
-MOST_EFFECTS = 4
 # Log evidence that two fits of one set may differ by and be the same.
 SAME = 0.5
 # Log evidence of an effect beyond which the pattern that was fitted without it is no guide.
@@ -74,12 +71,13 @@ class EffectSet:
         """A set, and the discrepancy around its own fit, at the sizes that matter."""
         usual = ModelDiscrepancy.of(state.study, fit)
         laws = [*of_effects(state.study, fit, state.candidates)]
-        sizes = probable_hyperparameters(state.plain(fit), usual, laws, state.freedom)
+        plain = NullModel.around(fit, state.study.nuisance)
+        sizes = probable_hyperparameters(plain, usual, laws, state.freedom)
         return EffectSet(state, names, fit, usual, sizes)
 
     @property
     def effects(self) -> dict[str, Effect]:
-        """Those of the set, as fitted."""
+        """The effects of the set, as fitted."""
         return {effect.id: effect for effect in self.state.candidates_in(self.fit)}
 
     @cached_property
@@ -108,7 +106,7 @@ class EffectSet:
 
     @cached_property
     def best(self) -> WeightedNull:
-        """That with nature's most probable discrepancy."""
+        """The null hypothesis with nature's most probable discrepancy."""
         nature = (one for one in self.weighed if not one.sizes.is_beyond_nature)
         return max(nature, key=lambda one: one.log_weight)
 
@@ -119,7 +117,7 @@ class EffectSet:
 
     @property
     def p_value(self) -> float:
-        """The same, or of fields over the parts larger than those of usual sprays.
+        """Probability of so much evidence, or of larger fields on the parts than usual ones.
 
         Two tests are made, each with its share of the significance level (Bonferroni).
         """
@@ -133,7 +131,7 @@ class EffectSet:
 
     @cached_property
     def log_weight_unknown(self) -> float:
-        """The same if something unknown acts beside it."""
+        """Logarithm of the weight of this set if something unknown acts beside it."""
         return self.log_weight + self.of_unknown.alone[UNKNOWN]
 
     @cached_property
@@ -182,7 +180,7 @@ class EffectSet:
         return tuple(cause for cause in self.space.alone if cause != UNKNOWN)[:TRIALS]
 
     def log_weight_of(self, rows: np.ndarray) -> float:
-        """The same weight with some of the readings (P,), at the best size of the discrepancy."""
+        """Logarithm of the weight by some readings (P,), at the best size of the discrepancy."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
         return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
@@ -221,11 +219,6 @@ class Search:
         self._patterns: tuple[DepositionModel, ...] = ()
         self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
 
-    @cached_property
-    def testability(self) -> Testability:
-        """What the readings can show beside the model as it is."""
-        return testability(self.nothing.space.central, self.state.seed)
-
     def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
         """A set with one effect more, whose first amplitudes are those of its law alone."""
         names = parent.names | {name}
@@ -263,7 +256,7 @@ class Search:
         found: list[SearchStage] = []
         here = self._near_best()
         while True:
-            room = len(here.names) < MOST_EFFECTS
+            room = len(here.names) < 4  # so many effects at the most
             stage = SearchStage(
                 here, [self.with_effect(here, name) for name in here.proposed if room]
             )

@@ -24,26 +24,19 @@ from paint_deposition.effects.learned.law import (
     waves,
 )
 from paint_deposition.inference.fitting.least_squares import STEP, Fit
-from paint_deposition.inference.fitting.smooth_fields import root_of_field, smooth, with_edges
+from paint_deposition.inference.fitting.random_effects import root_of_field, smooth, with_edges
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.covariates import Rays
 from paint_deposition.model.eq1_pattern import PlanarPattern
 
 # Knots of a curve; time is resolved more finely, as pumps pulsate.
 KNOTS, TIME_KNOTS = 12, 40
-# Rays that leave less than this share of the most are left out of a covariate's range, and
-# outermost rays by this share of their number.
-FAINT, OUTERMOST = 0.02, 0.01
 # Directions of a random function below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-2
-# Steps between the knots of a map [m], and of the radius of a footprint.
+# Distance between the knots of a map [m], and number of them along the radius of a footprint.
 MAP_STEP_M, RADII = 0.06, 10
-# The pattern ends at this many of its widths beyond the ring.
-WIDTHS = 3.0
-# Angles at which a pattern is averaged, and a flux that is none [um/s].
-ANGLES, NO_FLUX = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False), 1e-12
-# Share of the pattern's largest change from which on it follows a footprint.
-HARDLY_SHOWS = 1e-4
+# Angles at which a pattern is averaged.
+ANGLES = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
 # Distance of knots that have nothing in common.
 FAR = 1e6
 
@@ -92,11 +85,11 @@ class RandomLaw:
 
     @property
     def centred(self) -> 'RandomLaw':
-        """The same laws, each leaving the film as a whole as it is."""
+        """Random laws of this form, each leaving the film as a whole as it is."""
         return RandomLaw(self.basis, self.basis.centred(self.at_knots))
 
     def around(self, study: Study, model: DepositionModel) -> 'RandomLaw':
-        """The same where another model says what arrives where."""
+        """The random law where another model says what arrives where."""
         bases = bases_over(study, model, self.basis.law, self.basis.settings.get('kind', ''))
         maps = self.basis.settings.get('maps')
         (basis,) = (basis for basis in bases if basis.settings.get('maps') == maps)
@@ -230,7 +223,8 @@ def footprint_basis(study: Study, model: DepositionModel, radii: int = RADII) ->
         radii: how many knots from the middle to the end of the pattern.
     """
     patterns = model.patterns
-    reach = max(p.r_m + WIDTHS * max(p.sigma1_m, p.sigma2_m) for p in patterns)
+    # The pattern ends at this many of its widths beyond the ring.
+    reach = max(p.r_m + 3.0 * max(p.sigma1_m, p.sigma2_m) for p in patterns)
     films = []
     for rays in study.rays(model):
         radius = np.hypot(rays.x_m, rays.y_m) / reach * (radii - 1)
@@ -271,7 +265,7 @@ def beside_pattern(
 
     def log_flux(vector: np.ndarray) -> np.ndarray:
         patterns = fit.parameters.decode(vector).patterns
-        around = [np.log(flux_around(p, reach_m, radii) + NO_FLUX) for p in patterns]
+        around = [np.log(flux_around(p, reach_m, radii) + 1e-12) for p in patterns]
         return (harmonics @ np.mean(around, axis=0)).T.ravel()
 
     here, count = log_flux(fit.vector), len(fit.parameters.pattern)
@@ -280,10 +274,10 @@ def beside_pattern(
     moved = fit.vector + np.diag(steps)
     relative = np.stack([(log_flux(moved[k]) - here) / steps[k] for k in range(count)], axis=1)
     change = basis.film_um @ at_knots / study.sigma_um[:, np.newaxis]
-    # A pattern that hardly shows in the readings would go anywhere.
+    # A pattern that hardly shows, by this share of its largest change, would go anywhere.
     scale = fit.parameters.prior.factor[:count, :count]
     slopes = pattern @ scale
-    followed = scale @ np.linalg.lstsq(slopes, change, rcond=HARDLY_SHOWS)[0]
+    followed = scale @ np.linalg.lstsq(slopes, change, rcond=1e-4)[0]
     return at_knots - relative @ followed, followed
 
 
@@ -292,9 +286,11 @@ def _range(rays: list[Rays], values: list[np.ndarray]) -> tuple[float, float]:
     lows, highs = [], []
     for part, value in zip(rays, values, strict=True):
         if value.shape == part.share.shape:
-            value = value[part.share > FAINT * part.share.max()]
-            lows.append(np.quantile(value, OUTERMOST))
-            highs.append(np.quantile(value, 1.0 - OUTERMOST))
+            # Rays that leave less than this share of the most are left out, and one of a hundred
+            # on either side.
+            value = value[part.share > 0.02 * part.share.max()]
+            lows.append(np.quantile(value, 0.01))
+            highs.append(np.quantile(value, 0.99))
         else:
             lows.append(value.min())
             highs.append(value.max())

@@ -20,7 +20,6 @@ from paint_deposition.inference.diagnosis.explanations import (
     nonparametric_laws_of,
     of_places,
 )
-from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.testability import Testability
 from paint_deposition.inference.diagnosis.verdict import (
     Diagnosis,
@@ -30,29 +29,17 @@ from paint_deposition.inference.diagnosis.verdict import (
     Unknown,
     Verdict,
 )
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.posterior import usable
+from paint_deposition.inference.fitting.posterior import prior_for
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
 
+# Starts of the first fit.
 STARTS = 10
-# Times that laws of any form and the model's parameters are fitted to each other at most, and the
-# change of the misfit from which on they suit each other.
-LEARNING_STEPS, SETTLED = 8, 0.5
-# A point that gets less than this share of the mean film was hardly reached by the path.
-REACHED = 0.02
-MOST_UNREACHED = 0.1
-# Standard deviations above the prediction from which the gauge found paint, and the share of the
-# mean film: so much may be the tail of a footprint.
-PAINTED, TAIL = 3.0, 0.2
-# Probability of residuals this small: below it the noise is overstated, or the readings were
-# made up.
-TOO_GOOD = 1e-4
 
 
 @dataclass(frozen=True)
@@ -103,16 +90,11 @@ class DiagnosisState:
             for key, effect in library.items()
             if start.effect(key) is None
         }
-        prior, remarks = usable(known, campaign)
+        prior, remarks = prior_for(known, campaign)
         effects = (*start.effects, *(shapes[0] for shapes in candidates.values()))
         study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior)
         first = (Step.of(study, '', fit),)
         return DiagnosisState(study, start, prior, remarks, candidates, seed, fit, first)
-
-    @cached_property
-    def trouble(self) -> str:
-        """Why the fit cannot be right, '' if it can."""
-        return trouble_with(self.study, self.fit)
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
@@ -129,15 +111,6 @@ class DiagnosisState:
     def freedom(self) -> float:
         """Degrees of freedom of the noise estimate."""
         return self.study.noise.degrees_of_freedom
-
-    def plain(self, fit: Fit) -> NullModel:
-        """The model of a fit as it is, with nothing missing."""
-        return NullModel.around(fit, self.study.nuisance)
-
-    @property
-    def accepted_effects(self) -> list[Effect]:
-        """The candidates that the newest model has."""
-        return self.candidates_in(self.fit)
 
     def candidates_in(self, fit: Fit) -> list[Effect]:
         """The candidates that the model of a fit has."""
@@ -173,7 +146,8 @@ class DiagnosisState:
         """The newest model with the laws that these explanations, at these sizes, stand for."""
         fit = self.fit
         laws: tuple[LearnedLaw, ...] = ()
-        for _ in range(LEARNING_STEPS):
+        # The laws and the model's parameters are fitted to each other, until they suit.
+        for _ in range(8):
             randoms = [
                 explanation.random.around(self.study, fit.model)
                 for explanation, _ in chosen
@@ -196,7 +170,7 @@ class DiagnosisState:
                 )
                 for rows in [slice(stop - part.shape[1], stop)]
             )
-            if abs(before - fit.objective) < SETTLED:
+            if abs(before - fit.objective) < 0.5:
                 break
         start = fit.model.model_copy(update={'effects': (*fit.model.effects, *laws)})
         return self.study.fit(self._free(start), nuisance=self.study.nuisance)
@@ -275,19 +249,22 @@ def intervals(fit: Fit, effect_id: str) -> dict[str, Interval]:
 
 
 def trouble_with(study: Study, fit: Fit) -> str:
-    """Why the fit cannot be right, or nothing."""
+    """Why the fit cannot be right, '' if it can."""
     if wrong := [mistake.sentence for mistake in study.mistakes if mistake.stops]:
         return '; '.join(wrong)
     mean = float(np.mean(study.measured_um))
-    painted = (fit.residual > PAINTED) & (study.measured_um > TAIL * mean)
-    bare = float(np.mean(painted & (fit.predicted_um < REACHED * mean)))
+    # So many standard deviations above the prediction the gauge found paint; below this share of
+    # the mean film it may be the tail of a footprint.
+    painted = (fit.residual > 3.0) & (study.measured_um > 0.2 * mean)
+    # A point that gets less than this share of the mean film was hardly reached by the path.
+    bare = float(np.mean(painted & (fit.predicted_um < 0.02 * mean)))
     freedom = len(study) - len(fit.vector)
     if freedom < 5:
         return (
             f'{len(study)} points cannot determine {len(fit.vector)} parameters; '
             'measure at 30 points or more'
         )
-    if bare > MOST_UNREACHED:
+    if bare > 0.1:
         return (
             f'the recorded path leaves {100 * bare:.0f} % of the points bare, where '
             'the gauge found paint; check the trajectory, its trigger and the mesh frame'
@@ -299,7 +276,9 @@ def trouble_with(study: Study, fit: Fit) -> str:
         over_gauge = fit.residual * study.sigma_um / study.gauge_um
         reduced = float(over_gauge @ over_gauge) / freedom
         chance = fdtr(freedom, min(study.noise.degrees_of_freedom, 1e6), reduced)
-        if chance < TOO_GOOD:
+        # Below this probability of residuals so small the noise is overstated, or the readings
+        # were made up.
+        if chance < 1e-4:
             return (
                 f'the readings scatter about the model {np.sqrt(reduced):.2f} times as much as '
                 f'their noise says ({study.noise.source}); give their true sigma_um or repeats'

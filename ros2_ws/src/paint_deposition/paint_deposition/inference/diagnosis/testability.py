@@ -1,23 +1,15 @@
 """What the readings can show at all: effects that do not show, and the smallest that would."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from paint_deposition.inference.diagnosis.explanations import Sensitivity
 from paint_deposition.inference.diagnosis.model_space import EffectEvidence
 
-# Smallest signal-to-noise ratio, at the largest amplitude that is physical and with the pattern
-# refitted, at which an effect counts as testable.
-TESTABLE = 2.0
 # An amplitude is detectable if the test that something is missing, at this level, finds it with
 # this power.
 LEVEL, POWER = 0.05, 0.9
 # Signal-to-noise ratios at which the power is simulated, and with how many draws.
 RATIOS, DRAWS = np.geomspace(2.5, 10.0, 10), 200
-# As many explanations as follow an effect most closely are computed with it; the others weigh as
-# much as they do without it.
-FOLLOWING = 6
 
 
 Testability = tuple[tuple[str, ...], dict[str, dict[str, float]]]
@@ -36,7 +28,9 @@ def testability(space: EffectEvidence, seed: int) -> Testability:
         most = [np.maximum(np.abs(s.low), np.abs(s.high)) for s in found]
         # Along the combination of amplitudes that shows most.
         seen = (space.null.whiten(s.columns * m) for s, m in zip(found, most, strict=True))
-        if max(np.linalg.norm(columns, 2) for columns in seen) >= TESTABLE:
+        # An effect counts as testable from this signal-to-noise ratio on, at the largest amplitude
+        # that is physical and with the pattern refitted.
+        if max(np.linalg.norm(columns, 2) for columns in seen) >= 2.0:
             detectable[effect_id] = _detectable(space, found, null, draws)
         else:
             not_testable.append(effect_id)
@@ -56,22 +50,16 @@ def _detectable(
         if strength < 1e-9:
             continue
         backward = shapes[0].sides[k] < 0.0
-        ratio = _ratio(space, (-best if backward else best) / strength, null, draws)
+        direction = (-best if backward else best) / strength
+        power = power_along(space, direction, RATIOS, null, draws)
+        if power[-1] < POWER:
+            continue
+        ratio = float(np.interp(POWER, np.maximum.accumulate(power), RATIOS))
         amount = ratio * info[name]['typical'] / strength
         room = max(abs(info[name][end] - info[name]['neutral']) for end in ('low', 'high'))
         if amount <= room:
             found[name] = amount
     return found
-
-
-def _ratio(
-    space: EffectEvidence, direction: np.ndarray, null: np.ndarray, draws: np.ndarray
-) -> float:
-    """Length that a deviation must have to be detected with ``POWER``; inf beyond all tried."""
-    power = power_along(space, direction, RATIOS, null, draws)
-    if power[-1] < POWER:
-        return np.inf
-    return float(np.interp(POWER, np.maximum.accumulate(power), RATIOS))
 
 
 def power_along(
@@ -87,17 +75,13 @@ def power_along(
         direction: (P,) unit vector of whitened deviations. ratios: (R,) the lengths.
         null: simulated evidence if no cause acted. draws: (P, D) deviations behind its first D.
     """
-    chosen, count = _following(space, direction), draws.shape[1]
-    rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
-    along = space.evidence(draws, chosen, np.multiply.outer(direction, ratios))
-    evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
-    return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)
-
-
-def _following(space: EffectEvidence, direction: np.ndarray) -> Sequence[int]:
-    """Numbers of the explanations that take up most of a direction."""
+    # The evidence of what takes up most of the direction; others weigh as without a deviation.
     taken = [
         float(np.sum((own.columns.T @ direction) ** 2 / (1.0 + own.squares)))
         for own in space.principal
     ]
-    return np.argsort(taken)[::-1][:FOLLOWING].tolist()
+    chosen, count = np.argsort(taken)[::-1][:6].tolist(), draws.shape[1]
+    rest = np.exp(null[:count]) - np.exp(space.evidence(draws, chosen))
+    along = space.evidence(draws, chosen, np.multiply.outer(direction, ratios))
+    evidence = np.log(np.exp(along.reshape(len(ratios), count)) + rest)
+    return np.mean(evidence > np.quantile(null, 1.0 - LEVEL), axis=1)

@@ -14,16 +14,13 @@ from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.posterior import PatternShift, posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.readings.residuals import (
-    beyond_noise_um,
-    is_worse,
-)
+from paint_deposition.inference.readings.readings import beyond_noise_um, is_worse
 
 Verdict = Literal['none_missing', 'effect_missing', 'undecided', 'unknown_effect', 'fit_broken']
 
@@ -231,24 +228,23 @@ class Diagnosis:
         """How the gun ran over each part, by experiment."""
         return self.comparisons[-1].geometry
 
-    def _forms(self, found: EffectClass) -> dict[str, Any]:
-        """Of a learned law the closed forms that fit it; nothing of another effect."""
-        law = self.model.effect(found.best)
-        if not isinstance(law, LearnedLaw):
-            return {}
-        return {'forms': [form.to_dict() for form in forms_of(law)]}
-
     def to_dict(self) -> dict[str, Any]:
         """The content of ``diagnosis.json``."""
         before, after = self.history[0], self.history[-1]
         predicted = before.fit.predicted_um, after.fit.predicted_um
         places, sprays = self.proposals
+        classes = []
+        for found in self.classes:
+            classes.append(asdict(found))
+            law = self.model.effect(found.best)
+            if isinstance(law, LearnedLaw):
+                classes[-1]['forms'] = [form.to_dict() for form in forms_of(law)]
         return {
             'verdict': self.verdict,
             'reason': self.reason,
             'p_value': self.p_value,
             'accepted': list(self.accepted),
-            'classes': [asdict(found) | self._forms(found) for found in self.classes],
+            'classes': classes,
             'rmse_um': {
                 'before': before.rmse_um,
                 'after': after.rmse_um,

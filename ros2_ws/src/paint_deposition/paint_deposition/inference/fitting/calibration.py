@@ -5,6 +5,7 @@ greatest standard deviation start the fit of the 2D model, which goes through th
 as every film, so that door and panel alike can be in a campaign.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,46 +14,42 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.paint_used import impossible_brushes
+from paint_deposition.errors import ReadingsError
+from paint_deposition.film.paint_used import efficiency, impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.inference.discrepancy_figures import DiscrepancyFigures
-from paint_deposition.inference.fitting.brushes import brush_figures, with_brushes_of
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
     Correlation,
+    DiscrepancyFigures,
     Estimate,
     correlations,
     estimates,
 )
 from paint_deposition.inference.fitting.least_squares import Fit, on_one_thread
-from paint_deposition.inference.fitting.panel_fit import (
+from paint_deposition.inference.fitting.panel import (
     CollapseFit,
+    Panel,
+    check_panel,
     fit_collapse,
     shifts,
     short_reaches,
 )
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.posterior import posterior_of
+from paint_deposition.inference.fitting.posterior import posterior_of, with_brushes_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.plausibility import (
-    check_enough,
-    check_panel,
+    FEWEST_POINTS,
     check_readings,
     check_units_against_fit,
     geometry_by_experiment,
 )
-from paint_deposition.inference.readings.residuals import Residuals
+from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 
-STARTS = 8
 # Residuals beyond this many standard deviations are named in a warning.
 OUTLIER_SIGMAS = 4.0
-# Above this chi-square per degree of freedom the gauge's noise does not explain the residuals.
-MOST_CHI_SQUARE = 2.0
-SHOWN_CORRELATIONS = 10
 
 
 @dataclass(frozen=True)
@@ -117,7 +114,7 @@ class Calibration:
             },
             'correlations': [
                 {'parameters': [pair.first, pair.second], 'value': pair.value}
-                for pair in self.correlations[:SHOWN_CORRELATIONS]
+                for pair in self.correlations[:10]
             ],
             'experiments': [
                 {
@@ -182,7 +179,11 @@ def calibrate(
     """
     model = with_brushes_of(campaign, start or DepositionModel())
     study = Study.of(campaign, model.effects)
-    check_enough(len(study))
+    if len(study) < FEWEST_POINTS:
+        raise ReadingsError(
+            f'readings at {len(study)} points; the pattern has 7 parameters, measure at least '
+            f'{FEWEST_POINTS} points, better 30'
+        )
     owner = study.campaign.experiment_of[study.campaign.means.owner]
     for number, experiment in enumerate(study.campaign.experiments):
         check_readings(experiment.readings, study.noise.sigma_um[owner == number])
@@ -198,7 +199,7 @@ def calibrate(
         starts.append(model)
 
     def best_fit(study: Study) -> Fit:
-        fits = (study.fit(FreeParameters.of(one, *one.effects), STARTS, seed) for one in starts)
+        fits = (study.fit(FreeParameters.of(one, *one.effects), 8, seed) for one in starts)
         return min(fits, key=lambda fit: fit.objective)
 
     fit = best_fit(study)
@@ -226,29 +227,22 @@ def _panel_fit(study: Study, number: int) -> PanelFit | None:
 
 
 def _guessed(model: DepositionModel, panels: Sequence[PanelFit]) -> DepositionModel:
-    """Each pattern from the first panel of its brush."""
-    patterns = list(model.patterns)
-    for panel in reversed(panels):
-        row = int(model.pattern_rows(np.array([panel.panel.brush]))[0])
-        patterns[row] = started_from(model.painting_with(panel.panel.brush), panel).planar
-    return model.with_patterns(patterns)
-
-
-def started_from(model: DepositionModel, panel: PanelFit) -> DepositionModel:
-    """First values of the 2D model from the 1D fit, as in the paper.
+    """First values of each pattern from the first panel of its brush, as in the paper.
 
     The greater offset radius is the ring's, the greatest standard deviation that of both
     Gaussians; lengths are taken back from the panel's distance to the model plane. K1 is put
     right by the fit.
     """
-    collapse = panel.collapse.collapse
-    projection = model.projection
-    distance = panel.panel.distance_m + projection.emission_offset_m
-    shrink = projection.model_plane_m / distance
-    sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
-    r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
-    lengths = {'r_m': r, 'sigma1_m': sigma, 'sigma2_m': sigma}
-    return model.model_copy(update={'planar': model.planar.model_copy(update=lengths)})
+    patterns, projection = list(model.patterns), model.projection
+    for fitted in reversed(panels):
+        panel, collapse = fitted.panel, fitted.collapse.collapse
+        shrink = projection.model_plane_m / (panel.distance_m + projection.emission_offset_m)
+        sigma = float(np.clip(collapse.sigmas_m.max() * shrink, 0.01, 0.8))
+        r = float(np.clip(max(collapse.r1_m, collapse.r2_m) * shrink, 0.0, 0.9))
+        lengths = {'r_m': r, 'sigma1_m': sigma, 'sigma2_m': sigma}
+        row = int(model.pattern_rows(np.array([panel.brush]))[0])
+        patterns[row] = model.painting_with(panel.brush).planar.model_copy(update=lengths)
+    return model.with_patterns(patterns)
 
 
 def _warnings(
@@ -265,10 +259,11 @@ def _warnings(
         f'{pair.first} and {pair.second} can hardly be separated (correlation '
         f'{pair.value:+.2f}): trust their combination, not each'
         for pair in pairs
-        if pair.too_close
+        if abs(pair.value) > 0.95
     ]
     freedom = max(len(study) - len(fit.vector), 1)
-    if fit.chi_square > MOST_CHI_SQUARE * freedom:
+    # Above this the gauge's noise does not explain the residuals.
+    if fit.chi_square > 2.0 * freedom:
         warnings.append(
             f'residuals are {np.sqrt(fit.chi_square / freedom):.1f} times the noise of the gauge: '
             'something is missing from the model, see paint diagnose'
@@ -287,3 +282,25 @@ def _warnings(
             'readings to know it'
         )
     return warnings
+
+
+def brush_figures(model: DepositionModel, parameters: Sequence[Estimate]) -> dict[str, Any] | None:
+    """Set-points and transfer efficiency of each brush.
+
+    None without brushes. The efficiency is that on a part which catches everything.
+    """
+    if not model.brushes:
+        return None
+    several = len(model.brushes) > 1
+    relative = {value.name: value.sigma / value.value for value in parameters if value.value}
+    by_number: dict[str, Any] = {}
+    for brush in model.brushes:
+        share = efficiency(brush)
+        name = f'brush_{brush.number}.K1_cm3_per_s' if several else 'K1_cm3_per_s'
+        known = not math.isnan(share)
+        by_number[str(brush.number)] = {
+            **brush.set_points.model_dump(exclude_none=True),
+            'transfer_efficiency': share if known else None,
+            'transfer_efficiency_sigma': share * relative[name] if known else None,
+        }
+    return {'by_number': by_number}

@@ -1,24 +1,15 @@
-"""Fitted parameters with their uncertainties, in the model's own units."""
+"""Fitted parameters with their uncertainties, and what no law explains, in figures for people."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.inference.fitting.least_squares import STEP, Fit
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES, PatternVector
 
-TAILS = (0.025, 0.975)
-DRAWS = 4000
 # Places of K3 and phi among the parameters of a pattern.
 K3, PHASE = map(PATTERN_NAMES.index, ('K3', 'phi_rad'))
-# A parameter whose width has not fallen below this share of its weak prior's was not measured.
-LEARNED = 0.5
-# A standard deviation this large a share of a positive value leaves its first digit open.
-LARGEST_SHARE = 0.5
-# With the asymmetry this few standard deviations from zero its phase means nothing.
-ASYMMETRY_SIGMAS = 2.0
-PHASE_LIMIT_RAD = np.radians(45.0)
-TOO_CLOSE = 0.95
 
 
 @dataclass(frozen=True)
@@ -43,11 +34,6 @@ class Correlation:
     second: str
     value: float
 
-    @property
-    def too_close(self) -> bool:
-        """Whether one can compensate for the other."""
-        return abs(self.value) > TOO_CLOSE
-
 
 def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...]:
     """Every varied parameter with its uncertainty.
@@ -58,7 +44,8 @@ def estimates(fit: Fit, shifts: np.ndarray | None = None) -> tuple[Estimate, ...
     """
     covariance = scaled_covariance(fit, shifts)
     sigma = np.sqrt(np.diag(_spread(fit, covariance)))
-    learned = np.sqrt(np.diag(covariance)) <= LEARNED * fit.parameters.weak_prior.width
+    # A parameter was measured if its width has fallen below this share of its weak prior's.
+    learned = np.sqrt(np.diag(covariance)) <= 0.5 * fit.parameters.weak_prior.width
     values = fit.parameters.values(fit.vector[np.newaxis])[0]
     low, high = _intervals(fit, covariance, values)
     pattern, found = fit.parameters.pattern, []
@@ -134,10 +121,10 @@ def _intervals(
 ) -> tuple[np.ndarray, np.ndarray]:
     """(k,) ends of the 95 % intervals."""
     random = np.random.default_rng(0)
-    vectors = random.multivariate_normal(fit.vector, covariance, DRAWS, method='cholesky')
+    vectors = random.multivariate_normal(fit.vector, covariance, 4000, method='cholesky')
     inside = np.clip(vectors, *fit.parameters.bounds)
     away = _around_phase(fit.parameters.values(inside), values, fit.parameters.pattern)
-    low, high = np.quantile(away, TAILS, axis=0)
+    low, high = np.quantile(away, (0.025, 0.975), axis=0)
     return values + low, values + high
 
 
@@ -146,9 +133,10 @@ def _pattern_reason(
 ) -> str:
     """Why a parameter of the pattern is not determined, '' if it is."""
     if name == 'phi_rad':
-        if k3 < ASYMMETRY_SIGMAS * sigma_k3:
+        # With the asymmetry so few standard deviations from zero its phase means nothing.
+        if k3 < 2.0 * sigma_k3:
             return 'the asymmetry K3 is not significant, so it has no phase'
-        if sigma > PHASE_LIMIT_RAD:
+        if sigma > np.radians(45.0):
             return 'parallel passes hardly show the asymmetry along their travel; roll the gun'
         return ''
     if name == 'K3':
@@ -160,6 +148,57 @@ def _pattern_reason(
     row = {'K1_cm3_per_s': 0, 'K2': 1, 'r_m': 4, 'sigma1_m': 5, 'sigma2_m': 6}[name]
     if not learned[row]:
         return 'its value comes from the prior of usual bells'
-    if name in ('sigma1_m', 'sigma2_m') and sigma > LARGEST_SHARE * value:
+    # So large a standard deviation leaves the first digit open.
+    if name in ('sigma1_m', 'sigma2_m') and sigma > 0.5 * value:
         return f'its standard deviation is {100 * sigma / value:.0f} % of it'
     return ''
+
+
+@dataclass(frozen=True)
+class FootprintProfile:
+    """The footprint from its middle outward, averaged over the angle, over the peak of eq. (1)."""
+
+    radius_m: np.ndarray  # (n,) on the model plane [m]
+    # (n,) of eq. (1), as the readings have it, and how well they know it.
+    eq1: np.ndarray
+    found: np.ndarray
+    sd: np.ndarray
+
+
+@dataclass(frozen=True)
+class DiscrepancyFigures:
+    """The discrepancy in a campaign, as far as its readings show it."""
+
+    # By how much the film of a setting differs from any law, and parts of one setting from each
+    # other, as shares of the thickest film.
+    setting_share: float
+    part_share: float
+    length_m: float  # over which neighbours differ alike [m]
+    # Largest deviation of the footprint from eq. (1) that shows, over its peak.
+    footprint_of_peak: float
+    profile: FootprintProfile  # of the footprint
+
+    def to_dict(self) -> dict[str, float]:
+        """Sizes and length, for JSON."""
+        names = ('setting_share', 'part_share', 'length_m', 'footprint_of_peak')
+        return {name: getattr(self, name) for name in names}
+
+    @property
+    def footprint(self) -> dict[str, Any]:
+        """How far the footprint is from eq. (1), for JSON."""
+        profile = {name: values.tolist() for name, values in vars(self.profile).items()}
+        return {'deviation_of_peak': self.footprint_of_peak, 'profile': profile}
+
+    def __str__(self) -> str:
+        setting, peak = 100.0 * self.setting_share, 100.0 * self.footprint_of_peak
+        parts = f', parts painted alike by {100.0 * self.part_share:.1f} %'
+        footprint = (
+            f'the footprint differs from two Gaussians by {peak:.0f} % of its peak'
+            if peak
+            else 'no deviation of the footprint from two Gaussians shows'
+        )
+        return (
+            f'What no law explains: the film of a setting is off by {setting:.1f} % of its peak'
+            f'{parts if self.part_share else ""}, alike over about {1e3 * self.length_m:.0f} mm; '
+            f'{footprint}.'
+        )

@@ -26,11 +26,8 @@ from paint_deposition.kernel.threads import THREADS
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
 
-# Where effects act before the film has arrived: what they change, must be integrated again.
+# Where effects act that are laws of the flux.
 LAWS = ('flux_factor', 'pattern_scale')
-BEFORE_ARRIVAL = ('on_path', 'reach', 'shadow', *LAWS)
-# Films and prepared paths that are kept for models that differ in other respects only.
-FILMS_KEPT, PATHS_KEPT = 8, 2
 # Effects on film and gauge are differentiated by a step of this share of a unit.
 STEP = 1e-4
 
@@ -84,7 +81,9 @@ class Forward:
 
     def _split_by_stage(self, model: DepositionModel) -> '_Stages':
         acting = tuple(effect for effect in model.effects if not effect.is_neutral)
-        before = tuple(effect for effect in acting if effect.acts(*BEFORE_ARRIVAL))
+        # What effects change before the film has arrived must be integrated again.
+        early = ('on_path', 'reach', 'shadow', *LAWS)
+        before = tuple(effect for effect in acting if effect.acts(*early))
         if any(effect.acts(*LAWS) for effect in before):
             # All laws in a fixed order, absent ones neutral: one kernel, beside that without laws.
             laws = self._in_kernel | {e.id: e for e in before if e.acts(*LAWS)}
@@ -132,8 +131,8 @@ class _Part:
         self.experiment = experiment
         self._integrators: dict[bool, FilmIntegrator] = {}
         # Films and prepared paths depend on less than the model: many models share one.
-        self._film_um = lru_cache(FILMS_KEPT)(self._integrated_um)
-        self._steps = lru_cache(PATHS_KEPT)(self._prepared)
+        self._film_um = lru_cache(8)(self._integrated_um)
+        self._steps = lru_cache(2)(self._prepared)
 
     def points(self, slope: bool) -> SurfacePoints:
         """The P measured points, followed by the stencils where the slope is needed."""

@@ -19,17 +19,6 @@ from paint_deposition.kernel.eq2_flux import BY_COS, BY_SIN, CENTRED, EVEN, TERM
 
 # Steps of the finite differences by effects, in the vector's units.
 STEP = 1e-3
-SPREAD_OF_STARTS = 0.8
-# Candidate shapes of the pattern for each start.
-CANDIDATES_PER_START = 8
-# Steps of the first search from each start; the number of best ones that are refined.
-SCREENING_STEPS = 6
-REFINED_STARTS = 4
-MOST_STEPS = 60
-# Weight of the prior that there is no asymmetry, as a share of what the ring leaves on the points.
-EVENNESS = 0.05
-# Below this share of all paint the ring has no measurable asymmetry.
-LEAST_RING = 0.01
 
 # For functions: BLAS has one thread while they run. Threads that share matrices as small as those
 # of a fit mostly wait for each other, on a busy machine ten times as long as the work takes.
@@ -56,7 +45,7 @@ class Fit:
 
     @cached_property
     def marginal(self) -> 'Fit':
-        """The same fit with residual and Jacobian whitened by nuisance and discrepancy, too."""
+        """The fit with residual and Jacobian whitened by nuisance and discrepancy, too."""
         factor = covariance_factor(self.nuisance, self.discrepancy)
         return replace(
             self,
@@ -124,10 +113,11 @@ def fit_readings(
     for other in others:
         candidates.append(parameters.encode(parameters.start.with_patterns(other.patterns)))
     if len(candidates) > 1:
-        rough = [problem.search(start, SCREENING_STEPS) for start in candidates]
+        # A few steps from each start; the best are refined.
+        rough = [problem.search(start, 6) for start in candidates]
         rough.sort(key=lambda result: result.cost)
-        candidates = [result.x for result in rough[: REFINED_STARTS if starts > 1 else 1]]
-    found = [problem.search(start, MOST_STEPS) for start in candidates]
+        candidates = [result.x for result in rough[: 4 if starts > 1 else 1]]
+    found = [problem.search(start, 60) for start in candidates]
     best = min(found, key=lambda result: result.cost)
     fit = fit_at(forward, measured_um, sigma_um, parameters, best.x, nuisance, discrepancy)
     return replace(fit, converged=bool(best.status > 0))
@@ -179,11 +169,12 @@ def _best_starts(
         if name.rpartition('.')[2] in ('r_m', 'log_sigma1', 'log_sigma2')
     ]  # fmt: skip
     width = problem.prior.width
-    spread = ndtri(qmc.Halton(len(shape), seed=seed).random(CANDIDATES_PER_START * count))
+    # Eight candidate shapes of the pattern for each start.
+    spread = ndtri(qmc.Halton(len(shape), seed=seed).random(8 * count))
     tried = []
     for away in spread:
         vector = first.copy()
-        vector[shape] += SPREAD_OF_STARTS * width[shape] * away
+        vector[shape] += 0.8 * width[shape] * away
         shaped = np.clip(vector, problem.low, problem.high)
         vector = problem.with_best_gains(shaped)
         cost = np.sum(problem.residuals(vector, problem.terms(shaped)) ** 2)
@@ -253,7 +244,7 @@ class _Problem:
         return np.vstack([self.whitened(slopes), self.prior.whitening])
 
     def scaled_to_mean(self, vector: np.ndarray) -> np.ndarray:
-        """The same with the K1s scaled so that the mean film is right."""
+        """The vector with the K1s scaled so that the mean film is right."""
         predicted = self.predict(vector)
         weights = self.sigma**-2.0
         most = float(np.sum(weights * predicted**2))
@@ -264,7 +255,7 @@ class _Problem:
         return np.clip(scaled, self.low, self.high)
 
     def with_best_gains(self, vector: np.ndarray) -> np.ndarray:
-        """The same with the best K1, K2, K3 and phi, as far as other effects are linear.
+        """The vector with the best K1, K2, K3 and phi, as far as other effects are linear.
 
         Of several brushes K3 and phi are those that are best for the first.
         """
@@ -276,7 +267,8 @@ class _Problem:
         films = np.stack([self.terms(vector).predict_um(part) for part in parts]) / self.sigma
         films = films.reshape(pattern.count, len(one), -1)
         films[:, 2:] -= films[:, :1]
-        even = EVENNESS * np.linalg.norm(films[:, 0], axis=1)
+        # Weight of the prior that there is no asymmetry, as a share of what the ring leaves.
+        even = 0.05 * np.linalg.norm(films[:, 0], axis=1)
         evenness = np.kron(np.diag(even), np.eye(len(one))[2:])
         solved = lsq_linear(
             np.vstack([films.reshape(len(parts), -1).T, evenness]),
@@ -284,7 +276,8 @@ class _Problem:
             bounds=([0.0, 0.0, -np.inf, -np.inf] * pattern.count, np.inf),
         ).x.reshape(pattern.count, len(one))
         ring, centre = solved[:, 0], solved[:, 1]
-        if np.any(ring <= LEAST_RING * (ring + centre)):
+        # Below this share of all paint the ring has no measurable asymmetry.
+        if np.any(ring <= 0.01 * (ring + centre)):
             return self.scaled_to_mean(vector)
         found = vector.copy()
         for row, (log_k1, k2, *_) in enumerate(map(pattern.entries, range(pattern.count))):

@@ -31,19 +31,10 @@ from paint_deposition.part.points import box_centre_m
 
 # Prior probability that a campaign has a mistake of a kind, shared by all hypotheses of the kind.
 PRIOR_PROBABILITY = {'mirrored': 1e-3, 'exchanged': 1e-3, 'unit': 0.01, 'gun': 0.01}
-# Logarithm of the odds from which on there is one, and of odds that are no difference.
-SURE, ALIKE = 4.0, 2.0
-# Readings in the right place leave no more than this share of what was off beyond the noise, each
-# counted as off by so many standard deviations at most: by chance no missing effect is put right
-# as far as that.
-LEFT, LARGE = 0.25, 10.0
+# Logarithm of the odds from which on there is one.
+LEAST_LOG_ODDS = 4.0
 # Hypotheses are weighed if the logarithm of their likelihood without any field gains so much.
 WORTH_WEIGHING = 6.0
-# Film [um] and K1 [cm3/s] of the trade: medians, and standard deviations of the logarithms, where
-# a target or a model was given as well. Further off than so many of these a fit has gone astray.
-FILM_UM, FILM_SPREAD, TARGET_SPREAD = 35.0, 0.7, 0.35
-# 50 to 800 ml/min, 15 to 60 % of it solids, of which 60 to 90 % arrive.
-K1_CM3_PER_S, K1_SPREAD, GIVEN_SPREAD, ASTRAY = 1.0, 0.65, 0.4, 5.0
 # Readings over what was meant, in words, and what to do.
 FACTORS = {
     10.0: ('ten times too large', 'divide them by 10'),
@@ -53,8 +44,6 @@ FACTORS = {
     1000.0: ('like µm that were taken for mm', 'say unit: {thickness: um} in the campaign'),
     1e-3: ('like mm taken for µm', 'say unit: {thickness: mm} in the campaign'),
 }
-# One part is in another unit than the others only if the model is off on them by such factors.
-FAR_OFF = 2.5
 # What mirrors across and down make of a part.
 MIRRORED = {
     'mirrored left to right': (1, 0),
@@ -63,8 +52,6 @@ MIRRORED = {
 }
 # Kinds of mistakes by which readings are taken for those of other places.
 PLACES = ('mirrored', 'exchanged')
-# Families of effects that displace the film.
-DISPLACING = ('lateral shift', 'order', 'time')
 
 
 @dataclass(frozen=True)
@@ -104,12 +91,14 @@ class Weighed:
 
     @property
     def displaced(self) -> 'Weighed':
-        """The same readings, fitted with all effects that displace the film."""
+        """The readings, fitted with all effects that displace the film."""
         fit, own = self.fit, self.fit.model.effects
         effects = (
             effect()
             for key, effect in EFFECTS.items()
-            if effect.family in DISPLACING and not effect.acts(*LAWS) and not fit.model.effect(key)
+            if effect.family in ('lateral shift', 'order', 'time')
+            and not effect.acts(*LAWS)
+            and not fit.model.effect(key)
         )
         free = FreeParameters.of(fit.model, *own, *effects, known=fit.parameters.known)
         return replace(self, fit=self.study.fit(free, nuisance=self.study.nuisance))
@@ -126,25 +115,29 @@ class Weighed:
 
     @property
     def rough_log_weight(self) -> float:
-        """The same if the model lacks nothing, up to a constant."""
+        """Logarithm of the likelihood if the model lacks nothing, up to a constant."""
         spread = float(np.log(self.study.sigma_um).sum())
         return -0.5 * self.fit.objective - spread - self.log_scale + self.log_size()
 
     @property
     def excess(self) -> float:
-        """Mean square over the noise of what is off beyond it, each reading by LARGE at most."""
+        """Mean square over the noise of what is off beyond it, each reading by 10 at most."""
         found = self.study.residuals(self.fit.predicted_um)
-        return float(np.mean(np.minimum((found.residual_um / found.sigma_um) ** 2, LARGE**2))) - 1
+        return float(np.mean(np.minimum((found.residual_um / found.sigma_um) ** 2, 100.0))) - 1
 
     def log_size(self, factor: float = 1.0) -> float:
         """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
         target_um = self.study.campaign.target_um
-        usual, spread = (target_um, TARGET_SPREAD) if target_um else (FILM_UM, FILM_SPREAD)
+        # Film of the trade [um], or near its target: median, standard deviation of the logarithm.
+        usual, spread = (target_um, 0.35) if target_um else (35.0, 0.7)
         film = abs(np.log(self.study.measured_um.mean() / factor / usual)) / spread
-        usual, spread = K1_CM3_PER_S, K1_SPREAD
+        # K1 of the trade [cm3/s]: 50 to 800 ml/min, 15 to 60 % of it solids, of which 60 to 90 %
+        # arrive.
+        usual, spread = 1.0, 0.65
         if self.of_this_gun:
-            usual, spread = _k1(self.start), GIVEN_SPREAD
-        k1 = min(abs(np.log(_k1(self.fit.model) / factor / usual)) / spread, ASTRAY)
+            usual, spread = _k1(self.start), 0.4
+        # Further off than so many standard deviations a fit has gone astray.
+        k1 = min(abs(np.log(_k1(self.fit.model) / factor / usual)) / spread, 5.0)
         return -0.5 * (film**2 + k1**2) - float(np.log(spread))
 
 
@@ -179,20 +172,21 @@ def find_mistakes(study: Study, fit: Fit, start: DepositionModel) -> tuple[Mista
         # Where the model is off anyway, a rough likelihood is worth so much less.
         least = WORTH_WEIGHING * max(1.0 + as_given.excess, 1.0)
         least += as_given.rough_log_weight
+        # In the right place little is left of what was off: no effect is so by chance.
         worth = [
             (np.log(PRIOR_PROBABILITY[way.kind] / count[way.kind]) + meant.log_weight, way, meant)
             for way, meant in ((way, as_given.meant(way)) for way in ways)
             if meant.rough_log_weight > least
-            and (way.kind not in PLACES or meant.excess < LEFT * as_given.excess)
+            and (way.kind not in PLACES or meant.excess < 0.25 * as_given.excess)
         ]
         if not worth:
             break
         best = max(log_weight for log_weight, *_ in worth)
         # Of those that are alike, as on a part that is symmetric one way, the simplest.
-        _, way, meant = next(one for one in worth if one[0] > best - ALIKE)
-        if as_given.log_weight > best - SURE:
+        _, way, meant = next(one for one in worth if one[0] > best - 2.0)
+        if as_given.log_weight > best - LEAST_LOG_ODDS:
             break
-        if way.kind in PLACES and as_given.displaced.log_weight > best - SURE:
+        if way.kind in PLACES and as_given.displaced.log_weight > best - LEAST_LOG_ODDS:
             break
         found.append(Mistake(_sentence(way, as_given, meant), way.of_this_gun))
         as_given = meant
@@ -286,7 +280,8 @@ def _in_another_unit(given: Weighed, some: Sequence[int]) -> Iterator[Meant]:
     own = np.isin(campaign.experiment_of, some)
     weights = np.bincount(campaign.experiment_of, study.measured_um)
     over = weights / np.bincount(campaign.experiment_of, given.fit.predicted_um)
-    if not own.all() and np.ptp(np.log(over)) < np.log(FAR_OFF):
+    # One part is in another unit than the others only if the model is off on them by such factors.
+    if not own.all() and np.ptp(np.log(over)) < np.log(2.5):
         return
     for factor, (words, remedy) in FACTORS.items():
         if own.all() and given.log_size(factor) - given.log_size() < WORTH_WEIGHING:

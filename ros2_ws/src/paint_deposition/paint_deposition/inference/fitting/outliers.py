@@ -20,20 +20,14 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cholesky, solve_triangular
 from scipy.special import expit, logsumexp
 
-from paint_deposition.inference.fitting.smooth_fields import field_over_values, root_of_field
+from paint_deposition.inference.fitting.random_effects import field_over_values, root_of_field
 from paint_deposition.inference.readings.covariates import Covariate
 
-# The film's texture, as a share of it: what is usual, within a factor, and what is considered.
-USUAL_TEXTURE, TEXTURE_FACTOR = 0.01, 2.0
+# The film's texture, as a share of it: what is usual, within a factor of two, and what may be.
+USUAL_TEXTURE = 0.01
 TEXTURES = np.array([0.001, 0.003, 0.005, 0.0075, 0.01, 0.015, 0.02, 0.03, 0.045])
-# Sizes of a field as a share of the film, and lengths of its correlation: over a covariate in its
-# standard deviations, over the part in metres.
+# Sizes of a field as a share of the film.
 SHARES = (0.03, 0.1, 0.3)
-COVARIATE_LENGTH, PART_LENGTHS_M = 0.5, (0.1, 0.25)
-# Where the pattern is thin, a field is as large as where the film is this share of the mean.
-THINNEST = 0.2
-# Places on parts so far from each other have nothing in common [m].
-FAR_M = 1e6
 # Directions of a field below this share of the largest variance are left out.
 NEGLIGIBLE = 1e-3
 
@@ -54,13 +48,6 @@ class FittedPoints:
     def leave_one_out(self) -> 'LeaveOneOut':
         """Leave-one-out predictions of the readings by all models."""
         return LeaveOneOut.of(self)
-
-    def with_swapped(self, i: int, j: int) -> 'FittedPoints':
-        """The same with two readings in each other's place."""
-        residual = self.residual_um.copy()
-        more = self.predicted_um[j] + residual[j] - self.predicted_um[i] - residual[i]
-        residual[[i, j]] += more, -more
-        return replace(self, residual_um=residual)
 
     def select(self, rows: np.ndarray) -> 'FittedPoints':
         """Some of the readings."""
@@ -83,13 +70,17 @@ class LeaveOneOut:
     @staticmethod
     def of(misfit: FittedPoints) -> 'LeaveOneOut':
         """Compute all models."""
-        log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(TEXTURE_FACTOR))
-        found = []
+        log_prior = _log_normal(np.log(TEXTURES / USUAL_TEXTURE) / np.log(2.0))
+        found, residual = [], misfit.residual_um
         for field, log_share in _fields(misfit):
             directions = np.hstack([misfit.free_um, field])
             for texture, log_texture in zip(TEXTURES, log_prior, strict=True):
                 variance = misfit.gauge_um**2 + (texture * misfit.predicted_um) ** 2
-                likelihood, mean, sigma = _leave_one_out(misfit.residual_um, variance, directions)
+                solved, log_det = _solved(variance, directions)
+                weighted = residual / variance - solved.T @ (solved @ residual)
+                diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
+                likelihood = float(-0.5 * (residual @ weighted + log_det))
+                mean, sigma = residual - weighted / diagonal, diagonal**-0.5
                 found.append((likelihood + log_share + log_texture, texture, mean, sigma))
         log_weight, textures, mean, sigma = (np.array(of) for of in zip(*found, strict=True))
         return LeaveOneOut(log_weight, textures, mean, sigma, misfit.residual_um)
@@ -122,17 +113,6 @@ def _log_normal(value: ArrayLike, mean: ArrayLike = 0.0, sigma: ArrayLike = 1.0)
     return -0.5 * away**2 - 0.5 * np.log(2.0 * np.pi) - np.log(sigma)
 
 
-def _leave_one_out(
-    residual: np.ndarray, variance: np.ndarray, directions: np.ndarray
-) -> tuple[float, np.ndarray, np.ndarray]:
-    """Log likelihood, and mean and standard deviation (P,) of each reading given the others."""
-    solved, log_det = _solved(variance, directions)
-    weighted = residual / variance - solved.T @ (solved @ residual)
-    diagonal = 1.0 / variance - np.sum(solved**2, axis=0)
-    likelihood = -0.5 * (residual @ weighted + log_det)
-    return float(likelihood), residual - weighted / diagonal, diagonal**-0.5
-
-
 def _solved(variance: np.ndarray, directions: np.ndarray) -> tuple[np.ndarray, float]:
     """What their product (P, P) takes off the inverse variances, (n, P), and the determinant."""
     over = directions / variance[:, np.newaxis]
@@ -146,11 +126,14 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
 
     Nothing; a field over the part; over one covariate; over all of them at once.
     """
-    film = np.hypot(misfit.predicted_um, THINNEST * np.mean(misfit.predicted_um))[:, np.newaxis]
-    apart = np.column_stack([misfit.positions_m, FAR_M * misfit.experiment_of])
-    over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in PART_LENGTHS_M]
+    # Where the pattern is thin, a field is as large as where the film is this share of the mean.
+    film = np.hypot(misfit.predicted_um, 0.2 * np.mean(misfit.predicted_um))[:, np.newaxis]
+    # Places on parts so far from each other have nothing in common [m].
+    apart = np.column_stack([misfit.positions_m, 1e6 * misfit.experiment_of])
+    # Lengths of correlation: over the part [m], over a covariate in its standard deviations.
+    over_part = [root_of_field(apart, length, NEGLIGIBLE) for length in (0.1, 0.25)]
     scaled = [(c.values - c.values.mean()) / c.values.std() for c in misfit.covariates if c.varies]
-    over = [field_over_values(values, COVARIATE_LENGTH, NEGLIGIBLE) for values in scaled]
+    over = [field_over_values(values, 0.5, NEGLIGIBLE) for values in scaled]
     every = np.hstack([over_part[-1], *over])
     roots = [*over_part, *over, every]
     yield np.empty((len(film), 0)), np.log(0.5)
@@ -161,11 +144,6 @@ def _fields(misfit: FittedPoints) -> Iterator[tuple[np.ndarray, float]]:
 
 # Prior probability of an outlier, and the posterior one from which a reading counts as one.
 PRIOR_PROBABILITY, LEAST_PROBABILITY = 0.01, 0.9
-# A greater share of outliers than this means that the model is at fault.
-LARGEST_SHARE = 0.05
-# Prior probability that two readings of a campaign are swapped, and what the logarithm of the
-# likelihood must gain for a pair to be looked at.
-PRIOR_SWAP, WORTH_SWAPPING = 0.02, 8.0
 # Fewer points predict each other too poorly.
 FEWEST_POINTS = 20
 # A corrected value is proposed if it is within this many standard deviations of the expected one.
@@ -206,7 +184,7 @@ class Outlier:
         )
 
     def to_dict(self) -> dict[str, Any]:
-        """As results name it."""
+        """An entry of ``left_out`` in the files of results."""
         names = ('point', 'thickness_um', 'expected_um', 'sigma_um', 'guess_um', 'swapped_with')
         return {name: getattr(self, name) for name in names}
 
@@ -246,7 +224,8 @@ def find_outliers(misfit: FittedPoints, single: np.ndarray) -> dict[int, Expecte
             out = {worst: (*leave_one_out.predicted(worst), None)}
         if not out:
             return found
-        if len(found) + len(out) > max(LARGEST_SHARE * count, len(out)):
+        # A greater share of outliers means that the model is at fault.
+        if len(found) + len(out) > max(0.05 * count, len(out)):
             return {}
         found |= {int(kept[row]): expected for row, expected in out.items()}
         kept = np.delete(kept, list(out))
@@ -266,9 +245,12 @@ def _swapped(
         Of each what the others predict, as ``LeaveOneOut.predicted``, and the other row.
     """
     gain, i, j = _best_swap(misfit)
-    if gain < WORTH_SWAPPING:
+    if gain < 8.0:
         return {}
-    swapped = misfit.with_swapped(i, j)
+    residual_um = misfit.residual_um.copy()
+    more_um = misfit.predicted_um[j] + residual_um[j] - misfit.predicted_um[i] - residual_um[i]
+    residual_um[[i, j]] += more_um, -more_um
+    swapped = replace(misfit, residual_um=residual_um)
     after = swapped.leave_one_out
     found = {i: (after.predicted(i), j), j: (after.predicted(j), i)}
     for row, ((mean, sigma), _) in found.items():
@@ -278,7 +260,8 @@ def _swapped(
     likelihood = logsumexp(misfit.leave_one_out.log_weight)
     others = misfit.select(np.delete(np.arange(len(wild)), [i, j])).leave_one_out.log_weight
     both_out = wild[i] + wild[j] + np.log(2.0 * np.pi) + logsumexp(others) - likelihood
-    as_swapped = np.log(PRIOR_SWAP / pairs) + logsumexp(after.log_weight) - likelihood
+    # Prior probability that two readings of a campaign are swapped.
+    as_swapped = np.log(0.02 / pairs) + logsumexp(after.log_weight) - likelihood
     slips = log_odds[i], log_odds[j], both_out
     # Whatever is wrong with the two, both are left out; what is most probable is said.
     sure = expit(logsumexp([as_swapped, *slips])) >= LEAST_PROBABILITY

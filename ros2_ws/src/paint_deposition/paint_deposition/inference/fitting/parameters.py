@@ -73,11 +73,6 @@ class EffectParameter:
             effect.coordinates()[name],
         )  # fmt: skip
 
-    @property
-    def offset(self) -> float:
-        """Value of its coordinate where the entry is zero."""
-        return float(np.log(self.neutral)) if self.is_shape else self.neutral
-
     def encode(self, value: float) -> float:
         """The vector's entry for a value."""
         if self.is_shape:
@@ -131,7 +126,8 @@ class FreeParameters:
     @property
     def offset(self) -> np.ndarray:
         """(k,) values of a posterior's coordinates where the entries are zero."""
-        return np.array([0.0] * len(self.pattern) + [e.offset for e in self.of_effects])
+        own = [np.log(e.neutral) if e.is_shape else e.neutral for e in self.of_effects]
+        return np.array([0.0] * len(self.pattern) + own)
 
     @property
     def scale(self) -> np.ndarray:
@@ -164,14 +160,14 @@ class FreeParameters:
 
     @property
     def weak_prior(self) -> Prior:
-        """Of the vector where nothing is known of this bell."""
+        """Prior of the vector where nothing is known of this bell."""
         of_pattern = [(c.centre, c.width) for c in self.pattern.coordinates]
         centre, width = np.array(of_pattern + [(0.0, 1.0)] * len(self.varied)).T
         return Prior(centre, np.diag(width))
 
     @cached_property
     def prior(self) -> Prior:
-        """Of the vector: weak, but for what is known, widened by what differs between jobs."""
+        """Prior of the vector: weak, but for what is known, widened by how jobs differ."""
         weak, known = self.weak_prior, self.known
         if known is None:
             return weak

@@ -38,7 +38,7 @@ class PatternVector:
 
     @cached_property
     def coordinates(self) -> tuple[Coordinate, ...]:
-        """Of each entry; those of several brushes are named 'brush_2.K2' say."""
+        """Coordinate of each entry; those of several brushes are named 'brush_2.K2' say."""
         if self.count == 1:
             return PATTERN
         own = (*PATTERN[:COS], RATIO, *PATTERN[SIN + 1 :])
@@ -50,7 +50,7 @@ class PatternVector:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Of the 7 B parameters in the model's units."""
+        """Names of the 7 B parameters in the model's units."""
         return tuple(f'{self._prefix(row)}{n}' for row in range(self.count) for n in PATTERN_NAMES)
 
     def _prefix(self, row: int) -> str:
@@ -104,7 +104,11 @@ class PatternVector:
             if row:
                 asymmetry[:, [COS, SIN]] *= np.exp(vector[self._ratio(row)])
                 asymmetry[:, self._ratio(row)] = own[[COS, SIN]]
-            block[[COS, SIN]] = _slopes_of_asymmetry(own[[COS, SIN]]) @ asymmetry
+            # Of K3 cos(phi) and K3 sin(phi), where K3 <= 1, by free ones.
+            free, slopes = own[[COS, SIN]], np.eye(2)
+            if (k3 := np.hypot(*free)) > 1.0:
+                slopes = (slopes - np.outer(free, free) / k3**2) / k3
+            block[[COS, SIN]] = slopes @ asymmetry
         return found
 
     def subset(self, whole: 'PatternVector', vector: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -151,11 +155,3 @@ class PatternVector:
         """The patterns of parameters (7 B,)."""
         each = np.reshape(values, (self.count, -1)).tolist()
         return [PlanarPattern(**dict(zip(PATTERN_NAMES, own, strict=True))) for own in each]
-
-
-def _slopes_of_asymmetry(entries: np.ndarray) -> np.ndarray:
-    """(2, 2) derivative of K3 cos(phi) and K3 sin(phi), where K3 <= 1, by free ones (2,)."""
-    size = np.hypot(*entries)
-    if size <= 1.0:
-        return np.eye(2)
-    return (np.eye(2) - np.outer(entries, entries) / size**2) / size

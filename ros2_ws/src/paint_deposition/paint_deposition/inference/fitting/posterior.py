@@ -1,4 +1,7 @@
-"""The posterior of a fit: the prior of the next job, and models drawn from it."""
+"""The posterior of a fit: the prior of the next job, and models drawn from it.
+
+A campaign starts from the brushes that painted it, and from what is known of these.
+"""
 
 from __future__ import annotations
 
@@ -11,16 +14,15 @@ from scipy.special import chdtri
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
-from paint_deposition.errors import ModelError
+from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.inference.readings.campaign import Campaign
-
-# Settings that differ by a larger share than this are others.
-OTHER_SETTING = 0.05
+from paint_deposition.model.eq1_pattern import Brush, SetPoints, listed
+from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
 def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> Posterior:
@@ -29,9 +31,10 @@ def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None)
     scale = parameters.scale
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
     known = parameters.known.readings if parameters.known else ()
+    own = (experiment.taken.fingerprint for experiment in campaign.experiments)
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,
-        0.5 * (covariance + covariance.T), readings=(*known, *fingerprints(campaign)),
+        0.5 * (covariance + covariance.T), readings=(*known, *own),
         process=campaign.settings,
     )  # fmt: skip
 
@@ -76,7 +79,7 @@ def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Post
     return Posterior.of(new, mean, matrix, readings=known.readings, process=known.process)
 
 
-def usable(
+def prior_for(
     known: Posterior | None, campaign: Campaign
 ) -> tuple[Posterior | None, tuple[str, ...]]:
     """What may serve as the prior for a campaign, and a remark where it may not.
@@ -98,17 +101,10 @@ def usable(
         'pattern may differ by more than jobs do.'
         for name, then in known.process.items()
         for now in [campaign.settings.get(name, then)]
-        if abs(now - then) > OTHER_SETTING * abs(then)
+        if abs(now - then) > 0.05 * abs(then)
     )
 
 
-def fingerprints(campaign: Campaign) -> tuple[str, ...]:
-    """Of the readings of each experiment."""
-    return tuple(experiment.taken.fingerprint for experiment in campaign.experiments)
-
-
-# Values of a learned curve so many knots apart have nearly independent errors.
-KNOTS_TOGETHER = 2.0
 # If fewer draws than one in so many are physical, the posterior belongs to another model.
 MOST_ROUNDS = 1000
 
@@ -163,15 +159,11 @@ def _draw_curve(effect: Effect, rng: np.random.Generator) -> Effect:
     if not (isinstance(effect, LearnedCurve) and effect.sd):
         return effect
     knots = np.arange(len(effect.sd))
-    apart = np.subtract.outer(knots, knots) / KNOTS_TOGETHER
+    # Values so many knots apart have nearly independent errors.
+    apart = np.subtract.outer(knots, knots) / 2.0
     covariance = np.exp(-0.5 * apart**2) * np.outer(effect.sd, effect.sd)
     learned = rng.multivariate_normal(effect.learned, covariance, method='eigh')
     return effect.model_copy(update={'learned': tuple(learned.tolist())})
-
-
-# Of jobs that differ as assumed this share lies nearer than what is called usual, and this share
-# nearer than what is warned of.
-USUAL, ALARMING = 0.95, 0.999
 
 
 @dataclass(frozen=True)
@@ -185,7 +177,7 @@ class PatternShift:
 
     @staticmethod
     def of(fit: Fit) -> PatternShift | None:
-        """Of a fit; None where no readings stand behind what is known."""
+        """Distance of a fit; None where no readings stand behind what is known."""
         known, pattern = fit.parameters.known, fit.parameters.pattern
         if known is None or not known.readings:
             return None
@@ -201,12 +193,12 @@ class PatternShift:
     @property
     def usual(self) -> float:
         """Distance that 95 % of jobs stay below if they differ as assumed."""
-        return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - USUAL)))
+        return float(np.sqrt(chdtri(len(self.by_coordinate), 1.0 - 0.95)))
 
     @property
     def is_alarming(self) -> bool:
-        """Whether hardly any job differs as much."""
-        return bool(self.distance > np.sqrt(chdtri(len(self.by_coordinate), 1.0 - ALARMING)))
+        """Whether one job in a thousand differs as much, if they differ as assumed."""
+        return bool(self.distance > np.sqrt(chdtri(len(self.by_coordinate), 1.0 - 0.999)))
 
     def __str__(self) -> str:
         name, most = max(self.by_coordinate.items(), key=lambda item: abs(item[1]))
@@ -224,9 +216,51 @@ class PatternShift:
         )
 
     def to_dict(self) -> dict[str, object]:
-        """As in ``diagnosis.json``."""
+        """The entry ``pattern_shift`` in ``diagnosis.json``."""
         return {
             'standard_deviations': self.distance,
             'usual': self.usual,
             'by_coordinate': self.by_coordinate,
         }
+
+
+def with_brushes_of(campaign: Campaign, model: DepositionModel) -> DepositionModel:
+    """A model with the brushes that painted a campaign's parts, and no others.
+
+    One pattern is the first guess of all brushes, with the set-points of the recordings.
+
+    Raises:
+        ModelError: the model has brushes, but not one of these.
+        ReadingsError: some recordings name their brush and others do not.
+    """
+    numbers = campaign.brushes
+    if model.brushes or len(numbers) <= 1:
+        return model.of_numbers(numbers)
+    if ONLY_BRUSH in numbers:
+        silent = next(e.name for e in campaign.experiments if ONLY_BRUSH in e.brushes)
+        raise ReadingsError(
+            f"experiment '{silent}' names no brush, others name {listed(numbers - {ONLY_BRUSH})}: "
+            'give it `brush: NUMBER` in the campaign'
+        )
+    return DepositionModel.of_brushes(
+        (
+            Brush(number=n, planar=model.planar, **_set_points(campaign, n).model_dump())
+            for n in numbers
+        ),
+        projection=model.projection, effects=model.effects,
+    )  # fmt: skip
+
+
+def _set_points(campaign: Campaign, number: int) -> SetPoints:
+    """Medians over the recordings with this brush alone."""
+    found = {}
+    # What recordings hold of the process beside the flow, which is relative to the brush's.
+    for name in ('shaping_air_l_per_min', 'bell_speed_rpm', 'voltage_kv'):
+        recorded = [
+            abs(e.settings[name])
+            for e in campaign.experiments
+            if e.brushes == {number} and e.settings.get(name)
+        ]
+        if recorded:
+            found[name] = float(np.median(recorded))
+    return SetPoints(**found)

@@ -4,12 +4,16 @@ They are independent for every part and session. Only differences count: what al
 is for K1 and the effects to explain. Parts and sessions of which no reading is used have none: the
 model predicts them at the centre of their prior, as it predicts a part that is still unpainted. A
 part that was painted with something switched off has a level of its own, independent of the
-others.
+others. Smooth random fields over parts and covariates are given by roots of their covariances.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.spatial.distance import cdist
 
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.readings.campaign import Campaign
@@ -22,8 +26,6 @@ OTHER_LEVEL_SHARE = 0.3
 # The gauge's zero shifts by about this much from session to session and from operator to operator;
 # 0.3 to 1 um are usual [um].
 SESSION_UM = 0.7
-# An amount beyond this many of its standard deviations is worth a mention.
-NOTABLE = 2.0
 
 
 @dataclass(frozen=True)
@@ -52,7 +54,7 @@ class Amount:
     @property
     def is_notable(self) -> bool:
         """Whether it differs from zero by more than chance would have it."""
-        return abs(self.value) > NOTABLE * self.sd
+        return abs(self.value) > 2.0 * self.sd
 
     def __str__(self) -> str:
         return f'{self.kind} of {self.of}: {self.value:+.2f} ± {self.sd:.2f} {self.unit}'
@@ -113,3 +115,50 @@ def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:
 def _contrasts(known: np.ndarray) -> np.ndarray:
     """(n, n) amounts without what all those of n that are known (n,) have in common."""
     return np.diag(1.0 * known) - np.outer(known, known) / max(np.count_nonzero(known), 1)
+
+
+Correlation = Callable[[ArrayLike], np.ndarray]
+
+
+def smooth(away: ArrayLike) -> np.ndarray:
+    """Correlation at a distance over its length: that of a field without any edge."""
+    return np.exp(-0.5 * np.square(away))
+
+
+def with_edges(away: ArrayLike) -> np.ndarray:
+    """Correlation of a field that may bend sharply: Matérn's with smoothness 3/2."""
+    scaled = np.sqrt(3.0) * np.asarray(away)
+    return (1.0 + scaled) * np.exp(-scaled)
+
+
+def root_of_field(
+    places: np.ndarray, length: float, negligible: float, correlation: Correlation = smooth
+) -> np.ndarray:
+    """(N, n) square root of the covariance of a field of unit variance; not to be changed.
+
+    Args:
+        places: (N, D) where its values are.
+        negligible: directions below this share of the largest variance are left out.
+        correlation: at a distance over the length.
+    """
+    places = np.ascontiguousarray(places, dtype=float)
+    return _root(places.tobytes(), places.shape, length, negligible, correlation)
+
+
+# While models change, most places and lengths stay.
+@lru_cache(128)
+def _root(
+    places: bytes, shape: tuple[int, int], length: float, negligible: float,
+    correlation: Correlation,
+) -> np.ndarray:  # fmt: skip
+    at = np.frombuffer(places).reshape(shape)
+    values, vectors = np.linalg.eigh(correlation(cdist(at, at) / length))
+    kept = values > negligible * values[-1]
+    root = vectors[:, kept] * np.sqrt(values[kept])
+    root.flags.writeable = False
+    return root
+
+
+def field_over_values(values: np.ndarray, length: float, negligible: float) -> np.ndarray:
+    """(P, n) root of a field of unit variance over values (P,), with a length of correlation."""
+    return root_of_field(values[:, np.newaxis], length, negligible)

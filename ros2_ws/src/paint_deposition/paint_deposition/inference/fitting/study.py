@@ -20,16 +20,12 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate, Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
 from paint_deposition.inference.readings.plausibility import check_unit
-from paint_deposition.inference.readings.residuals import Residuals, root_mean_square
+from paint_deposition.inference.readings.readings import Residuals, root_mean_square
 
 # Times that points are left out for cross-validation, each of them once.
 FOLDS = 6
 # Texture that is assumed where the readings do not show it.
 TEXTURE_SHARE = 0.01
-# What facets cost the film is left out below this share of the noise, and reported from this.
-LEAST_FACETS, WORTH_REPORTING = 0.1, 1.0
-# Standard deviation of a reading that a fit does not use [um].
-NOT_USED_UM = 1e9
 
 
 @dataclass(frozen=True)
@@ -99,20 +95,15 @@ class Study:
         return np.hypot(np.hypot(self.gauge_um, self.texture.share * self.measured_um), facets_um)
 
     def with_facets(self, model: DepositionModel) -> 'Study':
-        """The same with what facets cost under a model, if it shows beside the noise."""
+        """The study with what facets cost under a model, if it shows beside the noise."""
         parts = ((e.surface, e.measured_points, e.path) for e in self.campaign.experiments)
         facet_um = np.concatenate([facet_errors_um(*part, model) for part in parts])
-        if np.all(np.abs(facet_um) < LEAST_FACETS * self.sigma_um):
+        if np.all(np.abs(facet_um) < 0.1 * self.sigma_um):
             return self
         return replace(self, facet_um=facet_um)
 
-    def without(self, outliers: dict[int, Outlier]) -> 'Study':
-        """The same without some points, by their row."""
-        kept = ~np.isin(np.arange(len(self)), list(outliers))
-        return replace(self.of_points(kept), outliers=tuple(outliers.values()))
-
     def of_points(self, kept: np.ndarray) -> 'Study':
-        """The same with some of the points only, (P,) bool.
+        """The study with some of the points only, (P,) bool.
 
         Raises:
             ReadingsError: an experiment has no reading left.
@@ -163,7 +154,7 @@ class Study:
         return Residuals(self.measured_um, levelled_um, self.sigma_um)
 
     def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
-        """The same for each experiment on its own."""
+        """Residuals of each experiment on its own."""
         residuals, owner = self.residuals(predicted_um), self.campaign.experiment_of
         return tuple(residuals.select(owner == k) for k in range(len(self.campaign.experiments)))
 
@@ -242,7 +233,7 @@ class Study:
         own = own if free is None else free
         count, kept = own.shape[1], (~out)[:, np.newaxis]
         found = fit_readings(
-            self.forward, self.measured_um, np.where(out, NOT_USED_UM, self.sigma_um),
+            self.forward, self.measured_um, np.where(out, 1e9, self.sigma_um),
             replace(fit.parameters, start=fit.model), nuisance=kept * np.hstack([own, nuisance]),
             others=(fit.parameters.start,),
         )  # fmt: skip
@@ -276,7 +267,7 @@ class Study:
         for number, name in enumerate(e.name for e in self.campaign.experiments):
             off_um = np.where(owner == number, np.abs(self.facet_um), 0.0)
             worst = int(off_um.argmax())
-            if off_um[worst] > WORTH_REPORTING * self.gauge_um[worst]:
+            if off_um[worst] > self.gauge_um[worst]:
                 found.append(
                     f'The mesh of {name} is coarser than its curvature allows: its facets put the '
                     f'film off by up to {off_um[worst]:.1f} µm at the readings, where the gauge '

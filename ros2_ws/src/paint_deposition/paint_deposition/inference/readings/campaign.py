@@ -87,15 +87,20 @@ class Experiment:
         )  # fmt: skip
 
     def with_readings(self, readings: Readings) -> 'Experiment':
-        """The same part with other readings; raises what ``of`` does."""
+        """The part with other readings; raises what ``of`` does."""
         found = Experiment.of(
             self.name, self.surface, self.path, readings, self.files, self.settings,
             self.switched_off, self.frame_id, self.films,
         )  # fmt: skip
         return replace(found, layer=self.layer, zones=self.zones, target=self.target)
 
+    def read_as(self, readings: Readings) -> 'Experiment':
+        """The part with other films read at the same points; nothing is matched anew."""
+        means, used = PointMeans.of(readings), np.ones(len(readings), dtype=bool)
+        return replace(self, readings=readings, means=means, taken=readings, used=used)
+
     def without(self, left_out: np.ndarray) -> 'Experiment':
-        """The same part without some of the readings (N,) that were used.
+        """The part without some of the readings (N,) that were used.
 
         Raises:
             ReadingsError: no reading is left.
@@ -227,7 +232,7 @@ class Campaign:
         return {name: float(np.mean(values)) for name, values in known.items()}
 
     def without(self, left_out: np.ndarray) -> 'Campaign':
-        """The same campaign without some of its readings (N,).
+        """The campaign without some of its readings (N,).
 
         Raises:
             ReadingsError: an experiment has no reading left.

@@ -9,11 +9,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import along_path, at_points
 from paint_deposition.inference.readings.campaign import Experiment
 
-# Most sub-steps from which rays are traced; a longer path is thinned.
-SUB_STEPS_USED = 4000
-# A quantity whose standard deviation is a smaller share of its largest value is constant.
-ROUNDING = 1e-4
-
 
 @dataclass(frozen=True)
 class Covariate:
@@ -25,7 +20,7 @@ class Covariate:
     @property
     def varies(self) -> bool:
         """Whether it differs between points by more than rounding in the recording."""
-        return bool(np.std(self.values) > ROUNDING * np.max(np.abs(self.values)))
+        return bool(np.std(self.values) > 1e-4 * np.max(np.abs(self.values)))
 
 
 @dataclass(frozen=True)
@@ -43,10 +38,10 @@ class Rays:
 
     @staticmethod
     def of(experiment: Experiment, model: DepositionModel) -> 'Rays':
-        """Trace them in plain NumPy; sub-steps are thinned to SUB_STEPS_USED."""
+        """Trace them in plain NumPy; the sub-steps of a long path are thinned."""
         path, points = experiment.path, experiment.measured_points
         rows = np.flatnonzero(path.flow * path.dwell_s > 0.0)
-        stride = 1 + len(rows) // SUB_STEPS_USED
+        stride = 1 + len(rows) // 4000
         rows = rows[::stride]
         axes = path.rotation[rows]
         offset, omega = model.projection.emission_offset_m, model.projection.model_plane_m

@@ -10,30 +10,17 @@ import numpy as np
 from scipy.ndimage import median
 from scipy.special import ndtri, stdtrit
 
-from paint_deposition.inference.readings.readings import PointMeans, Readings
-from paint_deposition.inference.readings.residuals import root_mean_square
+from paint_deposition.inference.readings.readings import PointMeans, Readings, root_mean_square
 
-# A usual magnetic or eddy-current gauge, for readings that say nothing of their noise.
-ASSUMED_FLOOR_UM = 0.7
-ASSUMED_SHARE = 0.01
 # Fewer degrees of freedom from repeats than this are not trusted alone.
 ENOUGH_REPEATS = 6
 # An assumed noise counts like an estimate with these degrees of freedom: it may be off by a third.
 ASSUMED_FREEDOM = 5.0
-# Repeats that are off by more standard deviations are gross outliers. Where the standard deviation
-# is estimated from few repeats, the limit is the quantile of Student's t that sound readings
-# exceed with this probability.
-GROSS_SIGMAS = 5.0
-GROSS_PROBABILITY = 1e-4
-# The scale is at least this share of the usual noise: a display in whole um shows many repeats
-# without any scatter.
-LEAST_SCALE = 0.5
-MOST_ROUNDS = 20
 
 
 def usual_noise_um(thickness_um: np.ndarray) -> np.ndarray:
-    """(N,) standard deviation of a usual gauge at these films [um]."""
-    return np.hypot(ASSUMED_FLOOR_UM, ASSUMED_SHARE * thickness_um)
+    """(N,) standard deviation of a usual magnetic or eddy-current gauge at these films [um]."""
+    return np.hypot(0.7, 0.01 * thickness_um)
 
 
 def gross_outliers(readings: Readings) -> np.ndarray:
@@ -46,9 +33,7 @@ def gross_outliers(readings: Readings) -> np.ndarray:
     stated, gross = readings.sigma_um, np.zeros(len(readings), dtype=bool)
     for pool in (np.isnan(stated), np.isfinite(stated)):
         if pool.any():
-            own = readings.select(pool)
-            repeats = _Repeats(own.thickness_um, own.sigma_um, PointMeans.of(own).owner)
-            gross[pool] = repeats.gross()
+            gross[pool] = _gross(readings.select(pool))
     return gross
 
 
@@ -76,57 +61,46 @@ def _listed(thickness_um: np.ndarray) -> str:
     return ', '.join(f'{value:.4g}' for value in thickness_um)
 
 
-class _Repeats:
-    """Readings of one gauge at K points.
+def _gross(readings: Readings) -> np.ndarray:
+    """(N,) outliers of one gauge, from a robust scale and iterated until the set stays."""
+    owner = PointMeans.of(readings).owner
+    count = np.bincount(owner)
+    middle = median(readings.thickness_um, owner, np.arange(len(count)))[owner]
+    scaled = (readings.thickness_um - middle) / np.fmax(usual_noise_um(middle), readings.sigma_um)
+    # From the point's median, or from the other of two, over its usual error.
+    number = count[owner]
+    error = np.sqrt(number / np.maximum(number - 1, 1))
+    distance = np.where(number == 2, 2.0, 1.0) * np.abs(scaled) / error
 
-    Attributes:
-        owner: (N,) point of each reading. count: (K,) readings at each point.
-        scaled: (N,) readings over the usual noise at their point.
-        distance: (N,) from the point's median, or from the other of two, over its usual error.
-    """
+    def beyond(scale: float, freedom: float) -> np.ndarray:
+        # Where the standard deviation is estimated from few repeats, the limit is the quantile of
+        # Student's t that sound readings exceed once in ten thousand.
+        sigmas = max(5.0, -float(stdtrit(freedom, 0.5e-4)))
+        # At least this share of the usual noise: a display in whole um shows many repeats without
+        # any scatter.
+        far = distance > sigmas * max(scale, 0.5)
+        outliers = np.bincount(owner, far)
+        undecided = 2.0 * outliers >= count
+        return far | ((outliers > 0.0) & undecided)[owner]
 
-    def __init__(self, thickness_um: np.ndarray, stated_um: np.ndarray, owner: np.ndarray):
-        self.owner, self.count = owner, np.bincount(owner)
-        middle = median(thickness_um, owner, np.arange(len(self.count)))[owner]
-        usual = np.fmax(usual_noise_um(middle), stated_um)
-        number = self.count[owner]
-        self.scaled = (thickness_um - middle) / usual
-        reference = np.where(number == 2, 2.0, 1.0)
-        error = np.sqrt(number / np.maximum(number - 1, 1))
-        self.distance = reference * np.abs(self.scaled) / error
-
-    def gross(self) -> np.ndarray:
-        """(N,) outliers, from a robust scale and iterated until the set no longer changes."""
-        if len(self.owner) - len(self.count) < ENOUGH_REPEATS:
-            return self._beyond(1.0, ASSUMED_FREEDOM)
-        gross = self._beyond(self._robust_scale(), np.inf)
-        for _ in range(MOST_ROUNDS):
-            before, gross = gross, self._beyond(*self._pooled(~gross))
-            if np.array_equal(before, gross):
-                break
-        return gross
-
-    def _robust_scale(self) -> float:
-        """Median of the distances, consistent for normal noise."""
-        order = np.lexsort((self.distance, self.owner))
-        # At each point one distance is redundant: half of a pair, or the median of three itself.
-        own = np.diff(self.owner[order], prepend=-1) == 0
-        return float(np.median(self.distance[order][own]) / ndtri(0.75))
-
-    def _pooled(self, kept: np.ndarray) -> tuple[float, float]:
-        """Pooled scale of the kept readings within points, and its degrees of freedom."""
-        count = np.bincount(self.owner, kept)
-        mean = np.bincount(self.owner, kept * self.scaled) / np.maximum(count, 1.0)
-        freedom = max(float(np.maximum(count - 1.0, 0.0).sum()), 1.0)
-        squares = float(np.sum(kept * (self.scaled - mean[self.owner]) ** 2))
-        return np.sqrt(squares / freedom), freedom
-
-    def _beyond(self, scale: float, freedom: float) -> np.ndarray:
-        sigmas = max(GROSS_SIGMAS, -float(stdtrit(freedom, 0.5 * GROSS_PROBABILITY)))
-        far = self.distance > sigmas * max(scale, LEAST_SCALE)
-        outliers = np.bincount(self.owner, far)
-        undecided = 2.0 * outliers >= self.count
-        return far | ((outliers > 0.0) & undecided)[self.owner]
+    if len(owner) - len(count) < ENOUGH_REPEATS:
+        return beyond(1.0, ASSUMED_FREEDOM)
+    order = np.lexsort((distance, owner))
+    # At each point one distance is redundant: half of a pair, or the median of three itself.
+    own = np.diff(owner[order], prepend=-1) == 0
+    # The median of the distances is consistent for normal noise.
+    gross = beyond(float(np.median(distance[order][own]) / ndtri(0.75)), np.inf)
+    for _ in range(20):
+        # The scale of the kept readings, pooled within points, and its degrees of freedom.
+        kept, before = ~gross, gross
+        left = np.bincount(owner, kept)
+        mean = np.bincount(owner, kept * scaled) / np.maximum(left, 1.0)
+        freedom = max(float(np.maximum(left - 1.0, 0.0).sum()), 1.0)
+        squares = float(np.sum(kept * (scaled - mean[owner]) ** 2))
+        gross = beyond(np.sqrt(squares / freedom), freedom)
+        if np.array_equal(before, gross):
+            break
+    return gross
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,8 @@ from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.points import box_words
 from paint_deposition.part.surface import Surface
 
-# Readings further from the surface, or facing more away from it, do not belong to the part.
+# Readings further from the surface do not belong to the part.
 MAX_DISTANCE_M = 0.02
-MAX_ANGLE_RAD = np.radians(60.0)
 # Ways in which a file may have been meant, by the factor on its positions.
 OTHER_UNITS = {
     0.001: 'they fit in millimetres: the file says metres, or its unit is wrong',
@@ -19,15 +18,6 @@ OTHER_UNITS = {
     0.0254: 'they fit in inches',
 }
 NEAR_M = 0.02
-# Readings span at least this share of the part's longest side, or a spot of it was measured.
-LEAST_SPAN = 0.1
-# Units taken for mm, by the same factor, where readings span less than this share of the part.
-TAKEN_FOR_MM = {10.0: 'cm', 25.4: 'inch'}
-SMALL_SPAN = 0.25
-# Readings that span less than this share are metres taken for millimetres, if they fit so.
-SPOT = 0.01
-# Boxes whose sides agree this well are the same part at another place.
-ALIKE = 0.25
 
 
 def refuse_off_surface(
@@ -44,9 +34,9 @@ def refuse_off_surface(
             f"point '{readings.point[means.first[worst]]}' at ({where}) m by "
             f'{distance_m[worst]:.3f} m (limit {MAX_DISTANCE_M:g}); {_hint(surface, places_m)}'
         )
-    # Readings clustered on a spot of the part, and fit if they are a thousand times larger.
+    # Readings clustered on a spot of the part are metres taken for mm, if they fit so.
     longest = np.ptp(surface.vertices_m, axis=0).max()
-    clustered = len(places_m) > 1 and np.ptp(places_m, axis=0).max() < SPOT * longest
+    clustered = len(places_m) > 1 and np.ptp(places_m, axis=0).max() < 0.01 * longest
     if clustered and _fits(surface, 1000.0 * places_m):
         hint = _hint(surface, places_m)
         raise ReadingsError(f'{readings.source}: all points lie on one spot: {hint}')
@@ -55,13 +45,14 @@ def refuse_off_surface(
 def unit_in_doubt(surface: Surface, readings: Readings) -> str:
     """A warning of positions in a guessed unit that fit the part in another; '' for none."""
     places_m, part_m = readings.positions_m, np.ptp(surface.vertices_m, axis=0)
-    small = np.ptp(places_m, axis=0) < SMALL_SPAN * part_m
+    small = np.ptp(places_m, axis=0) < 0.25 * part_m
     # The part may have no extent across its surface.
     if not readings.unit_is_guessed or not np.all(small | (part_m < NEAR_M)):
         return ''
+    # Units that may have been taken for mm.
     units = [
         unit
-        for factor, unit in TAKEN_FOR_MM.items()
+        for factor, unit in {10.0: 'cm', 25.4: 'inch'}.items()
         if surface.locate(factor * places_m).distance_m.max() < MAX_DISTANCE_M
     ]
     if not units:
@@ -76,7 +67,7 @@ def unit_in_doubt(surface: Surface, readings: Readings) -> str:
 
 def refuse_other_side(readings: Readings, means: PointMeans, angle_rad: np.ndarray) -> None:
     """Refuse points whose normals (P,) are turned this far from the surface's [rad]."""
-    away = np.count_nonzero(angle_rad > MAX_ANGLE_RAD)
+    away = np.count_nonzero(angle_rad > np.radians(60.0))
     if away:
         worst = int(np.argmax(angle_rad))
         raise ReadingsError(
@@ -97,7 +88,8 @@ def _hint(surface: Surface, positions_m: np.ndarray) -> str:
     if np.median(distance) < NEAR_M:
         return f'{boxes}; most points lie on the part: check these'
     sides, part = (np.sort(np.ptp(each, axis=0)) for each in (positions_m, vertices))
-    if np.all(sides <= (1.0 + ALIKE) * part + NEAR_M):
+    # Boxes whose sides agree this well are the same part at another place.
+    if np.all(sides <= 1.25 * part + NEAR_M):
         return f'{boxes}; they look like positions in another frame: give them in the mesh frame'
     return f'{boxes}; give positions in the mesh frame, in metres, or name their unit with unit:'
 
@@ -105,20 +97,13 @@ def _hint(surface: Surface, positions_m: np.ndarray) -> str:
 def _fits(surface: Surface, positions_m: np.ndarray) -> bool:
     """Whether most positions lie on the part and span a good share of it."""
     span = np.ptp(positions_m, axis=0).max()
-    if span < LEAST_SPAN * np.ptp(surface.vertices_m, axis=0).max():
+    # Readings span at least this share of the part's longest side, or a spot of it was measured.
+    if span < 0.1 * np.ptp(surface.vertices_m, axis=0).max():
         return False
     return bool(np.median(surface.locate(positions_m).distance_m) < NEAR_M)
 
 
 FEWEST_ON_A_LINE = 3
-# Lines lie this much further apart than the readings of one line stray from it.
-CLEAR_RATIO = 3.0
-# Readings on one line are not known to be straighter than this [m].
-STRAIGHT_M = 1e-3
-# So many of the points at least belong to a line, or there are none.
-SHARE_ON_LINES = 0.8
-# A single line is this much longer than wide.
-SINGLE_RATIO = 10.0
 
 
 def columns_or_rows(surface: Surface, path: SprayPath, positions_m: np.ndarray) -> np.ndarray:
@@ -153,14 +138,17 @@ def _lines(aside_m: np.ndarray, along_m: np.ndarray) -> np.ndarray | None:
     """(P,) number of the line of each point, -1 for none; None where there are no lines."""
     if len(aside_m) < FEWEST_ON_A_LINE:
         return None
-    if np.ptp(aside_m) <= np.ptp(along_m) / SINGLE_RATIO:
+    # A single line is this much longer than wide.
+    if np.ptp(aside_m) <= np.ptp(along_m) / 10.0:
         return np.zeros(len(aside_m), dtype=int)
     order = np.argsort(aside_m, kind='stable')
     gaps = np.diff(aside_m[order])
-    largest = np.maximum(np.sort(gaps)[::-1], STRAIGHT_M)
+    # Readings on one line are not known to be straighter than this [m].
+    largest = np.maximum(np.sort(gaps)[::-1], 1e-3)
     ratios = largest[:-1] / largest[1:]
     ratios = ratios[: len(aside_m) // FEWEST_ON_A_LINE]
-    if not len(ratios) or ratios.max() < CLEAR_RATIO:
+    # Lines lie this much further apart than the readings of one line stray from it.
+    if not len(ratios) or ratios.max() < 3.0:
         return None
     least = largest[int(np.argmax(ratios))]
     cluster = np.empty(len(aside_m), dtype=int)
@@ -168,6 +156,7 @@ def _lines(aside_m: np.ndarray, along_m: np.ndarray) -> np.ndarray | None:
     counts = np.bincount(cluster)
     kept = counts >= FEWEST_ON_A_LINE
     widths = [np.ptp(aside_m[cluster == k]) for k in np.flatnonzero(kept)]
-    if counts[kept].sum() < SHARE_ON_LINES * len(aside_m) or max(widths) > least:
+    # So many of the points at least belong to a line, or there are none.
+    if counts[kept].sum() < 0.8 * len(aside_m) or max(widths) > least:
         return None
     return np.where(kept, np.cumsum(kept) - 1, -1)[cluster]

@@ -4,14 +4,12 @@ from collections.abc import Iterator
 
 import numpy as np
 from scipy.spatial import cKDTree
-from scipy.special import chdtrc
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError, some
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator
 from paint_deposition.film.spray_geometry import SprayGeometry, spray_geometry
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.panel import Panel
 from paint_deposition.inference.readings.placement import unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.part.surface import Surface
@@ -22,34 +20,16 @@ FEWEST_POINTS = 10
 UNITS = {'mils': 25.4, 'mm': 1000.0}  # um in each
 # No paint film is thinner than this everywhere; such numbers are mils or millimetres.
 THINNEST_FILM_UM = 3.0
-THINNEST_MILS = 0.15
 # Two units in one column leave a gap: sorted by size, neighbours differ by more than this factor.
 LEAST_GAP = 6.0
 UNIT_SLACK = 1.8
-NEGATIVE_SIGMAS = 4.0
-# The film has structure if noise alone scatters as much with a smaller probability.
-NO_STRUCTURE_P = 1e-3
-# A point lies beside a pass from this share of the panel's scale on.
-BESIDE = 0.05
-MOST_NAMED = 6
-# A film is near a target if the logarithm of their ratio is no larger.
-NEAR = np.log(1.5)
-
-
-def check_enough(points: int) -> None:
-    """Refuse a campaign with hardly more points than the pattern has parameters."""
-    if points < FEWEST_POINTS:
-        raise ReadingsError(
-            f'readings at {points} points; the pattern has 7 parameters, measure at least '
-            f'{FEWEST_POINTS} points, better 30'
-        )
 
 
 def check_unit(readings: Readings) -> None:
     """Refuse readings in another unit."""
     highest = float(readings.thickness_um.max())
     if highest < THINNEST_FILM_UM:
-        unit = 'mils' if highest > THINNEST_MILS else 'mm'
+        unit = 'mils' if highest > 0.15 else 'mm'
         raise ReadingsError(
             f'{readings.source}: thickness_um is at most {highest:g}; these look like {unit}, '
             f'multiply by {UNITS[unit]:g}'
@@ -63,7 +43,7 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
         sigma_um: (N,) standard deviation of a reading [um].
     """
     film = readings.thickness_um
-    below = film < -NEGATIVE_SIGMAS * sigma_um
+    below = film < -4.0 * sigma_um
     if below.any():
         worst = int(np.argmin(film))
         raise ReadingsError(
@@ -84,35 +64,6 @@ def check_readings(readings: Readings, sigma_um: np.ndarray) -> None:
     for unit, exact in UNITS.items():
         if exact / UNIT_SLACK < factor < exact * UNIT_SLACK:
             raise _other_unit(readings, low, high, unit)
-
-
-def check_panel(
-    readings: Readings, panel: Panel, measured_um: np.ndarray, sigma_um: np.ndarray
-) -> None:
-    """Refuse a panel whose readings cannot determine a pass.
-
-    Args:
-        readings: as taken. panel: where points and passes lie.
-        measured_um, sigma_um: (P,) point means and their standard deviations [um].
-    """
-    places = panel.places_m
-    nearest = places[np.arange(len(places)), np.abs(places).argmin(axis=1)]
-    beside = BESIDE * panel.scale_m
-    if nearest.min() > -beside or nearest.max() < beside:
-        missing = 'x < 0' if nearest.min() > -beside else 'x > 0'
-        raise ReadingsError(
-            f'{readings.source}: all readings lie on one side of the passes ({missing} is bare '
-            'of readings, x from tool z times travel); measure across whole passes'
-        )
-    weights = sigma_um**-2.0
-    mean = float(weights @ measured_um) / float(weights.sum())
-    scatter = float(weights @ (measured_um - mean) ** 2)
-    if chdtrc(len(measured_um) - 1, scatter) > NO_STRUCTURE_P:
-        raise ReadingsError(
-            f'{readings.source}: the film varies by no more than the noise of the gauge '
-            f'({float(measured_um.std()):.2f} µm between points); there is no pattern in it, '
-            'measure beyond the passes or paint at a wider index'
-        )
 
 
 def check_units_against_fit(
@@ -154,7 +105,7 @@ def zeros_in_doubt(readings: Readings, expected_um: np.ndarray) -> str:
     rows = (readings.thickness_um == 0.0) & (expected_um > THINNEST_FILM_UM)
     if readings.zero_is_film or not rows.any():
         return ''
-    named = some(list(dict.fromkeys(readings.point[rows].tolist())), MOST_NAMED)
+    named = some(list(dict.fromkeys(readings.point[rows].tolist())), 6)
     low, high = expected_um[rows].min(), expected_um[rows].max()
     return (
         f'{np.count_nonzero(rows)} of {len(readings)} readings are 0 where the model expects '
@@ -205,7 +156,8 @@ def targets_in_doubt(experiment: Experiment, target_um: float) -> Iterator[str]:
     wanted += [(f"zone '{one.name}'", one.target_um, k) for k, one in enumerate(zones)]
     for name, wanted_um, zone in wanted:
         own = film[number == zone]
-        if len(own) and np.all(np.abs(np.log(np.maximum(own, NO_PAINT_UM) / wanted_um)) > NEAR):
+        away = np.abs(np.log(np.maximum(own, NO_PAINT_UM) / wanted_um))
+        if len(own) and np.all(away > np.log(1.5)):
             yield (
                 f'no reading is near the {wanted_um:g} µm of {name}: {own.min():.4g} to '
                 f'{own.max():.4g} µm were read; check the target and the unit of the readings'

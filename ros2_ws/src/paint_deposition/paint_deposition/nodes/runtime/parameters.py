@@ -115,7 +115,8 @@ class NodeParameter:
         try:
             value = self._adapter.validate_python(value)
         except ValidationError as error:
-            remedy = error.errors()[0]['msg'].removeprefix('Input should be ')
+            first = error.errors()[0]
+            value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
             for long, short in BOUNDS.items():
                 remedy = remedy.replace(long, short)
             shown = f'{value:g}' if isinstance(value, float) else quoted(value)

@@ -8,7 +8,7 @@ from matplotlib.figure import Figure, FigureBase
 
 from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.inference.comparison.profiles import Profile
-from paint_deposition.inference.comparison.residual_field import interpolate_over_surface
+from paint_deposition.inference.comparison.regions import interpolate_over_surface
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.film import page_film
 from paint_deposition.report.pictures.part import HALO, PartPicture, label_points

@@ -9,7 +9,7 @@ from matplotlib.gridspec import GridSpec
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.film.pass_film import sampled_collapse
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
 from paint_deposition.report.pictures.part import PALE_HALO, PartPicture, label_points
 from paint_deposition.report.style import (

@@ -6,7 +6,7 @@ from matplotlib.axes import Axes
 
 from paint_deposition.film.film import Film
 from paint_deposition.inference.comparison.comparison import Comparison
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
 from paint_deposition.planning.part_plan import PartPlan

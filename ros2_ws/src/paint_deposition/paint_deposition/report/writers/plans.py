@@ -28,7 +28,7 @@ from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
 from paint_deposition.files.tool_path import write_tool_path
 from paint_deposition.film.spray_geometry import spray_geometry
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed

@@ -10,15 +10,15 @@ from booth import MODEL, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ReadingsError
-from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.inference.diagnosis.reading_choice import ChosenReadings, choose, marks_at
-from paint_deposition.inference.diagnosis.reading_exchange import (
+from paint_deposition.inference.design.reading_choice import ChosenReadings, choose, marks_at
+from paint_deposition.inference.design.reading_exchange import (
     CandidateDesign,
+    UnmeasuredPart,
     exchanged,
     power,
     slope,
 )
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
+from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.part.gauge_places import grid_places
 
 PLACES, FREE, COLUMNS = 40, 3, 5

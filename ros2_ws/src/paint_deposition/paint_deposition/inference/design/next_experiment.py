@@ -12,16 +12,17 @@ import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.contenders import (
+from paint_deposition.inference.design.contenders import (
     Contender,
     Forecast,
     Placement,
     contenders_of,
 )
-from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.diagnosis.sprays import AS_BEFORE, MENU, Change, pairs
-from paint_deposition.inference.diagnosis.stationary_spray import (
+from paint_deposition.inference.design.sprays import AS_BEFORE, MENU, Change, pairs
+from paint_deposition.inference.diagnosis.proposals import (
     KEY,
+    Place,
+    Spray,
     StationarySpray,
     spots,
     suits,
@@ -31,23 +32,13 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import PointMeans, Readings
+from paint_deposition.inference.readings.readings import Readings
 
-CANDIDATES = 220
-PROPOSED_POINTS = 8
 # Gauges are not to be trusted next to a free edge [m], and readings are spread out [m].
 EDGE_MARGIN_M = 0.012
 SPACING_M = 0.05
 # A point with less than this share of the mean film was hardly painted.
 PAINTED = 0.2
-# Sprays that are named, single changes of which two at once are tried, and spots before which the
-# gun stands still.
-PROPOSED_SPRAYS, COMBINED, SPOTS = 15, 4, 5
-# What may be changed of a gun that stands still.
-OF_STANDING = ('roll', 'standoff', 'part', 'voltage', 'draught')
-# Chance of settling that one unit of cost is worth, as a share; that of spraying on one spot, and
-# what a film that may sag costs more.
-WORTH_OF_COST, COST_OF_STANDING, COST_OF_SAG = 0.05, 1.0, 1.0
 
 
 @dataclass(frozen=True)
@@ -79,34 +70,32 @@ def propose(
 
 
 def _sprays(study: Study, contenders: Sequence[Contender]) -> list[Spray]:
-    part = _part_that_differs_most(study, contenders)
+    # On the part on which the films of what competes differ most.
+    films_um = np.array([contender.fit.predicted_um for contender in contenders])
+    by_part = np.bincount(study.campaign.experiment_of, (films_um / study.sigma_um).var(axis=0))
+    part = study.campaign.experiments[int(by_part.argmax())]
     made = _best([_tried(study, contenders, part, change) for change in MENU])
-    leading = [one.change for one in made[:COMBINED]]
+    # Of the best single changes two at once are tried.
+    leading = [one.change for one in made[:4]]
     made += _best([_tried(study, contenders, part, change) for change in pairs(leading)])
     effects = (contender.fit.model.effect(contender.name) for contender in contenders)
     families = {effect.family for effect in effects if effect is not None}
     if suits(contenders[-1].fit.model, families):
-        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, SPOTS)]
+        tried = [_tried(study, contenders, part, AS_BEFORE, spot) for spot in spots(part, 5)]
         still = _best(tried)
         made += still
         if still:
-            changes = [change for change in MENU if change.kind in OF_STANDING]
+            # What may be changed of a gun that stands still.
+            kinds = ('roll', 'standoff', 'part', 'voltage', 'draught')
+            changes = [change for change in MENU if change.kind in kinds]
             spot = still[0].spot
             made += _best([_tried(study, contenders, part, change, spot) for change in changes])
-    return [one.spray for one in _best(made)[:PROPOSED_SPRAYS]]
+    return [one.spray for one in _best(made)[:15]]
 
 
 def _best(tried: Sequence[ScoredExperiment | None]) -> list[ScoredExperiment]:
-    """Those that can be done, best first."""
+    """Experiments that can be done, best first."""
     return sorted((one for one in tried if one is not None), key=lambda one: -one.worth)
-
-
-def _part_that_differs_most(study: Study, contenders: Sequence[Contender]) -> Experiment:
-    """The experiment on which the films of what competes differ most."""
-    campaign = study.campaign
-    films_um = np.array([contender.fit.predicted_um for contender in contenders])
-    by_part = np.bincount(campaign.experiment_of, (films_um / study.sigma_um).var(axis=0))
-    return campaign.experiments[int(by_part.argmax())]
 
 
 def _tried(
@@ -139,7 +128,7 @@ def _tried(
     if film_um.mean() < PAINTED * study.measured_um.mean():
         return None
     noise_um = np.full(len(film_um), study.noise.typical_um)
-    new = _read(new, Readings.of(new.measured_points.positions_m, film_um, sigma_um=noise_um))
+    new = new.read_as(Readings.of(new.measured_points.positions_m, film_um, sigma_um=noise_um))
     together = _together(study, (*study.campaign.experiments, new))
     if len(together) != len(study) + len(film_um):
         return None
@@ -152,9 +141,10 @@ def _tried(
         forecast.chance, stand.peak_um if stand else float(film_um.max()),
         float(experiment.means.mean_um.max()), stand,
     )  # fmt: skip
-    cost = change.cost + COST_OF_STANDING * (stand is not None)
-    cost += COST_OF_SAG * bool(spray.film_words)
-    return ScoredExperiment(change, spray, spray.chance * (1.0 - WORTH_OF_COST * cost), spot)
+    # To spray on one spot costs one unit more, and so does a film that may sag.
+    cost = change.cost + (stand is not None) + bool(spray.film_words)
+    # One unit of cost is worth this share of the chance of settling.
+    return ScoredExperiment(change, spray, spray.chance * (1.0 - 0.05 * cost), spot)
 
 
 def _together(study: Study, experiments: Sequence[Experiment]) -> Study:
@@ -174,12 +164,6 @@ def _in_words(
     return f'{what}, on {experiment.name}' if len(study.campaign.experiments) > 1 else what
 
 
-def _read(experiment: Experiment, readings: Readings) -> Experiment:
-    """The experiment with other films read at the same places."""
-    return replace(experiment, readings=readings, means=PointMeans.of(readings), taken=readings,
-                   used=np.ones(len(readings), dtype=bool))  # fmt: skip
-
-
 def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Place]:
     """Add one point after the other, each where it tells the leading effect from its rival."""
     parts = study.campaign.experiments
@@ -196,7 +180,7 @@ def _places(study: Study, contenders: Sequence[Contender], seed: int) -> list[Pl
     part, positions_m, film_um = part[rows], positions_m[rows], together.measured_um[rows]
     usable = film_um > PAINTED * np.mean(study.measured_um)
     places: list[Place] = []
-    while usable.any() and len(places) < PROPOSED_POINTS:
+    while usable.any() and len(places) < 8:
         pair = placement.nearest()
         best = int(np.argmax(np.where(usable, placement.gains()[pair], -1.0)))
         before = placement.separation(pair)
@@ -216,7 +200,7 @@ def _with_candidates(study: Study, number: int, model: DepositionModel, seed: in
     """A part with further readings at random points, clear of free edges, as a model predicts."""
     experiment, own = study.campaign.experiments[number], study.campaign.experiment_of == number
     surface, here = experiment.surface, experiment.measured_points
-    count = CANDIDATES // len(study.campaign.experiments)
+    count = 220 // len(study.campaign.experiments)
     random = np.random.default_rng(seed)
     chosen = random.permutation(len(surface.vertices_m))[: 4 * count]
     points = surface.points().select(chosen)
@@ -234,4 +218,4 @@ def _with_candidates(study: Study, number: int, model: DepositionModel, seed: in
     new = experiment.with_readings(readings)
     film_um = Forward(Campaign((new,)), study.forward.effects).predict_um(model)
     film_um[: len(here)] = readings.thickness_um[: len(here)]
-    return _read(new, replace(readings, thickness_um=film_um))
+    return new.read_as(replace(readings, thickness_um=film_um))

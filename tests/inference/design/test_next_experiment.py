@@ -9,14 +9,14 @@ from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.inference.diagnosis.contenders import contenders_of
-from paint_deposition.inference.diagnosis.next_experiment import (
+from paint_deposition.inference.design.contenders import contenders_of
+from paint_deposition.inference.design.next_experiment import (
     EDGE_MARGIN_M,
     SPACING_M,
     propose,
     with_proposals,
 )
-from paint_deposition.inference.diagnosis.sprays import MENU, together
+from paint_deposition.inference.design.sprays import MENU, together
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters

@@ -11,12 +11,8 @@ from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.orientation import across_axis
 
-# How far the gun is moved to or from the part [m], and how near to it that may bring it.
-STANDOFF_STEP_M, NEAREST_M = 0.06, 0.12
 # The gun opens this much earlier and closes this much later than it did [s].
 LONGER_OPEN_S = 0.3
-# Passes are turned on parts that are at most this deep [m].
-DEEPEST_M = 0.15
 
 
 @dataclass(frozen=True)
@@ -34,7 +30,7 @@ class Change:
 
     @property
     def keys(self) -> tuple[str, ...]:
-        """Of the single changes."""
+        """Keys of the single changes."""
         return tuple(change.key for change in self.both) or tuple(filter(None, [self.key]))
 
 
@@ -109,7 +105,8 @@ def _moved_off(distance_m: float) -> Callable[[Experiment], Experiment | None]:
         if distance_m < 0.0:
             spraying = path.position_m[path.flow > 0.0]
             standoff, _ = cKDTree(experiment.surface.vertices_m).query(spraying)
-            if standoff.min() + distance_m < NEAREST_M:
+            # The gun comes no nearer to the part [m].
+            if standoff.min() + distance_m < 0.12:
                 return None
         position = path.position_m - distance_m * path.rotation[:, :, 2]
         return replace(experiment, path=path.with_(position_m=position))
@@ -149,14 +146,15 @@ def _open_longer(path: SprayPath) -> SprayPath:
 
 
 def _passes_turned(experiment: Experiment) -> Experiment | None:
-    """The same passes turned by 90 deg and fitted to the part's other side, at the same speed."""
+    """Turn the passes by 90 deg and fit them to the part's other side, at the same speed."""
     surface, path = experiment.surface, experiment.path
     outward = surface.outward
     across = across_axis(outward, surface.down)
     along = np.cross(outward, across)
     frame = np.column_stack([across, along, outward])
     vertices = surface.vertices_m @ frame
-    if np.ptp(vertices[:, 2]) > DEEPEST_M:
+    # On a deeper part passes cannot be turned [m].
+    if np.ptp(vertices[:, 2]) > 0.15:
         return None
     low, high = vertices[:, :2].min(axis=0), vertices[:, :2].max(axis=0)
     middle, share = 0.5 * (low + high), (high - low)[::-1] / (high - low)
@@ -194,8 +192,8 @@ MENU = (
     Change('roll_90', 'with the gun rolled 90 deg about its axis', _rolled(90.0), 'roll'),
     Change('reverse_order', 'in reverse order', _on_path(_other_order), 'order'),
     Change('other_way', 'each run the other way', _on_path(_other_way), 'way'),
-    Change('further', '60 mm further off', _moved_off(STANDOFF_STEP_M), 'standoff'),
-    Change('closer', '60 mm closer', _moved_off(-STANDOFF_STEP_M), 'standoff'),
+    Change('further', '60 mm further off', _moved_off(0.06), 'standoff'),
+    Change('closer', '60 mm closer', _moved_off(-0.06), 'standoff'),
     Change('half_flow', 'at half the flow', _flow(0.5), 'film'),
     Change('double_flow', 'at twice the flow', _flow(2.0), 'film'),
     Change('half_speed', 'at half the speed', _on_path(_speed(0.5)), 'film'),

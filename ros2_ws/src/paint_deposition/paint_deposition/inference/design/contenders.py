@@ -45,14 +45,11 @@ from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.smooth_fields import field_over_values
+from paint_deposition.inference.fitting.random_effects import field_over_values
 from paint_deposition.inference.fitting.study import Study
 
 # Effects that compete at the most.
 MOST_CONTENDERS = 6
-# Log odds between two effects beyond which one of them leaves the group, and against what is no
-# effect, beyond which it is accepted.
-ALONE, ACCEPTED = COARSENED * log_odds(CREDIBLE), log_odds(SURE)
 # Logarithm of the prior odds of what is no effect of the library.
 LOG_PRIOR = {UNKNOWN: LOG_ODDS_UNKNOWN, FOOTPRINT: 0.0}
 
@@ -174,7 +171,7 @@ class Forecast:
         for contender in contenders:
             null = contender.null(study, usual).select(order)
             mean, factor = null.predicted(known)
-            expected = (study.measured_um / study.sigma_um)[order] - null.raw
+            expected = (study.measured_um / study.sigma_um)[order] - null.scaled_deviation
             here = null.select(np.arange(known))
             deviation, freedom = here.deviation[:, np.newaxis], study.noise.degrees_of_freedom
             prior = LOG_PRIOR.get(contender.name, log_odds(PRIOR_EFFECT))
@@ -229,7 +226,9 @@ class Forecast:
         """Probability that the true effect is left alone, averaged over which it probably is."""
         mean, variance = self.gains
         effect = np.array([contender.is_effect for contender in self.contenders])
-        needed = np.where(effect, ALONE, ACCEPTED)
+        # Log odds between two effects beyond which one of them leaves the group, and against what
+        # is no effect, beyond which it is accepted.
+        needed = np.where(effect, COARSENED * log_odds(CREDIBLE), log_odds(SURE))
         with np.errstate(divide='ignore', invalid='ignore'):
             left = np.nan_to_num(ndtr((self.odds + mean - needed) / np.sqrt(variance)))
         np.fill_diagonal(left, 1.0)

@@ -1,12 +1,12 @@
-"""Readings that do not lie on the part: the likely cause, and both bounding boxes."""
+"""Rows and columns among readings; those off the part are refused with the likely cause."""
 
 import numpy as np
 import pytest
 
-from booth import panel
+from booth import panel, path_of, serpentine
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.campaign import Experiment
-from paint_deposition.inference.readings.placement import unit_in_doubt
+from paint_deposition.inference.readings.placement import columns_or_rows, unit_in_doubt
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 
@@ -64,3 +64,46 @@ def test_how_far_points_were_moved_is_measured_along_the_normal():
     off = placed(PLACES_M + np.outer([-0.001, 0.002, 0.003, 0.0], [0.0, 1.0, 0.0]))
     assert off.off_surface_m == pytest.approx([0.001, 0.002, 0.003, 0.0], abs=1e-9)
     assert off.understood.endswith('by 1.5 mm (median), 3.0 mm at most')
+
+
+def grid(columns_m, rows_m, stray_m=0.0) -> np.ndarray:
+    """(N, 3) places on the booth's panel, columns one after the other."""
+    x, z = (values.ravel() for values in np.meshgrid(columns_m, rows_m, indexing='ij'))
+    stray = np.random.default_rng(3).uniform(-stray_m, stray_m, (2, len(x)))
+    return np.stack([x + stray[0], np.zeros(len(x)), z + stray[1]], axis=1)
+
+
+@pytest.fixture(scope='module')
+def level() -> SprayPath:
+    return path_of(serpentine())
+
+
+@pytest.mark.parametrize('stray_m', [0.0, 0.01])
+def test_a_grid_is_read_across_the_passes(level, stray_m):
+    places = grid([-0.3, 0.0, 0.2], [-0.3, -0.2, -0.1, 0.0, 0.1], stray_m)
+    labels = columns_or_rows(panel(), level, places)
+    assert labels.tolist() == ['column 1'] * 5 + ['column 2'] * 5 + ['column 3'] * 5
+
+
+def test_rows_serve_where_there_are_no_columns(level):
+    x = np.linspace(-0.4, 0.4, 9)
+    places = np.concatenate([grid(x, [0.2]), grid(x + 0.043, [-0.1])])
+    labels = columns_or_rows(panel(), level, places)
+    assert labels.tolist() == ['row 1'] * 9 + ['row 2'] * 9
+
+
+def test_one_line_is_one_group(level):
+    labels = columns_or_rows(panel(), level, grid([0.1], np.linspace(-0.4, 0.4, 12), 0.004))
+    assert set(labels) == {'column 1'}
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_scattered_places_have_no_lines(level, seed):
+    scattered = np.random.default_rng(seed).uniform(-0.4, 0.4, (40, 3)) * [1.0, 0.0, 1.0]
+    assert not any(columns_or_rows(panel(), level, scattered))
+
+
+def test_a_few_strays_belong_to_no_line(level):
+    places = grid([-0.3, 0.3], np.linspace(-0.4, 0.4, 8))
+    labels = columns_or_rows(panel(), level, np.vstack([places, [[0.05, 0.0, 0.33]]]))
+    assert labels.tolist() == ['column 1'] * 8 + ['column 2'] * 8 + ['']

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import multivariate_normal
 
-from paint_deposition.inference.diagnosis.contenders import Forecast, Placement
+from paint_deposition.inference.design.contenders import Forecast, Placement
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 
 READINGS, DRAWS = 6, 40_000

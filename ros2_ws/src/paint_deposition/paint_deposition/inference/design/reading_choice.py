@@ -9,9 +9,13 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.diagnosis.reading_exchange import CandidateDesign, exchanged
+from paint_deposition.inference.design.reading_exchange import (
+    CandidateDesign,
+    UnmeasuredPart,
+    exchanged,
+)
+from paint_deposition.inference.diagnosis.explanations import sensitivity
 from paint_deposition.inference.diagnosis.testability import power_along
-from paint_deposition.inference.diagnosis.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath
@@ -24,20 +28,8 @@ from paint_deposition.part.gauge_places import (
 )
 from paint_deposition.part.surface import Surface
 
-DEFAULT_REPEATS = 8
 # With fewer points than this the pattern's parameters alone take up all that is read.
 LEAST_POINTS, MOST_POINTS = 12, 400
-# Places from which the points are chosen.
-CANDIDATES = 700
-# Least distance between points, as a share of the side of the square that each stands for.
-APART = 0.5
-# Less than this share of the mean film is hardly painted.
-PAINTED = 0.2
-# Draws of the noise with which the power is simulated.
-DRAWS = 400
-# A point speaks for an effect if it carries this many times its even share of what is seen of it,
-# for as many effects at the most.
-SPEAKS, MOST_NAMED = 1.5, 3
 
 
 @dataclass(frozen=True)
@@ -146,7 +138,7 @@ class ChosenReadings:
 def choose(
     part: UnmeasuredPart,
     count: int,
-    repeats: int = DEFAULT_REPEATS,
+    repeats: int = 8,
     foot_m: float = FOOT_M,
     seed: int = 0,
     progress: Callable[[str], None] = lambda line: None,
@@ -160,17 +152,22 @@ def choose(
     Raises:
         ReadingsError: the part has no room for so many points.
     """
-    _refuse_odd(count, repeats)
+    if not LEAST_POINTS <= count <= MOST_POINTS:
+        raise ReadingsError(f'{count} points; ask for {LEAST_POINTS} to {MOST_POINTS}')
+    if not 0 <= repeats <= count:
+        raise ReadingsError(f'{repeats} of {count} points to be read twice; ask for 0 to {count}')
     progress('the film')
     surface = part.surface
     film_um = part.film_um
     if film_um.max() < NO_PAINT_UM:
         raise ReadingsError('no paint lands on the part; check the trajectory and --part-pose')
     usable = usable_places(surface, film_um, foot_m)
-    places = spread_places(surface, usable, max(CANDIDATES, 4 * count), seed)
+    # The points are chosen from so many places at least.
+    places = spread_places(surface, usable, max(700, 4 * count), seed)
     if len(places) < count:
         raise _no_room(len(places), count, foot_m)
-    apart_m = APART * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
+    # Least distance between points, as a share of the side of the square that each stands for.
+    apart_m = 0.5 * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
     progress('what the effects change')
     marks = marks_at(part, places)
     progress('choosing points')
@@ -178,7 +175,9 @@ def choose(
     if len(rows) < count:
         raise _no_room(len(rows), count, foot_m)
     face = from_edges_m(surface, surface.vertices_m[places[rows]])
-    rows = rows[_walk(face, 2.0 * apart_m)]
+    # The walk goes in rows from the top, to and fro.
+    row = ((face[:, 1].max() - face[:, 1]) / max(2.0 * apart_m, 1e-9)).astype(int)
+    rows = rows[np.lexsort((np.where(row % 2 == 0, face[:, 0], -face[:, 0]), row))]
     speaks_for = _speaks_for(marks, rows)
     progress('how surely effects would be found')
     freedom = float(repeats) if repeats >= ENOUGH_REPEATS else ASSUMED_FREEDOM
@@ -203,14 +202,19 @@ def usable_places(surface: Surface, film_um: np.ndarray, foot_m: float = FOOT_M)
     """(V,) bool, vertices that are painted and where the gauge can stand."""
     # The mean over the paint, not over the part: a bare side does not count.
     volume = surface.vertex_areas_m2 * film_um
-    return can_stand(surface, foot_m) & (film_um > PAINTED * (volume @ film_um) / volume.sum())
+    # Less than this share of the mean is hardly painted.
+    return can_stand(surface, foot_m) & (film_um > 0.2 * (volume @ film_um) / volume.sum())
 
 
 def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     """What readings at these vertices (C,) would show."""
     study = part.study(vertices)
     fit = part.fit(study)
-    laws = part.sensitivities(study, fit)
+    laws = [
+        sensitivity(study.forward, fit, shape, study.sigma_um)
+        for shapes in part.candidates.values()
+        for shape in shapes
+    ]
     return CandidateDesign(
         fit.jacobian @ fit.parameters.prior.factor,
         np.hstack([law.columns for law in laws]),
@@ -231,7 +235,7 @@ def power_of(
     """
     space = part.space(part.study(vertices), freedom)
     draws = space.null_draws(seed)
-    null, draws = space.evidence(draws), draws[:, :DRAWS]
+    null, draws = space.evidence(draws), draws[:, :400]
     found: dict[str, list[float]] = {}
     for law in (e.law for e in space.explanations if e.law is not None):
         for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
@@ -240,20 +244,6 @@ def power_of(
             chance = power_along(space, direction, np.array([strength]), null, draws)[0]
             found.setdefault(law.id, []).append(float(chance))
     return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}
-
-
-def _refuse_odd(count: int, repeats: int) -> None:
-    if not LEAST_POINTS <= count <= MOST_POINTS:
-        raise ReadingsError(f'{count} points; ask for {LEAST_POINTS} to {MOST_POINTS}')
-    if not 0 <= repeats <= count:
-        raise ReadingsError(f'{repeats} of {count} points to be read twice; ask for 0 to {count}')
-
-
-def _walk(face_m: np.ndarray, row_m: float) -> np.ndarray:
-    """(P,) order of points (P, 2) on the face: rows from the top, to and fro."""
-    down = face_m[:, 1].max() - face_m[:, 1]
-    row = (down / max(row_m, 1e-9)).astype(int)
-    return np.lexsort((np.where(row % 2 == 0, face_m[:, 0], -face_m[:, 0]), row))
 
 
 def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:
@@ -265,7 +255,8 @@ def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ..
     by_effect = np.column_stack([shares[:, marks.effects == n].mean(axis=1) for n in names])
     even = by_effect.mean(axis=0)
     over = by_effect / np.where(even > 0.0, even, np.inf)
+    # A point speaks for an effect if it carries this many times its even share of what is seen of
+    # it, for as many effects at the most.
     return tuple(
-        tuple(str(names[k]) for k in np.argsort(-point)[:MOST_NAMED] if point[k] > SPEAKS)
-        for point in over
+        tuple(str(names[k]) for k in np.argsort(-point)[:3] if point[k] > 1.5) for point in over
     )

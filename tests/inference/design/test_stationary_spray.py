@@ -7,9 +7,8 @@ import pytest
 
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.diagnosis.proposals import Spray
-from paint_deposition.inference.diagnosis.sprays import MENU
-from paint_deposition.inference.diagnosis.stationary_spray import StationarySpray, spots, suits
+from paint_deposition.inference.design.sprays import MENU
+from paint_deposition.inference.diagnosis.proposals import Spray, StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
 
