@@ -77,7 +77,10 @@ def test_impossible_requests_say_why(planner, ask):
     for request, words in (
         ({}, 'neither speed_m_per_s nor target_um'),
         ({'speed_m_per_s': math.nan}, 'speed_m_per_s is nan'),
-        ({'speed_m_per_s': 1e-5, 'target_um': 20.0}, 'expected a number 0.005 to 3: Speed of the passes'),
+        (
+            {'speed_m_per_s': 1e-5, 'target_um': 20.0},
+            'expected a number 0.005 to 3',
+        ),
         ({'speed_m_per_s': 0.2, 'tolerance': 1e-6}, 'the closest is'),
     ):
         answer = ask(**request)

@@ -25,9 +25,10 @@ from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     LAW_LENGTH,
     UNKNOWN,
+    law_errors,
     neutral_shapes,
     of_effects,
-    own_law_errors,
+    other_laws,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
@@ -41,6 +42,7 @@ from paint_deposition.inference.diagnosis.model_space import (
     WeightedNull,
     log_odds,
 )
+from paint_deposition.inference.diagnosis.search import ANOTHER_FORM, LAWS_OFF
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -62,6 +64,8 @@ class Contender:
     fit: Fit  # of the model refitted to it
     sizes: DiscrepancyHyperparameters  # of the discrepancy beside it
     covariate: str = ''  # of which something unknown is any smooth function
+    # How its laws are off: the number among ``LAWS_OFF``; the next one for laws of another form.
+    off: int = 0
 
     @property
     def is_effect(self) -> bool:
@@ -77,7 +81,10 @@ class Contender:
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
         laws = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
-        columns = [study.nuisance, own_law_errors(study, fit, laws, usual.model)]
+        given = study, fit, laws, usual.model
+        another = self.off == len(LAWS_OFF)
+        errors = other_laws(*given) if another else LAWS_OFF[self.off][0] * law_errors(*given)
+        columns = [study.nuisance, errors]
         for covariate in study.covariates(usual.model):
             if covariate.name == self.covariate:
                 away = (covariate.values - covariate.values.mean()) / covariate.values.std()
@@ -85,6 +92,14 @@ class Contender:
                 columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
         discrepancy = usual.around(study, fit).covariance(self.sizes)
         return NullModel.around(fit, np.hstack(columns), discrepancy=discrepancy)
+
+    def log_weight(self, null: NullModel, freedom: float) -> float:
+        """Logarithm of its posterior weight, for what it gives readings."""
+        evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
+        if not self.is_effect:
+            return evidence + LOG_PRIOR[self.name]
+        shares = [*(share for _, share in LAWS_OFF), ANOTHER_FORM]
+        return evidence + log_odds(PRIOR_EFFECT) + float(np.log(shares[self.off]))
 
 
 def contenders_of(
@@ -124,9 +139,9 @@ def contenders_of(
     base, found = fitted(discrepancy=best.null.discrepancy), []
     for name in names:
         effect = fit.model.effect(name) or laws.by_law(name)[1]
-        found.append(
-            Contender(name, fitted(effect, discrepancy=best.null.discrepancy), best.sizes)
-        )
+        there = fitted(effect, discrepancy=best.null.discrepancy)
+        ways = [Contender(name, there, best.sizes, off=k) for k in range(len(LAWS_OFF) + 1)]
+        found.append(max(ways, key=lambda way: way.log_weight(way.null(study, usual), freedom)))
     if diagnosis.unknown is not None:
         found.append(Contender(UNKNOWN, base, best.sizes, diagnosis.unknown.covariate))
     return (*found, Contender(FOOTPRINT, base, best.sizes))
@@ -172,10 +187,8 @@ class Forecast:
             null = contender.null(study, usual).select(order)
             mean, factor = null.predicted(known)
             expected = (study.measured_um / study.sigma_um)[order] - null.scaled_deviation
-            here = null.select(np.arange(known))
-            deviation, freedom = here.deviation[:, np.newaxis], study.noise.degrees_of_freedom
-            prior = LOG_PRIOR.get(contender.name, log_odds(PRIOR_EFFECT))
-            weights.append(prior + float(here.log_evidence(deviation, freedom)[0]))
+            here, freedom = null.select(np.arange(known)), study.noise.degrees_of_freedom
+            weights.append(contender.log_weight(here, freedom))
             means.append(expected[known:] + mean)
             factors.append(factor)
         return Forecast(contenders, np.array(weights), np.array(means), np.array(factors))

@@ -262,16 +262,8 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         kept: ids of the effects.
         model: whose rays say over which values of the covariates; one like it.
     """
-    off = _off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False)
-    elsewhere = np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
-    return np.hstack([own_law_errors(study, fit, kept, model), elsewhere])
-
-
-def own_law_errors(
-    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
-) -> np.ndarray:
-    """(P, n) directions of those errors of laws that run over their own covariates."""
     off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
+    off += list(_off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False))
     return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
 
 
