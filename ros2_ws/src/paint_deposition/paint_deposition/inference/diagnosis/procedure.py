@@ -186,13 +186,17 @@ def _predicting(
 ) -> list[tuple[Explanation, float]]:
     """The first of some laws, as far as readings left out bear them out.
 
-    A curve must predict whole parts better, a map or a footprint these or patches of the parts.
+    A curve must predict whole parts better; a map or a footprint these, or patches of the parts
+    without predicting whole parts worse.
     """
-    kept = 0
+    kept, enough = 0, 1.0 - LEAST_GAIN
     for count, (law, _) in enumerate(laws, start=1):
-        patches = (False, True) if law.learns in (PLACE, FOOTPRINT) else (False,)
-        errors = (left_out.errors_um(without, each) for each in patches)
-        if any(error_um[count] <= (1.0 - LEAST_GAIN) * error_um[kept] for error_um in errors):
+        parts_um = left_out.errors_um(without)
+        better = parts_um[count] <= enough * parts_um[kept]
+        if law.learns in (PLACE, FOOTPRINT) and parts_um[count] <= 1.001 * parts_um[kept]:
+            patches_um = left_out.errors_um(without, patches=True)
+            better |= patches_um[count] <= enough * patches_um[kept]
+        if better:
             kept = count
     return laws[:kept]
 
