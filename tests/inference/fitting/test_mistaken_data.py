@@ -115,6 +115,14 @@ def test_readings_of_two_panels_exchanged(panels):
     assert 'pair them the other way round' in one
 
 
+def test_a_part_of_unknown_level_is_not_accused_of_an_exchange(panels):
+    """Without voltage any share of the paint arrives: a film of any thickness may be its own."""
+    first, second = panels.experiments
+    off = replace(first.with_readings(second.readings), switched_off=frozenset({'voltage'}))
+    other = second.with_readings(first.readings)
+    assert said(replace(panels, experiments=(off, other))) == ()
+
+
 def test_alike_panels_are_not_accused_of_an_exchange():
     alike = gauged(MODEL, 4, orders=(ORDERS[0], ORDERS[0]))
     first, second = (part.readings for part in alike.experiments)

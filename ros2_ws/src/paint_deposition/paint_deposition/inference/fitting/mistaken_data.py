@@ -217,7 +217,9 @@ def _ways_meant(given: Weighed) -> Iterator[Meant]:
     for some in dict.fromkeys([every, *((k,) for k in every)]):
         yield from _mirrored(campaign, some)
         yield from _in_another_unit(given, some)
-    for one, other in combinations(parts, 2):
+    # The level of a part for which something was switched off is not known: it may be any.
+    known = [part for part in parts if not part.switched_off]
+    for one, other in combinations(known, 2):
         with suppress(ReadingsError):
             changed = {
                 one.name: one.with_readings(other.readings),
