@@ -119,6 +119,8 @@ def fit_readings(
         candidates = [result.x for result in rough[: 4 if starts > 1 else 1]]
     found = [problem.search(start, 60) for start in candidates]
     best = min(found, key=lambda result: result.cost)
+    if best.status == 0:  # along a narrow valley its steps ended first
+        best = problem.search(best.x, 300)
     fit = fit_at(forward, measured_um, sigma_um, parameters, best.x, nuisance, discrepancy)
     return replace(fit, converged=bool(best.status > 0))
 
