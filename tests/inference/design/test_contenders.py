@@ -83,7 +83,11 @@ def test_single_readings_add_up_to_all_of_them():
 def test_some_readings_are_predicted_from_others():
     rng = np.random.default_rng(5)
     columns, raw = rng.normal(size=(9, 4)), rng.normal(size=9)
-    mean, factor = NullModel.of(columns, raw).predicted(6)
+    null = NullModel.of(columns, raw)
+    mean, factor = null.predicted(6)
+    first, anew = null.first(6), NullModel.of(columns[:6], raw[:6])
+    assert first.lower == pytest.approx(anew.lower)
+    assert first.deviation == pytest.approx(anew.deviation)
     covariance = np.eye(9) + columns @ columns.T
     slope = covariance[6:, :6] @ np.linalg.inv(covariance[:6, :6])
     assert mean == pytest.approx(slope @ raw[:6])

@@ -17,7 +17,7 @@ from paint_deposition.inference.comparison.comparison import compare as compared
 from paint_deposition.inference.design.next_experiment import with_proposals
 from paint_deposition.inference.design.reading_choice import ChosenReadings, choose
 from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
-from paint_deposition.inference.diagnosis.model_space import discrepancy_of
+from paint_deposition.inference.diagnosis.model_space import space_around
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
@@ -60,7 +60,7 @@ def calibrate(
     doubts = require_paint(campaign, with_brushes_of(campaign, model or DepositionModel()))
     found = calibrated(campaign, model, seed, progress)
     found = replace(found, warnings=(*found.study.warnings, *doubts, *found.warnings))
-    return replace(found, discrepancy=discrepancy_of(found.study, found.fit))
+    return replace(found, discrepancy=space_around(found.study, found.fit).figures)
 
 
 def compare(

@@ -29,6 +29,7 @@ from paint_deposition.inference.diagnosis.explanations import (
     neutral_shapes,
     of_effects,
     other_laws,
+    standardised,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
@@ -38,9 +39,8 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_EFFECT,
     SIZES,
     SURE,
-    EffectEvidence,
-    WeightedNull,
     log_odds,
+    space_around,
 )
 from paint_deposition.inference.diagnosis.search import ANOTHER_FORM, LAWS_OFF
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
@@ -85,11 +85,10 @@ class Contender:
         another = self.off == len(LAWS_OFF)
         errors = other_laws(*given) if another else LAWS_OFF[self.off][0] * law_errors(*given)
         columns = [study.nuisance, errors]
-        for covariate in study.covariates(usual.model):
-            if covariate.name == self.covariate:
-                away = (covariate.values - covariate.values.mean()) / covariate.values.std()
-                law = SIZES[-1] * FACTOR * field_over_values(away, LAW_LENGTH, NEGLIGIBLE)
-                columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
+        if self.covariate:
+            values = standardised(study, usual.model)[self.covariate]
+            law = SIZES[-1] * FACTOR * field_over_values(values, LAW_LENGTH, NEGLIGIBLE)
+            columns.append((fit.predicted_um / study.sigma_um)[:, np.newaxis] * law)
         discrepancy = usual.around(study, fit).covariance(self.sizes)
         return NullModel.around(fit, np.hstack(columns), discrepancy=discrepancy)
 
@@ -119,7 +118,6 @@ def contenders_of(
     left_out = {*names, *(name for name in diagnosis.accepted if name not in library)}
     rest = tuple(effect for effect in fit.model.effects if effect.id not in left_out)
     without = fit.model.model_copy(update={'effects': rest})
-    freedom = study.noise.degrees_of_freedom
 
     def fitted(*effects: Effect, discrepancy: np.ndarray | None = None) -> Fit:
         model = without.model_copy(update={'effects': (*rest, *effects)})
@@ -127,18 +125,12 @@ def contenders_of(
         return study.fit(parameters, nuisance=study.nuisance, discrepancy=discrepancy)
 
     base = fitted()
-    usual, plain = ModelDiscrepancy.of(study, base), NullModel.around(base, study.nuisance)
-    nature = (
-        WeightedNull.of(plain, usual, sizes, freedom)
-        for sizes in usual.choices()
-        if not sizes.is_beyond_nature
-    )
-    best = max(nature, key=lambda one: one.log_weight)
     shapes = {name: neutral_shapes(library[name]) for name in names}
-    laws = EffectEvidence(best.null, [*of_effects(study, base, shapes)], freedom)
+    space = space_around(study, base, [*of_effects(study, base, shapes)])
+    best, usual, freedom = space.best, space.discrepancy, space.freedom
     base, found = fitted(discrepancy=best.null.discrepancy), []
     for name in names:
-        effect = fit.model.effect(name) or laws.by_law(name)[1]
+        effect = fit.model.effect(name) or space.central.by_law(name)[1]
         there = fitted(effect, discrepancy=best.null.discrepancy)
         ways = [Contender(name, there, best.sizes, off=k) for k in range(len(LAWS_OFF) + 1)]
         found.append(max(ways, key=lambda way: way.log_weight(way.null(study, usual), freedom)))
@@ -187,8 +179,8 @@ class Forecast:
             null = contender.null(study, usual).select(order)
             mean, factor = null.predicted(known)
             expected = (study.measured_um / study.sigma_um)[order] - null.scaled_deviation
-            here, freedom = null.select(np.arange(known)), study.noise.degrees_of_freedom
-            weights.append(contender.log_weight(here, freedom))
+            freedom = study.noise.degrees_of_freedom
+            weights.append(contender.log_weight(null.first(known), freedom))
             means.append(expected[known:] + mean)
             factors.append(factor)
         return Forecast(contenders, np.array(weights), np.array(means), np.array(factors))

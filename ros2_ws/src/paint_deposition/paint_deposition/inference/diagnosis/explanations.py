@@ -280,7 +280,7 @@ def _off_anywhere(
 
     Over the covariates that are the effect's own, or over all others.
     """
-    covariates = _standardised(study, model)
+    covariates = standardised(study, model)
     for effect, change in _changes(study, fit, kept):
         over = [name for name in covariates if (name in effect.covariates) == own]
         for name in over:
@@ -288,7 +288,7 @@ def _off_anywhere(
             yield size / np.sqrt(len(over)) * change[:, np.newaxis] * root
 
 
-def _standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
+def standardised(study: Study, model: DepositionModel) -> dict[str, np.ndarray]:
     """(P,) covariates that vary, in their standard deviations from the mean."""
     return {
         c.name: (c.values - c.values.mean()) / c.values.std()
@@ -310,7 +310,7 @@ def _laws_off(
     study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
 ) -> Iterator[tuple[Effect, np.ndarray, RandomLaw | None]]:
     """Effects, by what their laws may be off over a covariate (P, n) [um], and as a curve."""
-    covariates, film = _standardised(study, model), study.forward.predict_um(fit.model)
+    covariates, film = standardised(study, model), study.forward.predict_um(fit.model)
     for effect, change in _changes(study, fit, kept):
         own = [name for name in effect.covariates if name in covariates]
         scale = LAW_ERROR / np.sqrt(max(len(own), 1))

@@ -87,6 +87,17 @@ class NullModel:
             - half_log_det
         )
 
+    def first(self, count: int) -> 'NullModel':
+        """The same for the first so many of the readings; nothing is factored anew."""
+        discrepancy = self.discrepancy
+        return NullModel(
+            self.columns[:count],
+            self.scaled_deviation[:count],
+            None if discrepancy is None else discrepancy[:count, :count],
+            self.lower[:count, :count],
+            self.deviation[:count],
+        )
+
     def predicted(self, count: int) -> tuple[np.ndarray, np.ndarray]:
         """Deviations of the last Q readings, given the first so many.
 

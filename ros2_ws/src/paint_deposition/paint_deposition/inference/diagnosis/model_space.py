@@ -177,6 +177,11 @@ class ModelSpace:
         # Posterior probability of each of nature's sizes if nothing is missing.
         self.share = np.exp(np.array(log_weights) - self.log_null)
 
+    @property
+    def best(self) -> WeightedNull:
+        """The null hypothesis at nature's most probable sizes."""
+        return self.nature[int(self.share.argmax())]
+
     @cached_property
     def central(self) -> EffectEvidence:
         """The evidence at nature's most probable sizes, for what needs no average."""
@@ -219,7 +224,7 @@ class ModelSpace:
 
         The statistic is the score of such fields (Rao), summed over their lengths.
         """
-        sizes = self.nature[int(self.share.argmax())].sizes
+        sizes = self.best.sizes
         usual = self.discrepancy.covariance(self.discrepancy.usual(sizes))
         null = self.central.null.with_discrepancy(usual)
         score = np.zeros_like(usual)
@@ -256,7 +261,7 @@ class ModelSpace:
     def figures(self) -> DiscrepancyFigures:
         """What is left over: sizes on average over their posterior, the footprint's mean."""
         null = self.central.null
-        size = self.nature[int(self.share.argmax())].sizes.footprint
+        size = self.best.sizes.footprint
         footprint = self.discrepancy.footprint
         seen, of_peak = null.whiten(footprint.columns[size]), footprint.of_peak[size]
         mean = of_peak @ (seen.T @ null.deviation)
@@ -312,13 +317,13 @@ def probable_hyperparameters(
     return kept
 
 
-def discrepancy_of(study: Study, fit: Fit) -> DiscrepancyFigures:
-    """What a fitted model leaves over where nothing is missing."""
+def space_around(study: Study, fit: Fit, explanations: Sequence[Explanation] = ()) -> ModelSpace:
+    """What may be missing beside a fitted model, its laws being as they are."""
     plain, discrepancy = NullModel.around(fit, study.nuisance), ModelDiscrepancy.of(study, fit)
     freedom = study.noise.degrees_of_freedom
     sizes = probable_hyperparameters(plain, discrepancy, [], freedom)
     weighed = [WeightedNull.of(plain, discrepancy, size, freedom) for size in sizes]
-    return ModelSpace(weighed, [], discrepancy, freedom).figures
+    return ModelSpace(weighed, explanations, discrepancy, freedom)
 
 
 def inclusion_of(log_weights: Sequence[float], others: Sequence[float]) -> float:
