@@ -209,19 +209,20 @@ def _conclude(
     if named:
         names = ', and '.join(_in_words(c) for c in named)
         return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
-    if sum(c.probability for c in others) < 0.5:
-        unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
-        reason = f'Something outside the library acts. {unknown}'
-        if len(set(best.usual.setting_of)) == 1:
-            reason += (
-                ' All parts were painted alike: it may belong to the part or to the spray. Spray '
-                'the same part another way.'
-            )
-        return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
-    reason = 'These may be missing: ' + ', or '.join(
-        f'{c.best} ({percent(c.probability)})' for c in others[:3]
-    )
-    return state.diagnosis(p_value, 'undecided', reason, others)
+    possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
+    # With a law that was learned the verdict stays: something unknown acts, whatever may be beside.
+    if not state.accepted and sum(c.probability for c in others) >= 0.5:
+        return state.diagnosis(p_value, 'undecided', f'These may be missing: {possible}', others)
+    unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
+    reason = f'Something outside the library acts. {unknown}'
+    if len(set(best.usual.setting_of)) == 1:
+        reason += (
+            ' All parts were painted alike: it may belong to the part or to the spray. Spray '
+            'the same part another way.'
+        )
+    if others:
+        reason += f' Beside it these may be missing: {possible}.'
+    return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
 
 
 def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:
