@@ -210,9 +210,10 @@ def _conclude(
         names = ', and '.join(_in_words(c) for c in named)
         return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
     possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
-    # With a law that was learned the verdict stays: something unknown acts, whatever may be beside.
+    # Where a law was learned something unknown acts, whatever may act beside it.
     if not state.accepted and sum(c.probability for c in others) >= 0.5:
-        return state.diagnosis(p_value, 'undecided', f'These may be missing: {possible}', others)
+        reason = f'These may be missing: {possible}'
+        return state.diagnosis(p_value, 'undecided', reason, others)
     unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
     reason = f'Something outside the library acts. {unknown}'
     if len(set(best.usual.setting_of)) == 1:
