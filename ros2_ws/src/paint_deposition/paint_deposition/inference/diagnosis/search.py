@@ -20,9 +20,8 @@ from paint_deposition.inference.diagnosis.discrepancy import (
 )
 from paint_deposition.inference.diagnosis.explanations import (
     UNKNOWN,
-    law_errors,
     of_effects,
-    other_laws,
+    ways_off,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
@@ -43,9 +42,6 @@ from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many proposals are refitted each time.
 TRIALS = 5
-# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
-# times as far, and the prior share of each; and the share of a law of another form.
-LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
 # Log evidence that two fits of one set may differ by and be the same.
@@ -89,14 +85,8 @@ class EffectSet:
     def weighed(self) -> list[WeightedNull]:
         """The model as the null hypothesis, its laws being off, with each size of discrepancy."""
         study, freedom = self.state.study, self.state.freedom
-        laws = study, self.fit, self.names, self.usual.model
-        errors = law_errors(*laws)
-        variants = [(errors, 1.0)]
-        if errors.any():
-            variants = [(times * errors, share) for times, share in LAWS_OFF]
-            variants.append((other_laws(*laws), ANOTHER_FORM))
         found = []
-        for columns, share in variants:
+        for columns, share in ways_off(study, self.fit, self.names, self.usual.model):
             null = NullModel.around(self.fit, np.hstack([study.nuisance, columns]))
             found += [
                 WeightedNull.of(null, self.discrepancy, sizes, freedom, share)
@@ -152,14 +142,24 @@ class EffectSet:
     @property
     def _of_sizes(self) -> float:
         """What the mixture of sizes changes of the log evidence."""
-        entries, found = self.fit.parameters.of_effects, 0.0
+        each = [np.logaddexp.reduce(self._by_size(name)) for name in self.names]
+        return float(np.sum(each)) - len(each) * float(np.log(len(SIZES)))
+
+    def _by_size(self, name: str) -> np.ndarray:
+        """(S,) log odds of each size of an effect's amplitudes against the typical one."""
+        entries = self.fit.parameters.of_effects
         amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
-        for name in self.names:
-            own = [amount for amount, entry in zip(amounts, entries, strict=True)
-                   if entry.effect == name and not entry.is_shape]  # fmt: skip
-            by_size = 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
-            found += float(np.logaddexp.reduce(by_size)) - np.log(len(SIZES))
-        return found
+        own = [amount for amount, entry in zip(amounts, entries, strict=True)
+               if entry.effect == name and not entry.is_shape]  # fmt: skip
+        return 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
+
+    @property
+    def amplitude_sizes(self) -> dict[str, float]:
+        """The most probable size of each effect's amplitudes, times their typical ones.
+
+        With the typical size an effect that is stronger would be drawn towards none.
+        """
+        return {name: float(SIZES[self._by_size(name).argmax()]) for name in self.names}
 
     @property
     def log_prior(self) -> float:

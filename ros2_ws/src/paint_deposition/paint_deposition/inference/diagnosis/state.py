@@ -5,7 +5,7 @@ user asks for.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,6 +59,7 @@ class DiagnosisState:
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
         testable: what the readings can show; None while it is not known.
+        sizes: of the amplitudes of effects that were found, times their typical ones, by id.
         figures, discrepancy: of the discrepancy, and its covariance (P, P) over the noise, by
             which intervals are wider; None while they are not known.
     """
@@ -73,6 +74,7 @@ class DiagnosisState:
     history: tuple[Step, ...]
     accepted: tuple[EffectClass, ...] = ()
     testable: Testability | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
     figures: DiscrepancyFigures | None = None
     discrepancy: np.ndarray | None = None
 
@@ -98,7 +100,7 @@ class DiagnosisState:
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
-        return FreeParameters.of(start, *start.effects, known=self.known)
+        return FreeParameters.of(start, *start.effects, known=self.known, sizes=self.sizes)
 
     @cached_property
     def nonparametric_laws(self) -> list[Explanation]:
