@@ -5,7 +5,7 @@ good enough to propose. What is accepted is decided between models that were ref
 the discrepancy of nature at all its sizes, and with or without something unknown beside it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -120,11 +120,6 @@ class EffectSet:
         return self.log_evidence + self.log_prior
 
     @cached_property
-    def log_weight_unknown(self) -> float:
-        """Logarithm of the weight of this set if something unknown acts beside it."""
-        return self.log_weight + self.of_unknown.alone[UNKNOWN]
-
-    @cached_property
     def of_unknown(self) -> ModelSpace:
         """What is outside the library and may be missing beside it."""
         state = self.state
@@ -134,7 +129,7 @@ class EffectSet:
     def log_evidence(self) -> float:
         """Its evidence, nothing unknown acting, the amplitudes being of any of the sizes.
 
-        The fit takes each as normal with its typical size as the standard deviation.
+        The fit takes each as normal with one size as the standard deviation.
         """
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
         return float(np.logaddexp.reduce(nature)) + self._of_sizes
@@ -146,12 +141,13 @@ class EffectSet:
         return float(np.sum(each)) - len(each) * float(np.log(len(SIZES)))
 
     def _by_size(self, name: str) -> np.ndarray:
-        """(S,) log odds of each size of an effect's amplitudes against the typical one."""
-        entries = self.fit.parameters.of_effects
+        """(S,) log odds of each size of an effect's amplitudes against that of the fit."""
+        entries, fitted = self.fit.parameters.of_effects, self.fit.parameters.sizes.get(name, 1.0)
         amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
         own = [amount for amount, entry in zip(amounts, entries, strict=True)
                if entry.effect == name and not entry.is_shape]  # fmt: skip
-        return 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
+        change = 0.5 * np.sum(np.square(own)) * (fitted**-2.0 - SIZES**-2.0)
+        return change - len(own) * np.log(SIZES / fitted)
 
     @property
     def amplitude_sizes(self) -> dict[str, float]:
@@ -246,6 +242,12 @@ class Search:
             [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
+        sizes = trial.amplitude_sizes
+        if any(size != 1.0 for size in sizes.values()):
+            fit = self.state.fitted_with(
+                [*trial.effects.values()], fit.model, discrepancy=discrepancy, sizes=sizes
+            )
+            trial = replace(trial, fit=fit)
         known = self._trials.get(trial.names)
         if known is None or trial.log_evidence > known.log_evidence + SAME:
             self._trials[trial.names] = trial
@@ -281,7 +283,9 @@ class Search:
         best = max(tried, key=lambda one: one.log_weight, default=nothing)
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
-        others = self.state.fitted_with([*best.effects.values()], self.state.start, starts=STARTS)
+        others = self.state.fitted_with(
+            [*best.effects.values()], self.state.start, starts=STARTS, sizes=best.amplitude_sizes
+        )
         anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
@@ -305,15 +309,15 @@ class Search:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
         for name in trial.proposed:
             self.with_effect(trial, name)
-        weights = {
-            name: larger.log_weight
-            for names, larger in self._trials.items()
+        larger = {
+            name: one
+            for names, one in self._trials.items()
             if names > trial.names and len(names) == len(trial.names) + 1
             for name in names - trial.names
         }
-        without = trial.log_weight, trial.log_weight_unknown
-        shares = softmax([*without, *weights.values()])[len(without) :]
-        found = dict(zip(weights, shares.tolist(), strict=True))
+        odds = self._log_odds(trial, larger)
+        shares = softmax([0.0, *odds.values()])[1:]
+        found = {n: p for n, p in zip(odds, shares.tolist(), strict=True) if n != UNKNOWN}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def groups(self, trial: EffectSet) -> tuple[EffectSet, dict[str, Group]]:
@@ -345,11 +349,17 @@ class Search:
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
+        odds = self._log_odds(others, tried)
+        outside = odds.pop(UNKNOWN)
+        return tuple(members), inclusion_of([*odds.values()], [0.0, outside])
+
+    def _log_odds(self, trial: EffectSet, larger: Mapping[str, EffectSet]) -> dict[str, float]:
+        """Logarithm of the odds of each larger set against one, and of something unknown in it."""
         # Beside an accepted effect, whose law is no truer than that, evidence counts for less.
-        scale = COARSENED if others.names else 1.0
+        scale = COARSENED if trial.names else 1.0
         effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
-        odds = [
-            (one.log_evidence - others.log_evidence) / scale + effect for one in tried.values()
-        ]
-        outside = (others.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown
-        return tuple(members), inclusion_of(odds, [0.0, outside])
+        found = {
+            name: (one.log_evidence - trial.log_evidence) / scale + effect
+            for name, one in larger.items()
+        }
+        return found | {UNKNOWN: (trial.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown}

@@ -122,27 +122,30 @@ class DiagnosisState:
         self,
         effects: Sequence[Effect],
         model: DepositionModel,
-        free: np.ndarray | None = None,
+        directions: np.ndarray | None = None,
         discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
         starts: int = 1,
+        sizes: Mapping[str, float] | None = None,
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
         Args:
             effects: with their first values.
             model: to start from.
-            free: (P, n) directions over the noise that are left free beside them.
+            directions: (P, n) over the noise that are left free beside them.
             discrepancy: (P, P) covariance of the discrepancy, if that is allowed for.
             others: models whose patterns are starts, too.
             starts: how many, as in the first fit.
+            sizes: of the effects' amplitudes, times their typical ones; default: the state's.
         """
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
         start = model.model_copy(update={'effects': (*kept, *effects)})
         nuisance = self.study.nuisance
-        if free is not None:
-            nuisance = np.hstack([nuisance, free])
-        return self.study.fit(self._free(start), starts, self.seed, nuisance, discrepancy, others)
+        if directions is not None:
+            nuisance = np.hstack([nuisance, directions])
+        free = self._free(start) if sizes is None else replace(self._free(start), sizes=sizes)
+        return self.study.fit(free, starts, self.seed, nuisance, discrepancy, others)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""
