@@ -10,6 +10,7 @@ beforehand: on average by their Kullback-Leibler divergence (Lindley, Ann. Math.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -38,7 +39,9 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_EFFECT,
     SIZES,
     SURE,
+    amplitude_sizes,
     log_odds,
+    of_sizes,
     space_around,
 )
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
@@ -92,7 +95,8 @@ class Contender:
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
         if not self.is_effect:
             return evidence + LOG_PRIOR[self.name]
-        return evidence + log_odds(PRIOR_EFFECT) + float(np.log(self.share))
+        prior = log_odds(PRIOR_EFFECT) + float(np.log(self.share))
+        return evidence + of_sizes(self.fit, [self.name]) + prior
 
 
 def _laws_of(fit: Fit) -> frozenset[str]:
@@ -117,9 +121,16 @@ def contenders_of(
     rest = tuple(effect for effect in fit.model.effects if effect.id not in left_out)
     without = fit.model.model_copy(update={'effects': rest})
 
-    def fitted(*effects: Effect, discrepancy: np.ndarray | None = None) -> Fit:
+    def fitted(
+        *effects: Effect,
+        discrepancy: np.ndarray | None = None,
+        sizes: Mapping[str, float] = MappingProxyType({}),
+    ) -> Fit:
         model = without.model_copy(update={'effects': (*rest, *effects)})
-        parameters = FreeParameters.of(model, *model.effects, known=fit.parameters.known)
+        sizes = {**fit.parameters.sizes, **sizes}
+        parameters = FreeParameters.of(
+            model, *model.effects, known=fit.parameters.known, sizes=sizes
+        )
         return study.fit(parameters, nuisance=study.nuisance, discrepancy=discrepancy)
 
     base = fitted()
@@ -129,7 +140,9 @@ def contenders_of(
     base, found = fitted(discrepancy=best.null.discrepancy), []
     for name in names:
         effect = fit.model.effect(name) or space.central.by_law(name)[1]
-        there = fitted(effect, discrepancy=best.null.discrepancy)
+        rough = fitted(effect, discrepancy=best.null.discrepancy)
+        sizes = amplitude_sizes(rough, [name])
+        there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
         ways = [
             Contender(name, there, best.sizes, off=k, share=share)
             for k, (_, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model))

@@ -5,7 +5,7 @@ and kept only if they improve the prediction of readings left out.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from functools import partial
 
 import numpy as np
@@ -158,15 +158,13 @@ class LeftOut:
             found = stage.chosen(~out)
             if following is None or found.names != following.here.names:
                 break
-        parameters = replace(found.fit.parameters, sizes=found.amplitude_sizes)
-        fit = replace(found.fit, parameters=parameters)
         nulls = NullModels.around(found, found.fit).select(~out)
         laws = choose_laws(nulls, [option.select(~out) for option in options], state.freedom)
         learned = [size * options[k].columns for k, size in laws]
-        films_um = [state.study.predicted_without_um(fit, out)]
+        films_um = [state.study.predicted_without_um(found.fit, out)]
         for count in range(1, len(learned) + 1):
             free = np.hstack(learned[:count])
-            films_um.append(state.study.predicted_without_um(fit, out, free))
+            films_um.append(state.study.predicted_without_um(found.fit, out, free))
         return np.array(films_um + films_um[-1:] * (MOST_LAWS - len(learned)))
 
 

@@ -29,12 +29,13 @@ from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
     PRIOR_EFFECT,
     PRIOR_UNKNOWN,
-    SIZES,
     SURE,
     ModelSpace,
     WeightedNull,
+    amplitude_sizes,
     inclusion_of,
     log_odds,
+    of_sizes,
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
@@ -132,30 +133,7 @@ class EffectSet:
         The fit takes each as normal with one size as the standard deviation.
         """
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature)) + self._of_sizes
-
-    @property
-    def _of_sizes(self) -> float:
-        """What the mixture of sizes changes of the log evidence."""
-        each = [np.logaddexp.reduce(self._by_size(name)) for name in self.names]
-        return float(np.sum(each)) - len(each) * float(np.log(len(SIZES)))
-
-    def _by_size(self, name: str) -> np.ndarray:
-        """(S,) log odds of each size of an effect's amplitudes against that of the fit."""
-        entries, fitted = self.fit.parameters.of_effects, self.fit.parameters.sizes.get(name, 1.0)
-        amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
-        own = [amount for amount, entry in zip(amounts, entries, strict=True)
-               if entry.effect == name and not entry.is_shape]  # fmt: skip
-        change = 0.5 * np.sum(np.square(own)) * (fitted**-2.0 - SIZES**-2.0)
-        return change - len(own) * np.log(SIZES / fitted)
-
-    @property
-    def amplitude_sizes(self) -> dict[str, float]:
-        """The most probable size of each effect's amplitudes, times their typical ones.
-
-        With the typical size an effect that is stronger would be drawn towards none.
-        """
-        return {name: float(SIZES[self._by_size(name).argmax()]) for name in self.names}
+        return float(np.logaddexp.reduce(nature)) + of_sizes(self.fit, self.names)
 
     @property
     def log_prior(self) -> float:
@@ -179,7 +157,9 @@ class EffectSet:
         """Logarithm of the weight by some readings (P,), at the best size of the discrepancy."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
-        return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
+        return (
+            evidence + self.best.sizes.log_prior + of_sizes(self.fit, self.names) + self.log_prior
+        )
 
 
 @dataclass(frozen=True)
@@ -242,7 +222,7 @@ class Search:
             [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
-        sizes = trial.amplitude_sizes
+        sizes = amplitude_sizes(fit, effects)
         if any(size != 1.0 for size in sizes.values()):
             fit = self.state.fitted_with(
                 [*trial.effects.values()], fit.model, discrepancy=discrepancy, sizes=sizes
@@ -284,7 +264,10 @@ class Search:
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
         others = self.state.fitted_with(
-            [*best.effects.values()], self.state.start, starts=STARTS, sizes=best.amplitude_sizes
+            [*best.effects.values()],
+            self.state.start,
+            starts=STARTS,
+            sizes=best.fit.parameters.sizes,
         )
         anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence)
