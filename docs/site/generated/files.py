@@ -4,6 +4,7 @@
 """
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,10 @@ from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
+# Keys that were explained before, in the order of the file.
+TARGET = ['target_um', 'tolerance_um']
+COAT = [k for k in campaign_coats.CoatEntry.model_fields if k not in MOTION | {'wet_on_wet'}]
+SWEPT = [key for key in SweepFile.model_fields if key in PART]
 BEGIN, END = '<!-- generated: files -->', '<!-- end of generated -->'
 MODEL = """
 A model has `planar` or `brushes` by their numbers, `projection`, a list of
@@ -45,10 +50,11 @@ def text() -> str:
         '### A brush of `brushes`\n', 'Also `planar`.\n', _keys(SetPoints),
         '## Campaign\n', _keys(campaign_file._File),
         '### An experiment of `experiments`\n',
-        'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
-        _keys(campaign_file._Entry, without=MOTION | PART),
-        '### A coat of `coats`\n', 'Also the keys of [a motion](#a-motion).\n',
-        _keys(campaign_coats.CoatEntry, without=MOTION),
+        f'Also the keys of [a motion](#a-motion) and of [a part](#a-part), {_listed(TARGET)}.\n',
+        _keys(campaign_file._Entry, without=MOTION.union(PART, TARGET)),
+        '### A coat of `coats`\n',
+        f'Also the keys of [a motion](#a-motion), and of an experiment {_listed(COAT)}.\n',
+        _keys(campaign_coats.CoatEntry, without=MOTION.union(COAT)),
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
         _keys(MotionSource),
@@ -58,8 +64,9 @@ def text() -> str:
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
         '\nLayouts known by their headings, `#` a number:\n',
         table(('layout', 'known by', 'columns', 'no reading unless'), _layouts()),
-        '## Sweep\n', 'Also the keys of [a motion](#a-motion).\n',
-        _keys(SweepFile, without=MOTION),
+        '## Sweep\n',
+        f'Also the keys of [a motion](#a-motion), and of [a part](#a-part) {_listed(SWEPT)}.\n',
+        _keys(SweepFile, without=MOTION.union(SWEPT)),
         '### `passes`\n', _keys(Passes), '### `sample`\n', _keys(Sample),
     ])  # fmt: skip
 
@@ -85,13 +92,19 @@ def _layouts() -> list[tuple[str, str, str, str]]:
 
 
 def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
+    """A table of keys; those of one meaning share a row."""
     schema = model.model_json_schema()
-    rows = [
-        (f'`{key}`', said.get('description', 'text'), _bounds(said), _default(said, key, schema))
-        for key, said in schema['properties'].items()
-        if key not in without
-    ]
-    return table(('key', 'meaning', 'range', 'default'), rows)
+    rows: dict[str, list[str]] = {}
+    for key, said in schema['properties'].items():
+        if key not in without:
+            meaning, bounds = said.get('description', 'text'), _bounds(said)
+            facts = meaning, '' if bounds in meaning else bounds, _default(said, key, schema)
+            rows.setdefault('; '.join(filter(None, facts)), []).append(f'`{key}`')
+    return table(('key', 'meaning'), [(', '.join(keys), said) for said, keys in rows.items()])
+
+
+def _listed(keys: Iterable[str]) -> str:
+    return ', '.join(f'`{key}`' for key in keys)
 
 
 def _bounds(said: dict[str, Any]) -> str:
@@ -111,9 +124,9 @@ def _default(said: dict[str, Any], key: str, schema: dict[str, Any]) -> str:
         return 'required'
     value = said.get('default')
     if isinstance(value, bool):
-        return f'`{value}`'.lower()
+        return f'default `{value}`'.lower()
     shown = value not in (None, '', [], {}) and not isinstance(value, dict)
-    return f'`{value}`' if shown else ''
+    return f'default `{value}`' if shown else ''
 
 
 if __name__ == '__main__':
