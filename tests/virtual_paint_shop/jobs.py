@@ -195,14 +195,6 @@ def record(motion: Motion, sample_s: float, rng: np.random.Generator) -> Log:
     )
 
 
-def moved(
-    motion: Motion, tcp_m: np.ndarray | None = None, turn: np.ndarray | None = None
-) -> Motion:
-    """The same timing with other poses."""
-    poses = {'tcp_m': tcp_m, 'turn': turn}
-    return replace(motion, **{name: one for name, one in poses.items() if one is not None})
-
-
 def orthonormal(turn: np.ndarray) -> np.ndarray:
     z = turn[..., 2] / np.linalg.norm(turn[..., 2], axis=-1, keepdims=True)
     x = turn[..., 0] - np.sum(turn[..., 0] * z, axis=-1, keepdims=True) * z

@@ -2,11 +2,15 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from .bench import Bench
 from .doors import Bend, Part
+from .draw import draw_jobs
+from .gauge import scatter
 from .jobs import Job, Plan, drive
 from .parcels import Pattern
+from .programme import Painted, motion_of
 from .truths import DOWN, library
 
 pytestmark = pytest.mark.slow
@@ -15,13 +19,6 @@ FLAT = Part('door', 1.0, 1.0)
 BENDS = Bend('z', 0.50, -1.0, -0.20, 0.012), Bend('z', 0.25, -1.0, 0.35, 0.02)
 DOOR = Part('door', 1.1, 0.9, 5.0, 3.0, bends=BENDS)
 ROUND = Pattern(1.5, K2=0.2, K3=0.0, phi_rad=0.0, r_m=0.09, sigma1_m=0.04, sigma2_m=0.06)
-CONTRACT_IDS = {
-    'incidence_attraction', 'convex_attraction', 'faraday_shielding', 'gauge_curvature_bias',
-    'edge_build', 'corner_slowdown', 'trigger_lag', 'standoff_efficiency', 'pattern_spread',
-    'tcp_standoff', 'air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag',
-    'flow_drift', 'fog_gradient', 'overspray_fog', 'gauge_gain', 'gauge_zero', 'pose_lag',
-    'gun_wake', 'occlusion',
-}  # fmt: skip
 COLUMN = np.zeros(61), np.linspace(0.02, 0.98, 61)
 ROW = np.linspace(-0.48, 0.48, 97), np.full(97, 0.5)
 
@@ -132,3 +129,16 @@ def test_other_bells_keep_the_solids_and_change_the_shape(name):
     clean, film = change(name, COLUMN, 0.5, drawn={'angle_rad': 0.3})
     assert film.sum() == pytest.approx(clean.sum(), rel=0.02)
     assert np.sqrt(np.mean((film - clean) ** 2)) > 0.02 * clean.max()
+
+
+def test_a_given_programme_lays_the_film_of_the_shops_own():
+    """The shop's own motion as one would get it from a bag."""
+    pattern, (job,) = draw_jobs(5, [], ('door',), 0.05, 'outside')
+    spots, motion = scatter(job.part, 40, np.random.default_rng(1), 0.02), job.motion
+    given = motion_of(
+        motion.time_s, motion.tcp_m, Rotation.from_matrix(motion.turn).as_quat(),
+        motion.trigger_s, motion.trigger_on,
+    )  # fmt: skip
+    expected = Bench(9, job, pattern, 300_000).readings([], *spots)[0]
+    painted = Painted('door', job.part, pattern, [], given, 9, 300_000)
+    np.testing.assert_allclose(painted.film_um(*spots), expected, rtol=1e-9)
