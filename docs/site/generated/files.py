@@ -41,6 +41,7 @@ A model has `planar` or `brushes` by their numbers, `projection`, a list of
 def text() -> str:
     """A section for each file."""
     own = ', '.join(f'`{name}`' for name in OWN.values())
+    layouts = dict.fromkeys([*(one.name for one in FORMATS), *LINES, *FOLDERS])
     aliases = [(f'`{name}`', ', '.join(words)) for name, words in ALIASES.items()]
     return '\n'.join([
         '## Model\n',
@@ -62,8 +63,7 @@ def text() -> str:
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
-        '\nLayouts known by their headings, `#` a number:\n',
-        table(('layout', 'known by', 'columns', 'no reading unless'), _layouts()),
+        f'\nLayouts known by their headings or lines: {"; ".join(layouts)}.\n',
         '## Sweep\n',
         f'Also the keys of [a motion](#a-motion), and of [a part](#a-part) {_listed(SWEPT)}.\n',
         _keys(SweepFile, without=MOTION.union(SWEPT)),
@@ -76,19 +76,6 @@ def written(page: str) -> str:
     made = text().replace('\n\n\n', '\n\n').strip()
     return re.sub(f'({BEGIN}\n).*?(\n{END})', lambda found: found[1] + made + found[2], page,
                   flags=re.DOTALL)  # fmt: skip
-
-
-def _layouts() -> list[tuple[str, str, str, str]]:
-    rows = [
-        (
-            one.name, ', '.join(one.shown_by),
-            ', '.join(f'{quantity}: {heading}' for quantity, heading in one.columns.items()),
-            ', '.join(f'{heading} is {good[1]}' for heading, good in one.status.items()),
-        )
-        for one in FORMATS
-    ]  # fmt: skip
-    rows += [(n, 'its lines', ', '.join(line.groupindex), '') for n, line in LINES.items()]
-    return rows + [(f'{n}, folder or zip', ', '.join(f), '', '') for n, f in FOLDERS.items()]
 
 
 def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
