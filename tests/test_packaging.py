@@ -32,10 +32,6 @@ def manifest(package: str) -> ElementTree.Element:
     return ElementTree.parse(SOURCES / package / 'package.xml').getroot()
 
 
-def words(text: str) -> str:
-    return ' '.join(text.split())
-
-
 def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
     scripts = importlib.metadata.distribution(PACKAGE).entry_points
     return {script.name: script for script in scripts if script.group == 'console_scripts'}

@@ -80,9 +80,6 @@ class Readings:
     clean_um: np.ndarray  # the film without the hidden effects
     marks_um: np.ndarray  # (n, hidden) what each hidden effect alone would change
 
-    def __len__(self) -> int:
-        return self.thickness_um.size
-
     def select(self, rows: np.ndarray | slice) -> Readings:
         return Readings(*(column[rows] for column in vars(self).values()))
 

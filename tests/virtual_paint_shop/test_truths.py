@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from .bench import Bench
-from .doors import Bend, Part
+from .doors import Part
 from .draw import draw_jobs
 from .gauge import scatter
 from .jobs import Job, Plan, drive
@@ -16,8 +16,6 @@ from .truths import DOWN, library
 pytestmark = pytest.mark.slow
 
 FLAT = Part('door', 1.0, 1.0)
-BENDS = Bend('z', 0.50, -1.0, -0.20, 0.012), Bend('z', 0.25, -1.0, 0.35, 0.02)
-DOOR = Part('door', 1.1, 0.9, 5.0, 3.0, bends=BENDS)
 ROUND = Pattern(1.5, K2=0.2, K3=0.0, phi_rad=0.0, r_m=0.09, sigma1_m=0.04, sigma2_m=0.06)
 COLUMN = np.zeros(61), np.linspace(0.02, 0.98, 61)
 ROW = np.linspace(-0.48, 0.48, 97), np.full(97, 0.5)
@@ -85,17 +83,6 @@ def test_corner_slowdown_adds_paint_near_the_reversals_only():
     )
     assert film[-1] > 1.05 * clean[-1]
     assert film[48] == pytest.approx(clean[48], rel=0.002)
-
-
-@pytest.mark.parametrize(
-    ('truth_id', 'at_m', 'sign'), [('convex_attraction', 0.5, 1), ('faraday_shielding', 0.25, -1)]
-)
-def test_the_field_sees_the_convex_line_and_the_hollow(truth_id, at_m, sign):
-    clean, film = change(truth_id, COLUMN, 0.15, DOOR, passes=2)
-    gain = sign * relative(clean, film)
-    assert COLUMN[1][np.argmax(gain)] == pytest.approx(at_m, abs=0.03)
-    assert gain.min() >= 0.0
-    assert gain.max() > 0.10
 
 
 @pytest.mark.parametrize(('standoff', 'sign'), [(0.30, -1), (0.20, 1)])

@@ -120,10 +120,7 @@ class TriggerLag(Truth):
     """The flow answers the trigger like a first-order lag: rise in `amplitude`, fall faster."""
 
     id, family, typical, most, unit = 'trigger_lag', 'boundary', 0.08, 0.6, 's'
-    ranges = between(fall_ratio=(0.3, 0.8))
-
-    def staging(self) -> dict:
-        return {'gun': 'near_edge'}
+    ranges, gun = between(fall_ratio=(0.3, 0.8)), 'near_edge'
 
     def on_flow(self, flow, scene):
         nominal = scene.nominal
