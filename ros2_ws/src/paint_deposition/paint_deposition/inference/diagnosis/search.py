@@ -41,7 +41,8 @@ from paint_deposition.inference.diagnosis.model_space import (
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
 from paint_deposition.inference.fitting.least_squares import Fit
 
-# So many proposals are refitted each time.
+# So many proposals are refitted each time, but for single effects: these are all refitted once, as
+# the pattern that was fitted without any may imitate the one that acts.
 TRIALS = 5
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
@@ -193,6 +194,7 @@ class Search:
         self._trials: dict[frozenset[str], EffectSet] = {}
         self._tried: set[frozenset[str]] = set()
         self._patterns: tuple[DepositionModel, ...] = ()
+        self._leading: tuple[str, ...] = ()  # single effects that fitted best
         self.nothing = self._refitted({}, EffectSet.around(state, frozenset(), state.fit))
 
     def with_effect(self, parent: EffectSet, name: str) -> EffectSet:
@@ -239,9 +241,8 @@ class Search:
         here = self._near_best()
         while True:
             room = len(here.names) < 4  # so many effects at the most
-            stage = SearchStage(
-                here, [self.with_effect(here, name) for name in here.proposed if room]
-            )
+            proposals = self._proposals(here) if room else ()
+            stage = SearchStage(here, [self.with_effect(here, name) for name in proposals])
             again = self._in_another_pattern(stage)
             if again is not here:
                 here = again
@@ -252,6 +253,11 @@ class Search:
             found.append(stage)
             here = best
 
+    def _proposals(self, here: EffectSet) -> tuple[str, ...]:
+        """Effects to try beside a set."""
+        leading = () if here.names else self._leading
+        return tuple(dict.fromkeys((*here.proposed, *leading)))
+
     def _near_best(self) -> EffectSet:
         """Nothing missing, with the discrepancy around the best fit with one effect.
 
@@ -259,8 +265,10 @@ class Search:
         deviations of its footprint with it. All sets that are compared have the same.
         """
         nothing = self.nothing
-        tried = [self.with_effect(nothing, name) for name in nothing.proposed]
-        best = max(tried, key=lambda one: one.log_weight, default=nothing)
+        tried = {n: self.with_effect(nothing, n) for n in nothing.space.alone if n != UNKNOWN}
+        order = sorted(tried, key=lambda name: -tried[name].log_weight)
+        self._leading = tuple(order[:TRIALS])
+        best = tried[order[0]] if order else nothing
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
         others = self.state.fitted_with(
@@ -290,7 +298,7 @@ class Search:
 
     def beside(self, trial: EffectSet) -> dict[str, float]:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
-        for name in trial.proposed:
+        for name in self._proposals(trial):
             self.with_effect(trial, name)
         larger = {
             name: one
@@ -325,7 +333,7 @@ class Search:
         None could whose model is less probable than the one without any.
         """
         others = self.without(trial, name)
-        rivals = dict.fromkeys((name, *others.proposed))
+        rivals = dict.fromkeys((name, *self._proposals(others)))
         tried = {rival: self.with_effect(others, rival) for rival in rivals}
         weights = {rival: one.log_weight for rival, one in tried.items()}
         found = sorted(weights, key=lambda cause: -weights[cause])
