@@ -87,7 +87,7 @@ def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell,
     weak = cell.create_publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
     until_s = time.monotonic() + 30.0
     while weak.get_subscription_count() == 0 and time.monotonic() < until_s:
-        recorder.recorded['/atomizer/pose'].subscribe(500)
+        recorder.recorded['/atomizer/pose'].match_qos()
     for k in range(200, 300):
         first.publish(pose(START_NS + k))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == 300, what='all poses')
