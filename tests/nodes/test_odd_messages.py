@@ -19,23 +19,11 @@ from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.controllers import RwsSource
-from paint_deposition.nodes.robot.signal_source import SignalSource
 from paint_deposition.nodes.web_view import WebView
 from robot_arm import urdf
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
 MOTION = two_passes()
-
-
-class IdleSource(SignalSource):
-    """A source of signals whose controller says nothing."""
-
-    PARAMETERS = RwsSource.PARAMETERS
-
-    def follow(self, stopped) -> None:
-        while not stopped():
-            time.sleep(0.01)
 
 
 @pytest.fixture
@@ -57,7 +45,6 @@ def nodes(tmp_path):
         'joints': (AtomizerSource, {'urdf_file': str(arm), **signal}),
         'tf': (AtomizerSource, {'base_link': 'base', 'tip_link': 'tool0', **signal}),
         'trigger': (AtomizerSource, signal),
-        'signals': (lambda **o: IdleSource('signal_source', **o), {'trigger': 'gun'}),
         'player': (BagPlayer, {'bag': bag, 'rate': 0.0, 'loop': True, 'publish_clock': False}),
     }
 

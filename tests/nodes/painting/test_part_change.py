@@ -246,21 +246,6 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
     assert not (tmp_path / 'films').exists()
 
 
-def test_a_recording_is_read_only_beside_the_runs_and_in_folders_named_at_the_start(
-    simulator, change, tmp_path, tmp_path_factory
-):
-    parts, elsewhere = (tmp_path_factory.mktemp(name) for name in ('parts', 'elsewhere'))
-    simulator(mesh_file=str(write_panel(parts / 'panel.stl')))
-    for folder in (tmp_path / 'films/1', parts / '1', elsewhere / '1'):
-        folder.mkdir(parents=True)
-    for run in (tmp_path / 'films/1', parts / '1'):
-        assert 'holds no .mcap file' in change(serial='1', resume=str(run)).message
-    (tmp_path / 'films/link').symlink_to(elsewhere / '1')
-    for run in (elsewhere / '1', tmp_path / 'films/link', tmp_path / 'films/../../'):
-        answer = change(serial='1', resume=str(run))
-        assert 'is in no folder that deposition_simulator was given' in answer.message
-
-
 def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, tmp_path):
     """The part changes all the same, and the answer says both."""
     folder = tmp_path / 'films'
@@ -420,38 +405,3 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
-
-
-def test_a_part_is_resumed_from_its_recording_after_a_crash(
-    record, simulator, robot, painted, call, onlooker, executor, wait_until, tmp_path
-):
-    """Poses go on all the time; the recorder goes on with the run, and the film is whole."""
-    recorder, node = record(output_directory=str(tmp_path / 'runs')), simulator()
-    source, operator = robot(node), onlooker({})
-    wait_until(lambda: source.has_subscribers(2), what='both')
-    assert call(operator, ChangePart, SERVICE, ChangePart.Request(serial='7')).success
-    wait_until(lambda: recorder.run.folder.name == '7', what='the run')
-    source.send(MOTION, slice(0, 100))
-    painted(node, 100)
-    executor.remove_node(node)
-    node.destroy_node()
-    source.send(MOTION, slice(100, 150))
-    again = simulator()
-    wait_until(lambda: source.is_subscribed_by(again), what='the next simulator')
-    source.send(MOTION, slice(150, 200))
-    painted(again, 50)
-    client = operator.create_client(ChangePart, SERVICE)
-    wait_until(client.service_is_ready)
-    run = str(tmp_path / 'runs/7')
-    future = client.call_async(ChangePart.Request(serial='7', resume=run))
-    wait_until(lambda: again.parts.waiting, what='the request')
-    source.send(MOTION, slice(200, 250))
-    wait_until(future.done, what='the answer')
-    assert future.result().success, future.result().message
-    assert future.result().run == '7'
-    source.send(MOTION, slice(250, None))
-    film = painted(again, len(MOTION))
-    assert np.array_equal(film, offline_um(again, MOTION))
-    assert again.film.counts.rejected == 0
-    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='the recorder')
-    assert recorder.run.folder.name == '7'

@@ -25,7 +25,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
-from paint_deposition.nodes.robot.signal_source import StartsOfMotion
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
 EVENT = (
@@ -288,7 +287,7 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
     class Twice(OpcuaSource):
         connections = 0
 
-        def follow(self, stopped) -> None:
+        def follow(self) -> None:
             self.connections += 1
             for _ in range(3000 if self.connections > 1 else 1):
                 self.take('gun', 1.0, time.time_ns() - (0 if self.lags() else 80_000_000_000))
@@ -302,20 +301,6 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
         status = node.status()
         assert 'after its own time' not in status.message
     node.destroy_node()
-
-
-def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():
-    starts = StartsOfMotion()
-    begin_ns = 1_760_000_000_000_000_000
-    times_s = np.arange(0.0, 12.0, 0.004)
-    # At rest for a second of every three, then at 0.4 m/s.
-    for time_s, moved in zip(times_s, 0.4 * np.cumsum(times_s % 3.0 > 1.0) * 0.004, strict=True):
-        starts.add_pose(begin_ns + round(1e9 * time_s), np.array([moved, 0.0, 1.0]))
-        if abs(time_s % 3.0 - 1.12) < 1e-6:
-            starts.add_opening(begin_ns + round(1e9 * time_s))
-    delay_s, number = starts.delay_s()
-    assert number == 4
-    assert delay_s == pytest.approx(0.12, abs=0.01)
 
 
 @pytest.mark.parametrize(

@@ -163,14 +163,6 @@ class AtomizerInput:
             self._process(message, 0)
         self.flush()
 
-    def drop_held(self, until_ns: int) -> None:
-        """Drop kept poses up to the newest with this stamp, and those before it."""
-        held = self._held or []
-        stamps = [stamp_ns(k.header) if isinstance(k, PoseStamped) else -1 for k in held]
-        if until_ns in stamps:
-            end = len(stamps) - stamps[::-1].index(until_ns)
-            held[:end] = [k for k in held[:end] if isinstance(k, AtomizerState)]
-
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
             # Hours of poses.

@@ -15,14 +15,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.film.live_film import without_refused_states
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.painting.film_files import (
-    film_writer,
-    read_recorded_part,
-)
+from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
@@ -33,7 +26,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
 )
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, real_path
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
 
 # A change that takes longer delays the first poses on the part, and is reported.
@@ -159,28 +152,16 @@ class PartChange:
         self.waiting = True
         try:
             notes += await self._receive_all(following.last_sent_ns)
-            since_ns = self._newest_ns()
-            version = mesh_version(following.mesh_file)
-            ready = None
-            if not request.coat:
-                read = self._prepared(version)
-                ready = read.result() if read.done() else await node.result_of(read)
-            motions, told = None, None
-            if request.resume:
-                motions, told = await self._recorded(request.resume)
-            # What was painted since a crash is of the part that is resumed, and saved with it.
-            is_resumed = motions is not None and not self.part.serial
-            if node.film.counts.received and not is_resumed:
+            since_ns, version = self._newest_ns(), mesh_version(following.mesh_file)
+            read = None if request.coat else self._prepared(version)
+            if read is not None and not read.done():
+                await node.result_of(read)
+            next_part = read.result() if read is not None else None
+            if node.film.counts.received:
                 self._unsaved.append(self._film_writer())
-            if ready is not None:
-                log = [[*gun.log.events()] if is_resumed else [] for gun in node.film.guns]
-                node.change_part(version[0], ready)
+            if next_part is not None:
+                node.change_part(version[0], next_part)
                 self._version = version
-                if motions is not None:
-                    notes.append(self._resume(motions, log))
-            if told is not None and told.run == following.run:
-                following = told  # as it was announced: its recorder goes on with its run
-                since_ns = stamp_ns(told.header)
             self.part, self._since = following, datetime.now(timezone.utc)
             self._run, self._resets = following.run, 0
             self._publish(since_ns, request.part_pose)
@@ -234,8 +215,6 @@ class PartChange:
             PaintError: the request is inconsistent, or the run already exists.
         """
         require_file_name('serial', request.serial)
-        if request.resume and (request.coat or not request.serial):
-            raise PaintError('resume: give the serial number of the part, and its first coat')
         pose = list(request.part_pose)
         self._node.PARAMETERS['part_pose'].checked('part_pose', pose)
         if pose and not self._node.values['part_parent_frame']:
@@ -262,49 +241,17 @@ class PartChange:
                 'coat on it, or give the serial number of the next part'
             )
         folder = self._folder(following.run)
-        if folder.exists() and not request.resume:
+        if folder.exists():
             raise PaintError(
                 f'{folder} already exists: a part has one run for each coat, and none is '
                 'overwritten; give another serial, or move the folder away'
             )
-        # Runs beside that of the part may be read, too.
-        run = real_path(request.resume)
-        if request.resume and run.parent != folder.parent.resolve():
-            self._node.require_named_folder(request.resume)
         return following
 
-    async def _recorded(self, path: str) -> tuple[list[Trajectory], Part | None]:
-        """What a run holds of the part so far, once all that was received is in its file."""
-        # What a recorder took before is on its disk.
-        await self._settled(1.2)
-        names, frame_id = self._node.gun_names, self._node.frame.frame_id
-        return await self._node.result_of(
-            self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
-        )
-
-    def _resume(
-        self, motions: list[Trajectory], log: list[list[TriggerChange | PoseBatch]]
-    ) -> str:
-        """Paint what a run holds, and what came since if it ends before that."""
-        node = self._node
-        for motion, film, source, later in zip(
-            motions, node.film.guns, node.inputs, log, strict=True
-        ):
-            film.forget_trigger()
-            film.replay(events_of(without_refused_states(motion, film.model)))
-            stamps = motion.stamps_ns
-            source.take_pending()  # a recorder may have taken them before
-            if not source.received_ns or source.received_ns in stamps:
-                source.drop_held(int(stamps[-1]) if len(stamps) else 0)
-            else:
-                film.replay(later)
-        poses = sum(map(len, motions))
-        return f'{poses} poses of its recording are painted'
-
-    async def _settled(self, duration_s: float = 0.03) -> None:
+    async def _settled(self) -> None:
         """Wait for messages that were sent before now."""
         settled: Future[None] = Future()
-        threading.Timer(duration_s, settled.set_result, [None]).start()
+        threading.Timer(0.03, settled.set_result, [None]).start()
         await self._node.result_of(settled)
 
     def begin_again(self) -> None:
