@@ -66,9 +66,9 @@ def made(nodes, ros_context, spin):
 
 
 @pytest.mark.parametrize(
-    'name', ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger',
-             'signals', 'player'],
-)  # fmt: skip
+    'name',
+    ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player'],
+)
 def test_no_message_of_the_right_type_ends_a_node(
     name, made, ros_context, spin, executor, wait_until
 ):

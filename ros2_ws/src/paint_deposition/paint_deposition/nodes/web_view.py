@@ -22,7 +22,6 @@ from paint_deposition.files.recordings.headers import (
     trigger_change,
 )
 from paint_deposition.film.colour_scales import film_scale
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
@@ -33,10 +32,10 @@ from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
+    display_parameters,
     fixed_while_running,
     mesh_parameters,
-    require_colours,
-    thickness_parameter,
+    require_display,
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.facing import turned
@@ -62,17 +61,7 @@ WEB_VIEW = dict(
             '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
         ),
     ),
-    color_min_um=thickness_parameter(
-        'Film at the lower end of the colours; both ends 0: automatic [µm]'
-    ),
-    color_max_um=thickness_parameter(
-        'Film at the upper end of the colours; both ends 0: automatic [µm]'
-    ),
-    painted_above_um=thickness_parameter(
-        'Thinner film is shown as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-    ),
-    target_um=thickness_parameter('Film wanted; 0: none [µm]'),
-    target_tolerance_um=thickness_parameter('Allowed difference from the target [µm]'),
+    **display_parameters(),
 )
 
 
@@ -140,8 +129,7 @@ class WebView(PaintNode):
         self.page.close()
 
     def _validate(self, values: Mapping[str, Any]) -> None:
-        require_colours(values)
-        require_band(values['target_um'], values['target_tolerance_um'])
+        require_display(values)
 
     def _on_change(self, names: set[str]) -> None:
         self._show_scale()

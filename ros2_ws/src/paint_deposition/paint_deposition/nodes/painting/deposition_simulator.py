@@ -10,7 +10,6 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 from paint_deposition.nodes.painting.film_display import FilmDisplay
 from paint_deposition.nodes.painting.film_files import film_writer
 from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
@@ -20,10 +19,10 @@ from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
+    display_parameters,
     fixed_while_configured,
-    require_colours,
+    require_display,
     require_file_name,
-    thickness_parameter,
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -42,17 +41,7 @@ SIMULATOR = PAINTING | {
             choices=('single', 'double'),
         ),
     ),
-    'color_min_um': thickness_parameter(
-        'Film at the lower end of the colours; both ends 0: automatic [µm]'
-    ),
-    'color_max_um': thickness_parameter(
-        'Film at the upper end of the colours; both ends 0: automatic [µm]'
-    ),
-    'painted_above_um': thickness_parameter(
-        'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-    ),
-    'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
-    'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
+    **display_parameters(),
     **fixed_while_configured(
         'its zones are found on the mesh once; clean the node up or restart it',
         zones_file=NodeParameter(
@@ -125,8 +114,7 @@ class DepositionSimulator(PaintingNode):
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)
-        require_colours(values)
-        require_band(values['target_um'], values['target_tolerance_um'])
+        require_display(values)
 
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""
