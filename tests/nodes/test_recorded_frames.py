@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -15,6 +16,7 @@ from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.runtime.messages import header
 
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.
@@ -86,7 +88,7 @@ def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, o
     viewer = onlooker({})
     for kind in ('BYTE', 'BOOL', 'DOUBLE'):
         assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
-        assert node.frame.lookup_transform('base_link', 0) is not None
+        assert node.frame.on_part(PoseStamped(header=header('base_link', 0))) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
         request = SetParameters.Request(
             parameters=[ParameterMessage(name='part_pose', value=value)]

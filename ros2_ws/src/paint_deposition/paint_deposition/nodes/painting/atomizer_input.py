@@ -3,10 +3,9 @@
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -68,41 +67,45 @@ class AtomizerInput:
         on_poses: Callable[[PoseBatch], None],
         on_state: Callable[[TriggerChange], None],
     ) -> None:
-        self._node, self._frame = node, frame
+        self._node, self._frame, self.name = node, frame, name
         self._on_poses, self._on_state = on_poses, on_state
-        self.name = name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
         self.poses_received = self.newest_ns = self.sent_ns = 0
-        self.refused_s = self.pose_s = -math.inf
-        self.spraying = False
+        self.refused_s = self.pose_s = self._flushed_s = -math.inf
+        self.spraying, self.programmed_m_per_s = False, 0.0
         self.speed = SpeedNow()
-        self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._state_ahead: tuple[int, int] | None = None
-        self._flushed_s = -math.inf
         # What was taken from the queues, and when it was sent.
-        self._new_poses: list[tuple[PoseStamped, int]] = []
-        self._new_states: list[tuple[AtomizerState, int]] = []
+        new_poses, new_states = [], []
+        self._new_poses: list[tuple[PoseStamped, int]] = new_poses
+        self._new_states: list[tuple[AtomizerState, int]] = new_states
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue = TfQueue(self._transform, self._reject)
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
-        poses, states = (partial(self._note, new) for new in (self._new_poses, self._new_states))
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, poses),
+            subscribe(
+                PoseStamped, self._pose_topic,
+                lambda pose, info: new_poses.append((pose, info['source_timestamp'])),
+            ),
             # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, states, latched=True),
-        ]
+            subscribe(
+                AtomizerState, self._state_topic,
+                lambda state, info: new_states.append((state, info['source_timestamp'])),
+                latched=True,
+            ),
+        ]  # fmt: skip
         self.reset_counts()
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
         # Polled: waking up for each pose would cost more than painting it.
-        node.create_steady_timer(0.02, self._take)
+        node.create_steady_timer(0.02, partial(self.take_pending, at_once=False))
         node.create_steady_timer(0.2, self._report_progress)
 
     @property
@@ -115,15 +118,10 @@ class AtomizerInput:
         """Messages that the middleware has lost since the last reset."""
         return sum(topic.lost for topic in self._topics) - self._lost_before
 
-    @property
-    def received_ns(self) -> int:
-        """Stamp of the newest pose received, 0 before the first."""
-        return stamp_ns(self._newest.header) if self._newest is not None else 0
-
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
         self.reset_counts()
-        self.newest_ns = self.received_ns
+        self.newest_ns = stamp_ns(self._newest.header) if self._newest is not None else 0
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
@@ -139,14 +137,6 @@ class AtomizerInput:
         self._lost_before = sum(topic.lost for topic in self._topics)
         self.intervals = Intervals()
         self.jumps = Jumps()
-
-    def count_unpainted(self, poses: int) -> None:
-        """Count poses received while the node is not active."""
-        if not self.unpainted:
-            self._node.get_logger().warning(
-                f'{self._pose_topic}: poses arrive and are not painted: the node is inactive'
-            )
-        self.unpainted += poses
 
     # --- holding
 
@@ -177,13 +167,11 @@ class AtomizerInput:
 
     # --- batches
 
-    def take_pending(self) -> None:
-        """Take all messages in the queues and pass them on."""
-        self._drain()
-        self.flush()
+    def take_pending(self, at_once: bool = True) -> None:
+        """Take all messages in the queues, each state before the first pose that was sent later.
 
-    def _drain(self) -> None:
-        """Process what is in the queues, each state before the first pose that was sent later."""
+        They are passed on at once, or when they fill a batch or have waited for long enough.
+        """
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
@@ -198,10 +186,8 @@ class AtomizerInput:
         for state in states:
             self._take_state(*state)
 
-    def _take(self) -> None:
-        self._drain()
-        waited = time.monotonic() - self._flushed_s >= 0.05
-        if waited or len(self._poses) >= POSES_PER_BATCH:
+        has_waited = time.monotonic() - self._flushed_s >= 0.05
+        if at_once or has_waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
 
     def flush(self) -> None:
@@ -226,9 +212,6 @@ class AtomizerInput:
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
         self._on_poses(batch)
-
-    def _note(self, new: list[tuple[Any, int]], message: Any, info: Mapping[str, Any]) -> None:
-        new.append((message, info['source_timestamp']))
 
     # --- poses
 

@@ -94,16 +94,8 @@ class PartFrame:
         pose, frame_id = pose_of(message.pose), message.header.frame_id
         if is_frame(frame_id, self.frame_id):
             return pose
-        return self.lookup_transform(frame_id, stamp_ns(message.header)).applied(*pose)
-
-    def lookup_transform(self, frame_id: str, at_ns: int) -> Rigid:
-        """The transform from another frame into the part's at that time.
-
-        Raises:
-            NoTransform: there is none, or none yet.
-        """
         try:
-            return self._tree.lookup(frame_id, self.frame_id, at_ns)
+            into_part = self._tree.lookup(frame_id, self.frame_id, stamp_ns(message.header))
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
             remedy = 'set part_pose and part_parent_frame, or frame_id'
@@ -111,6 +103,7 @@ class PartFrame:
                 remedy = 'publish tf without gaps and by the clock of the poses'
             may_come = missing.may_come and bool(self.tf_topics)
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
+        return into_part.applied(*pose)
 
 
 class TfQueue:

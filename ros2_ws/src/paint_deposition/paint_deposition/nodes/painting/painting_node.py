@@ -13,7 +13,7 @@ from rclpy.timer import Timer
 from paint_deposition.effects.catalogue import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
@@ -27,6 +27,7 @@ from paint_deposition.nodes.painting.painting_parameters import (
 )
 from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.runtime.topics import gun_topic
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -59,7 +60,7 @@ class PaintingNode(ManagedNode, ABC):
         self.inputs = [
             AtomizerInput(
                 self, name, self.frame, partial(self._add_poses, number),
-                partial(self._add_trigger, number),
+                lambda change, number=number: self.film.guns[number].add_trigger(change),
             )
             for number, name in enumerate(self.gun_names)
         ]  # fmt: skip
@@ -125,7 +126,13 @@ class PaintingNode(ManagedNode, ABC):
     def _add_poses(self, gun: int, batch: PoseBatch) -> None:
         """Paint poses of a gun, given by its number, if the node is active."""
         if not self.active:
-            self.inputs[gun].count_unpainted(len(batch))
+            source = self.inputs[gun]
+            if not source.unpainted:
+                topic = gun_topic(source.name, 'atomizer/pose')
+                self.get_logger().warning(
+                    f'{topic}: poses arrive and are not painted: the node is inactive'
+                )
+            source.unpainted += len(batch)
             return
         began_s = time.monotonic()
         self.film.guns[gun].add_poses(batch)
@@ -136,9 +143,6 @@ class PaintingNode(ManagedNode, ABC):
             # N poses stand for N intervals: one of them lies before the batch.
             duration_s = float(np.median(steps_ns)) * len(batch) * 1e-9
             self._times_s[gun].append((spent_s, duration_s))
-
-    def _add_trigger(self, gun: int, change: TriggerChange) -> None:
-        self.film.guns[gun].add_trigger(change)
 
     @property
     def real_time_factor(self) -> float:
@@ -257,13 +261,23 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None and self.repainting.done:
             self._adopt_repainted(self.repainting)
         oriented = self._outward_side.orient(self.surface, self.film.guns)
-        if oriented is not self.surface:
-            try:
-                self._turn_inside_out(oriented)
-            except PaintError as error:  # readings that were taken on its other side, say
-                self._outward_side = OutwardSide(0)
-                self.model_problem = f'the gun paints the other side of the part: {error}'
-                self.get_logger().error(self.model_problem)
+        if oriented is self.surface:
+            return
+        try:
+            self._set_surface(oriented)
+        except PaintError as error:  # readings that were taken on its other side, say
+            self._outward_side = OutwardSide(0)
+            self.model_problem = f'the gun paints the other side of the part: {error}'
+            self.get_logger().error(self.model_problem)
+            return
+        # The motion so far is painted again, with the other side outward.
+        models = [gun.model for gun in self.film.guns]
+        turned = unpainted_films(self.surface, self.points, models, self.values)
+        for new, old in zip(turned.guns, self.film.guns, strict=True):
+            new.replay(old.log.events())
+        self.film = turned
+        if self.repainting is not None:
+            self._repaint()
 
     def _adopt_repainted(self, repainting: Repainting) -> None:
         self.repainting = None
@@ -279,14 +293,3 @@ class PaintingNode(ManagedNode, ABC):
             self._repaint()
         else:
             self.film = film
-
-    def _turn_inside_out(self, surface: Surface) -> None:
-        """Repaint the motion so far on the part with its other side outward."""
-        self._set_surface(surface)
-        models = [gun.model for gun in self.film.guns]
-        turned = unpainted_films(self.surface, self.points, models, self.values)
-        for new, old in zip(turned.guns, self.film.guns, strict=True):
-            new.replay(old.log.events())
-        self.film = turned
-        if self.repainting is not None:
-            self._repaint()

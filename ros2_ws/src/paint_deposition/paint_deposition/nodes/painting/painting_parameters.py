@@ -124,11 +124,16 @@ def model_from_parameters(
     Raises:
         ModelError: the model is invalid, or names an effect file without `allow_user_effects`.
     """
+
+    def refuse(path: Path) -> type[Effect]:
+        raise ModelError(
+            f'effect file {path} is not run, because it is Python code; if you trust it, start '
+            'the node with allow_user_effects:=true'
+        )
+
     if not values['model_file']:
         return DepositionModel()
-    return read_model(
-        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
-    )
+    return read_model(values['model_file'], load if values['allow_user_effects'] else refuse)
 
 
 def models_from_parameters(
@@ -151,13 +156,6 @@ def models_from_parameters(
     models = tuple(model_from_parameters({**values, 'model_file': file}, load) for file in files)
     require_same_film_effects(dict(zip(guns, models, strict=True)))
     return models
-
-
-def _refuse_effect_file(path: Path) -> type[Effect]:
-    raise ModelError(
-        f'effect file {path} is not run, because it is Python code; if you trust it, start the '
-        'node with allow_user_effects:=true'
-    )
 
 
 @dataclass(frozen=True)
