@@ -82,10 +82,10 @@ class ReplayClock:
     def _remaining_s(self, time_ns: int) -> float:
         if self._rate == 0.0:
             return 0.0 if self.running else math.inf
-        if self._since_s is None or self._time_ns is None:
+        now_ns = self.time_ns
+        if self._since_s is None or now_ns is None:
             return math.inf
-        passed_s = time.monotonic() - self._since_s
-        return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
+        return (time_ns - now_ns) * 1e-9 / self._rate
 
 
 @dataclass
@@ -247,21 +247,23 @@ class FlowControl:
             behind = self._window.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            never_reported = {
-                name for name, s in self._window.subscribers.items() if s.never_reported
-            }
-            for name in never_reported - self._never_reported:
-                self._node.get_logger().warning(
-                    f'{name} has never reported its progress: it is no longer waited for, and '
-                    'may lose poses when its queue overflows'
-                )
-            self._never_reported = never_reported
+            self._warn_of_mute_subscribers()
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
                 self._log_status(f'waiting for {late}')
             self._stopped.wait(0.001)
         self.status = 'playing'
+
+    def _warn_of_mute_subscribers(self) -> None:
+        subscribers = self._window.subscribers.items()
+        mute = {name for name, subscriber in subscribers if subscriber.never_reported}
+        for name in mute - self._never_reported:
+            self._node.get_logger().warning(
+                f'{name} has never reported its progress: it is no longer waited for, and may '
+                'lose poses when its queue overflows'
+            )
+        self._never_reported = mute
 
     def _log_status(self, status: str) -> None:
         self.status = status

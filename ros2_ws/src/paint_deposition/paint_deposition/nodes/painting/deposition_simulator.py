@@ -1,7 +1,7 @@
 """Node `deposition_simulator`: the film on a part as the atomizer paints it."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -10,8 +10,12 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.nodes.painting.film_display import FilmDisplay
-from paint_deposition.nodes.painting.film_files import film_writer
+from paint_deposition.nodes.painting.film_display import (
+    FilmDisplay,
+    shares,
+    statistics_of,
+    volume_by_gun,
+)
 from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
@@ -26,6 +30,7 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.writers.write import write_film
 
 SIMULATOR = PAINTING | {
     'publish_rate_hz': NodeParameter(
@@ -140,7 +145,7 @@ class DepositionSimulator(PaintingNode):
         try:
             require_file_name('name', stem)
             self.catch_up()
-            write = film_writer(self, Path(self.values['output_directory']), stem)
+            write = self.film_writer(Path(self.values['output_directory']), stem)
             paths = await self.result_of(self._saving.submit(write))
         except Exception as error:  # reported to the caller of the service
             response.message = str(error)
@@ -149,3 +154,64 @@ class DepositionSimulator(PaintingNode):
         response.paths = [str(path) for path in paths]
         response.message = f'wrote {", ".join(path.name for path in paths)}'
         return response
+
+    def film_writer(
+        self, folder: Path, stem: str, part: Mapping[str, Any] | None = None
+    ) -> Callable[[], list[Path]]:
+        """A function that writes the film as it is now and returns the paths; for any thread.
+
+        Args:
+            folder, stem: of the files.
+            part: description of the part for the statistics file.
+        """
+        film, surface, zones = self.film.snapshot(), self.surface, self.zones
+        values, names, details = dict(self.values), self.gun_names, self._details()
+        counts = [gun.counts.to_dict() for gun in self.film.guns]
+        if part:
+            details['part'] = part
+
+        def write() -> list[Path]:
+            laid_cm3 = volume_by_gun(names, surface, film)
+            files = values['model_files'] or [values['model_file']] * len(names)
+            details['atomizers'] = [
+                {
+                    'name': name,
+                    'model_file': file,
+                    'painted_volume_cm3': laid_cm3[name],
+                    'share': share,
+                    'emitted_volume_cm3': gun.emitted_cm3,
+                    'poses': poses,
+                }
+                for (name, share), file, gun, poses in zip(
+                    shares(laid_cm3).items(), files, film.guns, counts, strict=True
+                )
+            ]
+            film_um = film.film_um
+            figures = statistics_of(values, surface, film_um, film.emitted_cm3, zones)
+            if any(gun.model.brushes for gun in film.guns):
+                details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
+            return write_film(
+                folder, surface, film_um, figures, zones=zones, stem=stem,
+                statistics_file=f'{stem}.json', details=details,
+                color_range_um=(values['color_min_um'], values['color_max_um']),
+            )  # fmt: skip
+
+        return write
+
+    def _details(self) -> dict[str, Any]:
+        """What the statistics file says beside the figures of the film."""
+        refused = [source.refused_frames.items() for source in self.inputs]
+        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
+        return {
+            'mesh_file': self.mesh_file,
+            'mesh_id': self.surface.mesh_id,
+            'frame_id': self.frame.frame_id,
+            'down': self.surface.down,
+            'model_file': self.values['model_file'],
+            'zones_file': self.values['zones_file'],
+            'effects': list(dict.fromkeys(effects)),
+            'poses': self.film.counts.to_dict(),
+            'poses_in_other_frames': {
+                frame: count for frames in refused for frame, count in frames
+            },
+        }

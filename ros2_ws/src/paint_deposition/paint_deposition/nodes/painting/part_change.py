@@ -1,5 +1,7 @@
 """Changing the part in the cell: the film is saved, and a new film and a new run begin."""
 
+from __future__ import annotations
+
 import os
 import threading
 import time
@@ -7,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from paint_msgs.msg import Part
 from paint_msgs.srv import ChangePart
@@ -15,8 +18,6 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.painting.film_files import film_writer
-from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     read_part,
@@ -28,6 +29,9 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
+
+if TYPE_CHECKING:
+    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
@@ -62,7 +66,7 @@ class PartChange:
 
     def __init__(
         self,
-        node: PaintingNode,
+        node: DepositionSimulator,
         version: Version,
         saving: ThreadPoolExecutor,
         group: CallbackGroup,
@@ -315,7 +319,7 @@ class PartChange:
     def _film_writer(self) -> Callable[[], list[Path]]:
         part, node = self.part, self._node
         if not part.serial:
-            return film_writer(node, self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
+            return node.film_writer(self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
         described = {
             **{name: getattr(part, name) for name in ('type', 'serial', 'coat', 'run')},
             'since': self._since.isoformat(timespec='milliseconds'),
@@ -323,7 +327,7 @@ class PartChange:
             'part_pose': list(node.values['part_pose'] or []),
             'gap_s': self._gap_s,
         }
-        return film_writer(node, self._folder(part.run), 'film', described)
+        return node.film_writer(self._folder(part.run), 'film', described)
 
     def _save_films(self) -> list[Path]:
         """Save the films that are not on disk, the oldest first, in the thread for that."""
