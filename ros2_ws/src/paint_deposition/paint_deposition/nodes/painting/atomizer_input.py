@@ -79,9 +79,8 @@ class AtomizerInput:
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._state_ahead: tuple[int, int] | None = None
         # What was taken from the queues, and when it was sent.
-        new_poses, new_states = [], []
-        self._new_poses: list[tuple[PoseStamped, int]] = new_poses
-        self._new_states: list[tuple[AtomizerState, int]] = new_states
+        self._new_poses: list[tuple[PoseStamped, int]] = []
+        self._new_states: list[tuple[AtomizerState, int]] = []
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
@@ -91,12 +90,12 @@ class AtomizerInput:
         self._topics = [
             subscribe(
                 PoseStamped, self._pose_topic,
-                lambda pose, info: new_poses.append((pose, info['source_timestamp'])),
+                lambda pose, info: self._new_poses.append((pose, info['source_timestamp'])),
             ),
             # A latched state from before the node started is still in effect.
             subscribe(
                 AtomizerState, self._state_topic,
-                lambda state, info: new_states.append((state, info['source_timestamp'])),
+                lambda state, info: self._new_states.append((state, info['source_timestamp'])),
                 latched=True,
             ),
         ]  # fmt: skip

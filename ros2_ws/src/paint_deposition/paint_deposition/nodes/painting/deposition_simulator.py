@@ -111,11 +111,11 @@ class DepositionSimulator(PaintingNode):
         )
         return Status(WARN, beside, status.values)
 
-    def _points_on(self, surface: Surface) -> SurfacePoints:
-        return surface.points()
-
     def _read_part(self) -> None:
         self._mesh_version = mesh_version(self.mesh_file)
+
+    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
+        return surface, surface.points()
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)

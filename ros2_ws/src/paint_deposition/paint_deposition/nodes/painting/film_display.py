@@ -4,6 +4,7 @@ import sys
 import time
 from array import array
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -204,7 +205,7 @@ class FilmDisplay:
             'thickness/field': lambda: field_message(surface, film_um, at),
         }
         for gun, topic in enumerate(self._share_topics):
-            make[topic] = lambda gun=gun: field_message(surface, film.shares_um[gun], at)
+            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
         if self._node.values['publish_mesh']:
             make['thickness/mesh'] = lambda: self._mesh_message(at.frame_id)
         for topic, message in make.items():

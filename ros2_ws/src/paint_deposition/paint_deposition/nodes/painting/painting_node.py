@@ -4,6 +4,7 @@ import time
 from abc import ABC, abstractmethod
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -12,8 +13,9 @@ from rclpy.timer import Timer
 
 from paint_deposition.effects.catalogue import read_effect_file, try_effect
 from paint_deposition.errors import PaintError
+from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
-from paint_deposition.motion.pose_stream import PoseBatch
+from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
@@ -22,12 +24,11 @@ from paint_deposition.nodes.painting.painting_parameters import (
     models_from_parameters,
     read_part,
     unpainted_films,
-    warm_up,
-    zones_on,
 )
 from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -53,14 +54,13 @@ class PaintingNode(ManagedNode, ABC):
 
     repainting: Repainting | None = None
     model_problem = ''
-    _notes_logged = 0
     _shown: CommonFilm | None = None
 
     def _configure(self) -> None:
         self.inputs = [
             AtomizerInput(
                 self, name, self.frame, partial(self._add_poses, number),
-                lambda change, number=number: self.film.guns[number].add_trigger(change),
+                partial(self._add_trigger, number),
             )
             for number, name in enumerate(self.gun_names)
         ]  # fmt: skip
@@ -88,34 +88,56 @@ class PaintingNode(ManagedNode, ABC):
         self._times_s: list[deque[tuple[float, float]]] = [
             deque(maxlen=100) for _ in self.gun_names
         ]
-        self.model_problem, self._notes_logged = '', 0
+        self.model_problem = ''
+        self._noted: set[str] = set()
         self.frame = PartFrame(self, self.values['frame_id'])
         self._set_part_pose()
         self.models = models_from_parameters(self.values)
         self._read_part()
-        self._set_surface(read_part(self.values, self.mesh_file))
-        self.zones = zones_on(self.values, self.mesh_file, self.surface)
-        self._outward_side = OutwardSide(len(self.gun_names))
-        self.film = unpainted_films(self.surface, self.points, self.models, self.values)
         self.get_logger().info('getting ready; a new model is compiled first')
-        warm_up(self.surface, self.film)
+        self._take_part(self.prepare(self.mesh_file))
 
     # --- for the subclass
 
     @abstractmethod
-    def _points_on(self, surface: Surface) -> SurfacePoints:
-        """The points of the part to paint."""
+    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
+        """The points of the part to paint, and its surface with the side outward that they need.
+
+        Raises:
+            PaintError: they are not on the surface.
+        """
 
     def _read_part(self) -> None:
         """Read what ``_points_on`` needs; called before the mesh is read."""
 
-    def _set_surface(self, surface: Surface) -> None:
-        """Set the part, at the start and when it is turned inside out."""
-        self.surface = surface
-        self.points = self._points_on(surface)
-        for note in surface.notes[self._notes_logged :]:
-            self.get_logger().warning(note)
-        self._notes_logged = len(surface.notes)
+    def prepare(self, mesh_file: str) -> PreparedPart:
+        """The part of a mesh, ready to be painted; a large one takes a second, in any thread.
+
+        Raises:
+            PaintError: mesh or zones cannot be read, or a zone has no vertex of the part.
+        """
+        values, zones = self.values, None
+        surface, points = self._points_on(read_part(values, mesh_file))
+        if values.get('zones_file'):
+            zones = read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
+        film = unpainted_films(surface, points, self.models, values)
+        film.warm_up()
+        facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
+        return PreparedPart(surface, points, film, zones)
+
+    def _take_part(self, part: PreparedPart) -> None:
+        """Paint this part from now on."""
+        self.surface, self.points, self.zones = part.surface, part.points, part.zones
+        self.film, self._shown = part.film, None
+        self._outward_side = OutwardSide(len(self.gun_names))
+        self._surface_changed()
+
+    def _surface_changed(self) -> None:
+        """Follow another surface, or the same turned inside out; its notes are said once."""
+        for note in self.surface.notes:
+            if note not in self._noted:
+                self.get_logger().warning(note)
+        self._noted |= {*self.surface.notes}
 
     @abstractmethod
     def publish(self) -> None:
@@ -143,6 +165,9 @@ class PaintingNode(ManagedNode, ABC):
             # N poses stand for N intervals: one of them lies before the batch.
             duration_s = float(np.median(steps_ns)) * len(batch) * 1e-9
             self._times_s[gun].append((spent_s, duration_s))
+
+    def _add_trigger(self, gun: int, change: TriggerChange) -> None:
+        self.film.guns[gun].add_trigger(change)
 
     @property
     def real_time_factor(self) -> float:
@@ -175,10 +200,8 @@ class PaintingNode(ManagedNode, ABC):
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
-        self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points
-        self.zones, self.film, self._shown = part.zones, film, None
-        self._notes_logged = len(part.surface.notes)
-        self._outward_side = OutwardSide(len(self.gun_names))
+        self.mesh_file = mesh_file
+        self._take_part(replace(part, film=film))
         if self.repainting is not None:
             self._repaint()
 
@@ -264,7 +287,7 @@ class PaintingNode(ManagedNode, ABC):
         if oriented is self.surface:
             return
         try:
-            self._set_surface(oriented)
+            self.surface, self.points = self._points_on(oriented)
         except PaintError as error:  # readings that were taken on its other side, say
             self._outward_side = OutwardSide(0)
             self.model_problem = f'the gun paints the other side of the part: {error}'
@@ -276,6 +299,7 @@ class PaintingNode(ManagedNode, ABC):
         for new, old in zip(turned.guns, self.film.guns, strict=True):
             new.replay(old.log.events())
         self.film = turned
+        self._surface_changed()
         if self.repainting is not None:
             self._repaint()
 

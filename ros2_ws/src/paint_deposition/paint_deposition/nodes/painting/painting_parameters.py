@@ -13,7 +13,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import LoadEffect, read_model
-from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
@@ -27,7 +26,6 @@ from paint_deposition.nodes.runtime.parameters import (
     fixed_while_configured,
     mesh_parameters,
 )
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
@@ -165,7 +163,7 @@ class PreparedPart:
     surface: Surface
     points: SurfacePoints
     film: LiveFilms
-    zones: PointZones | None = None
+    zones: PointZones | None
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
@@ -178,17 +176,6 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
         raise PaintError("mesh_file is empty: give the part's mesh")
     down = np.array(values['down']) if values['down'] else None
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
-
-
-def zones_on(values: Mapping[str, Any], mesh_file: str, surface: Surface) -> PointZones | None:
-    """The zones of a part's vertices by a node's parameters, if they name any.
-
-    Raises:
-        PaintError: the zones cannot be read, or one has no vertex of the part.
-    """
-    if not values.get('zones_file'):
-        return None
-    return read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
 
 
 def unpainted_films(
@@ -204,9 +191,3 @@ def unpainted_films(
         **{n: values[n] for n in ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')},
     }
     return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
-
-
-def warm_up(surface: Surface, film: LiveFilms) -> None:
-    """Compile and compute what painting needs; a large part takes a second."""
-    film.warm_up()
-    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for rays along a gun's axis

@@ -18,13 +18,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.painting.painting_parameters import (
-    PreparedPart,
-    read_part,
-    unpainted_films,
-    warm_up,
-    zones_on,
-)
+from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
@@ -295,7 +289,7 @@ class PartChange:
         """The part of this mesh, which is read unless it is kept."""
         part = self._parts.pop(version, None)
         if part is None or (part.done() and part.exception()):
-            part = self._reading.submit(self._prepare, version[0])
+            part = self._reading.submit(self._prepare_named, version[0])
         self._parts[version] = part
         others = [kept for kept in self._parts if kept not in (version, self._version)]
         # A large one takes some 100 MB.
@@ -303,15 +297,9 @@ class PartChange:
             del self._parts[kept]
         return part
 
-    def _prepare(self, mesh_file: str) -> PreparedPart:
-        """Read the mesh and compile, in a thread of its own."""
-        node = self._node
-        node.require_named_folder(mesh_file)
-        surface = read_part(node.values, mesh_file)
-        points = surface.points()
-        film = unpainted_films(surface, points, node.models, node.values)
-        warm_up(surface, film)
-        return PreparedPart(surface, points, film, zones_on(node.values, mesh_file, surface))
+    def _prepare_named(self, mesh_file: str) -> PreparedPart:
+        self._node.require_named_folder(mesh_file)
+        return self._node.prepare(mesh_file)
 
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run
