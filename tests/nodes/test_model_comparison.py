@@ -47,19 +47,13 @@ def readings(tmp_path):
 
 
 @pytest.fixture
-def comparison(ros_context, spin, readings, tmp_path):
+def comparison(start, readings, tmp_path):
     """`comparison(**parameters)`: a comparison with the readings that runs."""
-
-    def comparison(**values) -> ModelComparison:
-        chosen = {
-            'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
-            'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
-        } | values  # fmt: skip
-        node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
-        spin(node)
-        return node
-
-    return comparison
+    chosen = {
+        'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
+        'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
+    }  # fmt: skip
+    return lambda **values: start(ModelComparison, **chosen | values)
 
 
 @pytest.fixture

@@ -1,7 +1,5 @@
 """What a cell has to bear: a node that stalls."""
 
-import time
-
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from paint_msgs.msg import PoseProgress, ThicknessStats
@@ -52,7 +50,7 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
 
 
 def test_a_recorder_that_stalls_at_a_change_has_each_pose_in_the_run_of_its_part(
-    simulator, robot, ros_domain, wait_until, call, tmp_path
+    simulator, robot, ros_domain, wait_until, still, call, tmp_path
 ):
     """It hears of the part before it hears of the last poses on the part before."""
     node = simulator()
@@ -71,8 +69,7 @@ def test_a_recorder_that_stalls_at_a_change_has_each_pose_in_the_run_of_its_part
             node.catch_up()
             films.append(node.film.snapshot().film_um)
             if part == 1:  # for longer than a queue of the system is emptied
-                until_s = time.monotonic() + 2.0
-                wait_until(lambda until_s=until_s: time.monotonic() > until_s)
+                still(2.0)
             answer = call(source, ChangePart, '/deposition_simulator/change_part',
                           ChangePart.Request(serial=f'{part}'))  # fmt: skip
             assert answer.success, answer.message

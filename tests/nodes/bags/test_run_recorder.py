@@ -18,7 +18,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
@@ -27,13 +26,11 @@ from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_until, tmp_path):
+def test_every_byte_of_a_replay_is_recorded(play, record, wait_until, tmp_path):
     written = straight_pass(900)
     bag = write_pose_bag(tmp_path / 'pass', written)
     recorder = record()
-    replay = parameters(bag=str(bag), rate=0.0, state_topic='/atomizer/state')
-    player = BagPlayer(context=ros_context, parameter_overrides=replay)
-    spin(player)
+    player = play(bag, rate=0.0, state_topic='/atomizer/state')
     wait_until(player.finished.done, what='the end of the replay')
     information = finish(recorder)
     assert counts(information)['/atomizer/pose'] == 900
@@ -129,9 +126,8 @@ def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_unti
     assert counts(finish(recorder)) == {'/atomizer/pose': 500}
 
 
-def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin, wait_until):
-    planner = IndexPlanner(context=ros_context)
-    spin(planner)
+def test_a_model_changed_meanwhile_is_in_the_recording(record, start, wait_until):
+    planner = start(IndexPlanner)
     recorder = record()
     events = [p for p in planner.publishers if p.topic_name == '/parameter_events']
     wait_until(

@@ -24,7 +24,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
@@ -283,16 +282,13 @@ def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot,
     assert (tmp_path / 'films/1/film.csv').is_file()
 
 
-def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,
-                                                 spin, wait_until, tmp_path):  # fmt: skip
+def test_the_recorder_begins_a_run_for_each_part(
+    simulator, robot, record, painted, change, wait_until, tmp_path
+):
     folder = tmp_path / 'films'
     where = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
     node = simulator(part_pose=where, part_parent_frame='cell')
-    recorder = RunRecorder(
-        context=ros_context,
-        parameter_overrides=parameters(output_directory=str(folder), name='before'),
-    )
-    spin(recorder)
+    recorder = record(output_directory=str(folder), name='before')
     source = robot(node, recorder)
     for number, motion in enumerate((MOTION, later(MOTION)), start=1):
         assert change(serial=f'47-{number}', type='door').success

@@ -10,7 +10,6 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
-from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.robot.egm_source import EgmSource, EgmStream
@@ -110,9 +109,7 @@ def test_a_step_of_the_controllers_clock_does_not_move_the_stamps(step_ms):
         assert stamp == now_ns + 4_000_000 * k - LAG_NS
 
 
-def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
-    ros_context, spin, onlooker, wait_until
-):
+def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlooker, wait_until):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]
@@ -126,10 +123,9 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
             'joint_states': (JointState, QoSProfile(depth=500)),
         }
     )
-    node = EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
-    spin(node)
+    start(EgmSource, **chosen)
     with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
-        EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
+        start(EgmSource, **chosen)
     wait_until(lambda: viewer.count_publishers('atomizer/pose'), what='discovery')
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
         robot.bind(('127.0.0.1', 0))
