@@ -90,10 +90,6 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     assert '\n' not in problem
     assert np.array_equal(node.film.snapshot().film_um, painted_anew)
     wait_until(lambda: viewer.reports('deposition_simulator: film', problem), what='diagnostics')
-    # Painting again, for another reason, is done with the model that is in use.
-    node.set_parameters(parameters(max_pose_gap_s=0.3))
-    wait_until(lambda: not node.repainting, what='repainting')
-    assert (node.model_problem, node.film.guns[0].max_pose_gap_s) == ('', 0.3)
 
 
 def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):

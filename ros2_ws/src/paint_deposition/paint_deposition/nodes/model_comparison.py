@@ -46,11 +46,6 @@ COMPARISON = dict(
     color_max_um=thickness_parameter(
         'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
     ),
-    color_radius_m=NodeParameter(
-        0.0,
-        'Radius of the colour around a reading; 0: from the spacing of the readings [m]',
-        (0.0, 5.0),
-    ),
 )
 
 
@@ -117,8 +112,7 @@ class ModelComparison(PaintingNode):
     def _spread_colours(self) -> None:
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
-        radius_m = self.values['color_radius_m']
-        self._spreading = interpolation_matrix(self.surface, places, normals, radius_m)
+        self._spreading = interpolation_matrix(self.surface, places, normals)
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
@@ -131,8 +125,6 @@ class ModelComparison(PaintingNode):
 
     def _on_change(self, names: set[str]) -> None:
         super()._on_change(names)
-        if 'color_radius_m' in names:
-            self._spread_colours()
         if 'color_max_um' in names:
             self._publish_legend()
         self._shown = None

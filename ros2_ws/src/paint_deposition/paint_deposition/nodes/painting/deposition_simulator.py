@@ -38,23 +38,12 @@ SIMULATOR = PAINTING | {
         'Rate of the statistics while the film changes, and highest rate of large messages [Hz]',
         (0.1, 30.0),
     ),
-    **fixed_while_configured(
-        'the film so far was computed in it; clean the node up or restart it',
-        precision=NodeParameter(
-            'single',
-            'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
-            choices=('single', 'double'),
-        ),
-    ),
     **display_parameters(),
     **fixed_while_configured(
         'its zones are found on the mesh once; clean the node up or restart it',
         zones_file=NodeParameter(
             '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
         ),
-    ),
-    'publish_mesh': NodeParameter(
-        True, 'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]'
     ),
     'output_directory': NodeParameter(
         'runs',

@@ -201,13 +201,12 @@ class FilmDisplay:
     def _publish_large(self, film: CommonFilm, at: Header) -> None:
         film_um, surface = self._film_um, self._node.surface
         make: dict[str, Callable[[], Any]] = {
+            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
             'thickness/cloud': lambda: cloud_message(surface, film_um, at),
             'thickness/field': lambda: field_message(surface, film_um, at),
         }
         for gun, topic in enumerate(self._share_topics):
             make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
-        if self._node.values['publish_mesh']:
-            make['thickness/mesh'] = lambda: self._mesh_message(at.frame_id)
         for topic, message in make.items():
             self._large[topic].publish_if_wanted(self._version, message)
 

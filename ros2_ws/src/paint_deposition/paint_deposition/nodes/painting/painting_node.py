@@ -195,7 +195,6 @@ class PaintingNode(ManagedNode, ABC):
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
             film = unpainted_films(part.surface, part.points, self.models, self.values)
         for new, old in zip(film.guns, self.film.guns, strict=True):
-            new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
@@ -230,12 +229,6 @@ class PaintingNode(ManagedNode, ABC):
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
 
     def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'max_pose_gap_s' in names and not self.film.complete:
-            memory = f'pose_memory ({self.values["pose_memory"]} poses)'
-            raise PaintError(
-                f'max_pose_gap_s: the motion is longer than {memory} and cannot be painted again; '
-                'reset first'
-            )
         if names & MODEL_PARAMETERS:
             # Effect files are tested in the thread that repaints, so that poses do not wait.
             self._next_models = models_from_parameters(values, read_effect_file)
@@ -248,8 +241,7 @@ class PaintingNode(ManagedNode, ABC):
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
             self.models = self._next_models
-        if names & {*MODEL_PARAMETERS, 'max_pose_gap_s'}:
-            self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
+            self._repaint()
         if 'publish_rate_hz' in names:
             self.destroy_timer(self.show_timer)
             self.show_timer = self._new_show_timer()
@@ -261,7 +253,7 @@ class PaintingNode(ManagedNode, ABC):
     def _set_part_pose(self) -> None:
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
 
-    def _repaint(self, from_start: bool = True) -> None:
+    def _repaint(self) -> None:
         """Start to repaint with the current models and parameters, in a thread."""
         self._abort_repainting()
         surface, points, models = self.surface, self.points, self.models
@@ -272,7 +264,7 @@ class PaintingNode(ManagedNode, ABC):
                     try_effect(type(effect), effect.file)
             return unpainted_films(surface, points, models, self.values)
 
-        self.repainting = Repainting(self.film, make, from_start)
+        self.repainting = Repainting(self.film, make, self.values['repaint'])
 
     def _abort_repainting(self) -> None:
         if self.repainting is not None:

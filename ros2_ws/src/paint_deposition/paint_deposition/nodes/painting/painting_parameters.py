@@ -70,12 +70,6 @@ PAINTING = dict(
     part_parent_frame=NodeParameter(
         '', 'Frame that part_pose is given in; poses in it are transformed [name]'
     ),
-    max_pose_gap_s=NodeParameter(
-        0.25,
-        'A longer interval between pose stamps is gun off; a change paints the motion so far '
-        'again [s]',
-        (0.001, 60.0),
-    ),
     trigger_latency_s=NodeParameter(
         0.1,
         'How late a state may arrive, by the stamps of the poses, and still switch the gun at its '
@@ -84,6 +78,9 @@ PAINTING = dict(
     ),
     **fixed_while_configured(
         'the subscriptions and the pose memory are made with it; clean the node up or restart it',
+        max_pose_gap_s=NodeParameter(
+            0.25, 'A longer interval between pose stamps is gun off [s]', (0.001, 60.0)
+        ),
         atomizers=atomizers_parameter('that paint this part'),
         pose_queue_depth=NodeParameter(
             5000,
@@ -184,10 +181,13 @@ def unpainted_films(
     models: Iterable[DepositionModel],
     values: Mapping[str, Any],
 ) -> LiveFilms:
-    """An unpainted film for the model of each gun, by a node's parameters."""
-    options: dict[str, Any] = {
-        'precision': values.get('precision', 'double'),
-        'occluder': surface.occluder,
-        **{n: values[n] for n in ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')},
-    }
-    return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
+    """An unpainted film for the model of each gun, by a node's parameters.
+
+    On a mesh the film is computed in single precision, at readings in double.
+    """
+    named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
+    options: dict[str, Any] = {name: values[name] for name in named}
+    options['precision'] = 'double' if 'measurements_file' in values else 'single'
+    return LiveFilms(
+        tuple(LiveFilm(points, model, occluder=surface.occluder, **options) for model in models)
+    )
