@@ -60,19 +60,6 @@ def test_latched_messages_are_recorded_as_latched(record, cell, wait_until):
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
 
 
-def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until, cell):
-    recorder = record()
-    first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=50))
-    first.publish(pose(START_NS))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
-    second = publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
-    wait_until(lambda: second.get_subscription_count() == 1, what='a subscription that fits')
-    first.publish(pose(START_NS + 1))
-    second.publish(pose(START_NS + 2))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 3, what='the poses of both')
-    finish(recorder)
-
-
 def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell, wait_until):
     """Those that are in the queue come before those that a second subscription hears."""
     recorder = record()
@@ -153,28 +140,6 @@ def test_bad_input_is_reported_at_the_start(record):
     ):
         with pytest.raises(PaintError, match=says):
             record(**values)
-
-
-def test_of_two_states_with_one_stamp_the_newer_is_in_force(ros_context, record, spin, onlooker,
-                                                            wait_until, tmp_path):  # fmt: skip
-    """One is of the part before; the other is of this part, and taken after its first pose."""
-    recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
-    spin(robot)
-    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
-    wait_until(lambda: robot.has_subscribers(1), what='the recorder')
-    robot.send_state(START_NS, 1.0)
-    robot.send_pose(START_NS, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
-    parts.publish(Part(run='1', header=header('part', START_NS)))
-    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
-    robot.send_state(START_NS, 0.5)
-    robot.send_pose(START_NS + 1, *place)
-    robot.send_pose(START_NS + 2, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='the poses')
-    wait_until(lambda: recorder.run.counts.get('/atomizer/state') == 2, what='the state')
-    recorder.close()
-    motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
-    assert motion.trigger_flow[-1] == 0.5
 
 
 @pytest.mark.parametrize('heard', ['all along', 'afterwards'])

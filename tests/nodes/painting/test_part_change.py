@@ -117,27 +117,6 @@ def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, w
     wait_until(lambda: viewer.shows('thickness/stats', lambda s: (s.run, s.poses_received) == now))
 
 
-def test_poses_belong_to_the_part_that_was_there_when_they_were_sent(
-    simulator, robot, painted, asked, wider, wait_until
-):
-    """Those before a request wait beside it; those after it wait while the mesh is read."""
-    node = simulator(pose_queue_depth=5000, max_edge_length_m=0.015)
-    source = robot(node)
-    asked(prepare=True)  # so that the service is known
-    source.send(MOTION)
-    future = asked(serial='1', mesh_file=wider)
-    wait_until(lambda: node.parts.waiting, what='the request')
-    source.send(later(MOTION))
-    wait_until(future.done, what='the change')
-    answer = future.result()
-    assert answer.success, answer.message
-    figures = json.loads(Path(answer.paths[2]).read_text())
-    assert figures['poses']['received'] == len(MOTION)
-    film = painted(node, len(MOTION))
-    assert node.mesh_file == wider
-    assert np.array_equal(film, offline_um(node, later(MOTION)))
-
-
 def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
     simulator, robot, painted, change, wider, wait_until, tmp_path
 ):

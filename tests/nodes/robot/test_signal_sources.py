@@ -278,12 +278,9 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
 
         def follow(self) -> None:
             self.connections += 1
-            for _ in range(3000 if self.connections > 1 else 1):
-                self.take('gun', 1.0, time.time_ns() - (0 if self.lags() else 80_000_000_000))
+            for number in range(3000 if self.connections > 1 else 1):
+                self.take('gun', 1.0, time.time_ns() - (0 if number else 80_000_000_000))
             raise OSError('broken off')
-
-        def lags(self) -> int:
-            return 'gun' not in self._silent
 
     node = Twice(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     while node.connections < 3:

@@ -58,6 +58,7 @@ class ModelComparison(PaintingNode):
     """
 
     PARAMETERS = COMPARISON
+    PRECISION = 'double'
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)

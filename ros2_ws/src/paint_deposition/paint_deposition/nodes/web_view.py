@@ -4,6 +4,7 @@ import contextlib
 import os
 import sys
 import time
+from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -22,9 +23,14 @@ from paint_deposition.files.recordings.headers import (
     trigger_change,
 )
 from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
+from paint_deposition.nodes.painting.frames import (
+    PartFrame,
+    TfQueue,
+    placed_in_order,
+)
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
@@ -106,9 +112,8 @@ class WebView(PaintNode):
         self._frame = PartFrame(self, self.values['frame_id'])
         self._flow: dict[str, float] = {}
         # The simulator, which cannot paint a pose without a transform, says why.
-        self._waiting = {
-            name: TfQueue(partial(self._move_gun, name), lambda *_: None)
-            for name in self.values['atomizers'] or ['']
+        self._waiting: dict[str, TfQueue] = {
+            name: deque() for name in self.values['atomizers'] or ['']
         }
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
@@ -209,8 +214,10 @@ class WebView(PaintNode):
         self._frame.take_pending()
         for topic in self._inputs:
             topic.take_pending()
-        for waiting in self._waiting.values():
-            waiting.process(time.monotonic())
+        for gun, waiting in self._waiting.items():
+            for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
+                if not isinstance(placed, NoTransform):
+                    self._move_gun(gun, pose, *placed)
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
@@ -221,10 +228,11 @@ class WebView(PaintNode):
             self._flow[gun] = trigger_change(state).flow
 
     def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
-        self._waiting[gun].add(message, time.monotonic())
+        self._waiting[gun].append((time.monotonic(), message))
 
-    def _move_gun(self, gun: str, message: PoseStamped) -> None:
-        position_m, quaternion = self._frame.on_part(message)
+    def _move_gun(
+        self, gun: str, message: PoseStamped, position_m: np.ndarray, quaternion: np.ndarray
+    ) -> None:
         stamps = np.array([stamp_ns(message.header)])
         batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
         for position, z_axis in zip(*batch.finite_axes(), strict=True):

@@ -17,7 +17,11 @@ from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
+from paint_deposition.nodes.painting.frames import (
+    PartFrame,
+    TfQueue,
+    placed_in_order,
+)
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
@@ -85,7 +89,7 @@ class AtomizerInput:
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
-        self.tf_queue = TfQueue(self._transform, self._reject)
+        self.tf_queue: TfQueue = deque()
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
         self._topics = [
             subscribe(
@@ -162,7 +166,8 @@ class AtomizerInput:
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:
-            self.tf_queue.add(message, time.monotonic())
+            self.tf_queue.append((time.monotonic(), message))
+            self._place()
 
     # --- batches
 
@@ -192,7 +197,7 @@ class AtomizerInput:
     def flush(self) -> None:
         """Pass on the next batch; poses that wait for their transform are not in it."""
         self._flushed_s = time.monotonic()
-        self.tf_queue.process(self._flushed_s)
+        self._place()
         if not self._poses:
             return
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
@@ -228,10 +233,14 @@ class AtomizerInput:
         if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
-    def _transform(self, message: PoseStamped) -> None:
-        pose = self._frame.on_part(message)
-        self.anomalies['poses without a frame'] += not message.header.frame_id
-        self._poses.append((stamp_ns(message.header), *pose))
+    def _place(self) -> None:
+        """Put the poses whose transforms are known into the next batch."""
+        for pose, placed in placed_in_order(self.tf_queue, self._frame.on_part, time.monotonic()):
+            if isinstance(placed, NoTransform):
+                self._reject(pose, placed)
+            else:
+                self.anomalies['poses without a frame'] += not pose.header.frame_id
+                self._poses.append((stamp_ns(pose.header), *placed))
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id

@@ -3,7 +3,7 @@
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,9 +12,11 @@ import numpy as np
 from rclpy.timer import Timer
 
 from paint_deposition.effects.catalogue import read_effect_file, try_effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
+from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
@@ -23,7 +25,6 @@ from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     models_from_parameters,
     read_part,
-    unpainted_films,
 )
 from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
@@ -52,6 +53,7 @@ class PaintingNode(ManagedNode, ABC):
         model_problem: why the models that were set last are not in use, '' if they are.
     """
 
+    PRECISION = 'single'
     repainting: Repainting | None = None
     model_problem = ''
     _shown: CommonFilm | None = None
@@ -120,10 +122,19 @@ class PaintingNode(ManagedNode, ABC):
         surface, points = self._points_on(read_part(values, mesh_file))
         if values.get('zones_file'):
             zones = read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
-        film = unpainted_films(surface, points, self.models, values)
+        film = self._unpainted(surface, points, self.models)
         film.warm_up()
         facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
         return PreparedPart(surface, points, film, zones)
+
+    def _unpainted(
+        self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
+    ) -> LiveFilms:
+        """An unpainted film for the model of each gun."""
+        named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
+        options: dict[str, Any] = {name: self.values[name] for name in named}
+        options |= {'precision': self.PRECISION, 'occluder': surface.occluder}
+        return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
 
     def _take_part(self, part: PreparedPart) -> None:
         """Paint this part from now on."""
@@ -193,7 +204,7 @@ class PaintingNode(ManagedNode, ABC):
         """
         film = part.film
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
-            film = unpainted_films(part.surface, part.points, self.models, self.values)
+            film = self._unpainted(part.surface, part.points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.reset_keeping_trigger_of(old)
@@ -262,7 +273,7 @@ class PaintingNode(ManagedNode, ABC):
             for effect in (effect for model in models for effect in model.effects):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return unpainted_films(surface, points, models, self.values)
+            return self._unpainted(surface, points, models)
 
         self.repainting = Repainting(self.film, make, self.values['repaint'])
 
@@ -287,7 +298,7 @@ class PaintingNode(ManagedNode, ABC):
             return
         # The motion so far is painted again, with the other side outward.
         models = [gun.model for gun in self.film.guns]
-        turned = unpainted_films(self.surface, self.points, models, self.values)
+        turned = self._unpainted(self.surface, self.points, models)
         for new, old in zip(turned.guns, self.film.guns, strict=True):
             new.replay(old.log.events())
         self.film = turned

@@ -1,6 +1,6 @@
 """The parameters that nodes with a film share, and the models, parts and films built from them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import LoadEffect, read_model
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
-from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
@@ -173,21 +172,3 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
         raise PaintError("mesh_file is empty: give the part's mesh")
     down = np.array(values['down']) if values['down'] else None
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
-
-
-def unpainted_films(
-    surface: Surface,
-    points: SurfacePoints,
-    models: Iterable[DepositionModel],
-    values: Mapping[str, Any],
-) -> LiveFilms:
-    """An unpainted film for the model of each gun, by a node's parameters.
-
-    On a mesh the film is computed in single precision, at readings in double.
-    """
-    named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
-    options: dict[str, Any] = {name: values[name] for name in named}
-    options['precision'] = 'double' if 'measurements_file' in values else 'single'
-    return LiveFilms(
-        tuple(LiveFilm(points, model, occluder=surface.occluder, **options) for model in models)
-    )
