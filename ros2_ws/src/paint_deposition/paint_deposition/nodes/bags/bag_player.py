@@ -2,6 +2,7 @@
 
 import math
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
 from heapq import merge
@@ -261,7 +262,7 @@ class BagPlayer(PaintNode):
 
     def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
         if message.topic == self._pose_topic:
-            self._flow_control.add_sent(header_stamp_ns(message.cdr))
+            self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
         elif message.topic in self._transform_topics:
