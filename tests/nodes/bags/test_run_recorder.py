@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import AtomizerState, Part, ThicknessStats
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from paint_msgs.msg import Part, ThicknessStats
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
@@ -140,38 +140,6 @@ def test_bad_input_is_reported_at_the_start(record):
     ):
         with pytest.raises(PaintError, match=says):
             record(**values)
-
-
-@pytest.mark.parametrize('heard', ['all along', 'afterwards'])
-def test_a_run_begins_with_all_states_since_a_clock_was_set_back_and_none_from_before(
-    ros_context, record, spin, onlooker, wait_until, tmp_path, heard
-):
-    robot, place = Robot(ros_context), (np.zeros(3), FACING_PANEL)
-    robot.destroy_publisher(robot.state_publisher)
-    latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    robot.state_publisher = robot.create_publisher(AtomizerState, 'atomizer/state', latched)
-    spin(robot)
-    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
-    recorder = record() if heard == 'all along' else None
-    if recorder:
-        wait_until(lambda: robot.has_subscribers(1), what='the recorder')
-    robot.send_state(START_NS, 1.0)
-    robot.send_pose(START_NS, *place)
-    if recorder:
-        wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
-    again_ns = START_NS - 3_600_000_000_000
-    robot.send_state(again_ns, 0.5)
-    robot.send_state(again_ns + 3, 0.7)
-    recorder = recorder or record()
-    wait_until(lambda: recorder.run.counts.get('/atomizer/state') == 3, what='the states')
-    parts.publish(Part(run='1', header=header('part', START_NS)))
-    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
-    for number in range(5):
-        robot.send_pose(again_ns + number, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 5, what='the poses')
-    recorder.close()
-    motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
-    assert motion.trigger_stamps_ns.tolist() == [again_ns, again_ns + 3]
 
 
 def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(

@@ -85,36 +85,55 @@ def asked(onlooker, wait_until):
     return asked
 
 
-def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, wider, onlooker,
-                                            wait_until, tmp_path):  # fmt: skip
-    node = simulator()
+def test_each_part_has_its_film_and_its_run(
+    simulator, robot, record, painted, change, wider, onlooker, wait_until, tmp_path
+):
+    """In one folder, if simulator and recorder have the same `output_directory`."""
+    folder = tmp_path / 'films'
+    node = simulator(part_pose=[0.0] * 6 + [1.0], part_parent_frame='cell')
+    recorder = record(output_directory=str(folder), name='before')
     viewer = onlooker(
         {'part': (Part, topics.LATCHED), 'thickness/stats': (ThicknessStats, topics.LATCHED)}
     )
-    source = robot(node)
-    first = change(serial='4711', type='door')
-    assert first.success, first.message
-    assert (first.run, list(first.paths)) == ('4711', [])
-    source.send(MOTION)
-    film = painted(node, len(MOTION))
-    second = change(serial='4712', type='wide door', mesh_file=wider)
-    assert second.success, second.message
-    folder = tmp_path / 'films/4711'
-    assert list(second.paths) == [str(folder / f'film.{end}') for end in ('ply', 'csv', 'json')]
-    saved = np.loadtxt(folder / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-    assert saved == pytest.approx(film, rel=1e-8)
-    figures = json.loads((folder / 'film.json').read_text())
-    assert figures['part'].items() >= {'serial': '4711', 'type': 'door', 'coat': 1}.items()
-    assert figures['poses']['received'] == len(MOTION)
-    assert node.film.snapshot().film_um.max() == 0.0
+    source = robot(node, recorder)
+    motions, films = (MOTION, later(MOTION)), []
+    for number, (motion, mesh) in enumerate(zip(motions, (node.mesh_file, wider), strict=True)):
+        answer = change(serial=f'47-{number}', type='door', mesh_file=mesh)
+        assert (answer.success, answer.run) == (True, f'47-{number}'), answer.message
+        before = [str(folder / '47-0' / f'film.{end}') for end in ('ply', 'csv', 'json')]
+        assert list(answer.paths) == (before if number else [])
+        assert node.film.snapshot().film_um.max() == 0.0
+        wait_until(lambda n=number: recorder.run.folder.name == f'47-{n}', what='the run')
+        source.send(motion)
+        films.append(painted(node, len(MOTION)))
+        assert np.array_equal(films[-1], offline_um(node, motion))
+        wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == len(MOTION))
     assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
-    source.send(later(MOTION))
-    assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
-    wait_until(lambda: viewer.shows('part', lambda p: p.serial == '4712'), what='the part')
+    wait_until(lambda: viewer.shows('part', lambda p: p.serial == '47-1'), what='the part')
     part = viewer.newest('part')
-    assert (part.type, part.coat, part.mesh_file) == ('wide door', 1, wider)
-    now = '4712', len(MOTION)
+    assert (part.type, part.coat, part.mesh_file) == ('door', 1, wider)
+    now = '47-1', len(MOTION)
     wait_until(lambda: viewer.shows('thickness/stats', lambda s: (s.run, s.poses_received) == now))
+    recorder.close()
+    node.close()
+    for number, (motion, film) in enumerate(zip(motions, films, strict=True)):
+        run = folder / f'47-{number}'
+        recorded = read_recording(run, None, '/atomizer/state')
+        assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
+        with open_bag(run) as bag:
+            messages = {topic.name: topic.message_count for topic in bag.topics}
+        # Where the part stands was published once, before the first of them.
+        assert messages['/part'] == messages['/part_pose'] == 1
+        # The second begins with the state in which the gun was left.
+        assert messages['/atomizer/state'] == len(motion.triggers) + number
+        assert messages['/thickness/field']
+        assert f'serial: 47-{number}' in (run / 'metadata.yaml').read_text()
+        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
+        assert saved == pytest.approx(film, rel=1e-7)
+        figures = json.loads((run / 'film.json').read_text())
+        described = {'serial': f'47-{number}', 'type': 'door', 'coat': 1}
+        assert figures['part'].items() >= described.items()
+        assert figures['poses']['received'] == len(MOTION)
 
 
 def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
@@ -259,39 +278,6 @@ def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot,
     assert (answer.success, answer.run) == (False, '2')
     assert 'it stands where the part before did: not now' in answer.message
     assert (tmp_path / 'films/1/film.csv').is_file()
-
-
-def test_the_recorder_begins_a_run_for_each_part(
-    simulator, robot, record, painted, change, wait_until, tmp_path
-):
-    folder = tmp_path / 'films'
-    where = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    node = simulator(part_pose=where, part_parent_frame='cell')
-    recorder = record(output_directory=str(folder), name='before')
-    source = robot(node, recorder)
-    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
-        assert change(serial=f'47-{number}', type='door').success
-        wait_until(lambda n=number: recorder.run.folder.name == f'47-{n}', what='the run')
-        source.send(motion)
-        painted(node, len(MOTION))
-        wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == len(MOTION))
-    recorder.close()
-    node.close()
-    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
-        run = folder / f'47-{number}'
-        recorded = read_recording(run, None, '/atomizer/state')
-        assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
-        with open_bag(run) as bag:
-            messages = {topic.name: topic.message_count for topic in bag.topics}
-        # Where the part stands was published once, before the first of them.
-        assert messages['/part'] == messages['/part_pose'] == 1
-        # The second begins with the state in which the gun was left.
-        assert messages['/atomizer/state'] == len(motion.triggers) + number - 1
-        assert messages['/thickness/field']
-        told = (run / 'metadata.yaml').read_text()
-        assert f'serial: 47-{number}' in told
-        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-        assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
 
 
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
