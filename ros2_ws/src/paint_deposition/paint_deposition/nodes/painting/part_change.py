@@ -146,29 +146,11 @@ class PartChange:
         began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
-        unplaced = ''
         self.waiting = True
         try:
             notes += await self._receive_all(following.last_sent_ns)
-            since_ns, version = self._newest_ns(), mesh_version(following.mesh_file)
-            read = None if request.coat else self._prepared(version)
-            if read is not None and not read.done():
-                await node.result_of(read)
-            next_part = read.result() if read is not None else None
-            if node.film.counts.received:
-                self._unsaved.append(self._film_writer())
-            if next_part is not None:
-                node.change_part(version[0], next_part)
-                self._version = version
-            self.part, self._since = following, datetime.now(timezone.utc)
-            self._run, self._resets = following.run, 0
-            self._publish(since_ns, request.part_pose)
-            # After the part, so that a recorder knows whose pose it is.
-            if len(request.part_pose):
-                kind, pose = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
-                placed = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
-                if not placed.successful:
-                    unplaced = f'it stands where the part before did: {placed.reason}'
+            await self._begin(following, request)
+            unplaced = self._place(request.part_pose)
         finally:
             self.waiting = False
             node.release()
@@ -178,10 +160,45 @@ class PartChange:
             saved = await node.result_of(self._saving.submit(self._save_films))
             response.paths = [str(path) for path in saved]
             notes.append(f'wrote {", ".join(response.paths)}' if saved else '')
+        called = following.serial + (f' ({following.type})' if following.type else '')
+        done = f'coat {following.coat} on {called}: on top of the film so far'
+        if not request.coat:
+            ready = f'bare metal, ready after {self._gap_s * 1e3:.0f} ms'
+            done = f'{called} on {following.mesh_file}: {ready}'
         notes += [self._save_error, unplaced]
-        response.message = '; '.join(filter(None, [self._sentence(), *notes]))
+        response.message = '; '.join(filter(None, [done, *notes]))
         node.get_logger().info(response.message)
         return unplaced
+
+    async def _begin(self, following: Part, request: ChangePart.Request) -> None:
+        """Begin on the part that follows, or on another coat."""
+        node, since_ns = self._node, self._newest_ns()
+        version, part = mesh_version(following.mesh_file), None
+        if not request.coat:
+            read = self._prepared(version)
+            part = read.result() if read.done() else await node.result_of(read)
+        if node.film.counts.received:
+            self._unsaved.append(self._film_writer())
+        if part is not None:
+            node.change_part(version[0], part)
+            self._version = version
+        self.part, self._since = following, datetime.now(timezone.utc)
+        self._run, self._resets = following.run, 0
+        self._publish(since_ns, request.part_pose)
+
+    def _place(self, part_pose: Sequence[float]) -> str:
+        """Say where the part stands, after the part: a recorder then knows whose pose it is.
+
+        Returns:
+            Why it stands where the part before did, if it does.
+        """
+        if not len(part_pose):
+            return ''
+        pose = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, list(part_pose))
+        placed = self._node.set_parameters_atomically([pose])
+        return '' if placed.successful else (
+            f'it stands where the part before did: {placed.reason}'
+        )  # fmt: skip
 
     async def _receive_all(self, last_sent_ns: int) -> list[str]:
         """Paint what was sent until then, and keep what was sent later.
@@ -275,31 +292,20 @@ class PartChange:
         newest_ns = max(source.newest_ns for source in self._node.inputs)
         return newest_ns or self._node.get_clock().now().nanoseconds
 
-    def _sentence(self) -> str:
-        part = self.part
-        called = part.serial + (f' ({part.type})' if part.type else '')
-        if part.coat > 1:
-            return f'coat {part.coat} on {called}: on top of the film so far'
-        gap_ms = self._gap_s * 1e3
-        return f'{called} on {part.mesh_file}: bare metal, ready after {gap_ms:.0f} ms'
-
     # --- parts, files and messages
 
     def _prepared(self, version: Version) -> Future[PreparedPart]:
         """The part of this mesh, which is read unless it is kept."""
         part = self._parts.pop(version, None)
         if part is None or (part.done() and part.exception()):
-            part = self._reading.submit(self._prepare_named, version[0])
+            self._node.require_named_folder(version[0])
+            part = self._reading.submit(self._node.prepare, version[0])
         self._parts[version] = part
         others = [kept for kept in self._parts if kept not in (version, self._version)]
         # A large one takes some 100 MB.
         for kept in others[: max(len(others) - 4, 0)]:
             del self._parts[kept]
         return part
-
-    def _prepare_named(self, mesh_file: str) -> PreparedPart:
-        self._node.require_named_folder(mesh_file)
-        return self._node.prepare(mesh_file)
 
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run
