@@ -35,19 +35,6 @@ from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-COMPARISON = dict(
-    **PAINTING,
-    **fixed_while_configured(
-        'the film is painted where they were taken; clean the node up or restart it',
-        measurements_file=NodeParameter(
-            '', 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]'
-        ),
-    ),
-    color_max_um=thickness_parameter(
-        'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
-    ),
-)
-
 
 class ModelComparison(PaintingNode):
     """Paints the points of gauge readings and publishes their residuals.
@@ -57,7 +44,19 @@ class ModelComparison(PaintingNode):
     them are for display only.
     """
 
-    PARAMETERS = COMPARISON
+    PARAMETERS = PAINTING | dict(
+        **fixed_while_configured(
+            'the film is painted where they were taken; clean the node up or restart it',
+            measurements_file=NodeParameter(
+                '',
+                'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh '
+                '[path]',
+            ),
+        ),
+        color_max_um=thickness_parameter(
+            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+        ),
+    )
     PRECISION = 'double'
 
     def __init__(self, **kwargs: Any):

@@ -52,32 +52,30 @@ from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKE
 SILENT_S = 2.0
 
 
-WEB_VIEW = dict(
-    **fixed_while_running(
-        'the page is served with it; restart the node with the new value',
-        **mesh_parameters(max_edge_length_m=0.01),
-        down=direction_parameter('As for deposition_simulator [-]'),
-        atomizers=atomizers_parameter('to show'),
-        host=NodeParameter(
-            DEFAULT_HOST,
-            'Address to listen on; any but that of this machine alone needs a token [name]',
-        ),
-        port=NodeParameter(DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)),
-        token=NodeParameter(
-            '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
-        ),
-    ),
-    **display_parameters(),
-)
-
-
 class WebView(PaintNode):
     """Serves the live page with what the simulator publishes; it computes no film itself.
 
     The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
     """
 
-    PARAMETERS = WEB_VIEW
+    PARAMETERS = display_parameters() | dict(
+        fixed_while_running(
+            'the page is served with it; restart the node with the new value',
+            **mesh_parameters(max_edge_length_m=0.01),
+            down=direction_parameter('As for deposition_simulator [-]'),
+            atomizers=atomizers_parameter('to show'),
+            host=NodeParameter(
+                DEFAULT_HOST,
+                'Address to listen on; any but that of this machine alone needs a token [name]',
+            ),
+            port=NodeParameter(
+                DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)
+            ),
+            token=NodeParameter(
+                '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
+            ),
+        )
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('web_view', **kwargs)

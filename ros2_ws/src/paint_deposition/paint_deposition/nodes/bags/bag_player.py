@@ -46,48 +46,6 @@ from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while
 
 LOG_TIME = attrgetter('log_time_ns')
 
-PLAYER = fixed_while_running(
-    'the replay has begun with it; start another player',
-    bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
-    pose_topic=NodeParameter(
-        '',
-        "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only one "
-        '[topic]',
-    ),
-    tf=NodeParameter(
-        [],
-        'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
-        'empty: they do not [names]',
-        constraints='two names, or none',
-        allows=lambda value: not value or len(value) == 2,
-        element=str,
-    ),
-    urdf=NodeParameter(
-        '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
-    ),
-    tip_link=NodeParameter(
-        '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
-    ),
-    base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
-    state_topic=NodeParameter(
-        '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
-    ),
-    rate=NodeParameter(
-        1.0,
-        'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
-        (0.0, math.inf),
-    ),
-    loop=NodeParameter(False, 'Start again at the end [true/false]'),
-    start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
-    wait_for_subscribers=NodeParameter(
-        1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
-    ),
-    window=NodeParameter(
-        200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
-    ),
-    publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
-)
-
 
 class BagPlayer(PaintNode):
     """Publishes `atomizer/pose`, `atomizer/state` and transforms as recorded, and /clock.
@@ -101,7 +59,47 @@ class BagPlayer(PaintNode):
     same time while the replay is paused.
     """
 
-    PARAMETERS = PLAYER
+    PARAMETERS = fixed_while_running(
+        'the replay has begun with it; start another player',
+        bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
+        pose_topic=NodeParameter(
+            '',
+            "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only "
+            'one [topic]',
+        ),
+        tf=NodeParameter(
+            [],
+            'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
+            'empty: they do not [names]',
+            constraints='two names, or none',
+            allows=lambda value: not value or len(value) == 2,
+            element=str,
+        ),
+        urdf=NodeParameter(
+            '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
+        ),
+        tip_link=NodeParameter(
+            '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
+        ),
+        base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
+        state_topic=NodeParameter(
+            '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
+        ),
+        rate=NodeParameter(
+            1.0,
+            'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
+            (0.0, math.inf),
+        ),
+        loop=NodeParameter(False, 'Start again at the end [true/false]'),
+        start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
+        wait_for_subscribers=NodeParameter(
+            1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
+        ),
+        window=NodeParameter(
+            200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
+        ),
+        publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)

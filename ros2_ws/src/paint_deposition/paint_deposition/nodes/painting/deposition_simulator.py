@@ -32,26 +32,6 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.write import write_film
 
-SIMULATOR = PAINTING | {
-    'publish_rate_hz': NodeParameter(
-        5.0,
-        'Rate of the statistics while the film changes, and highest rate of large messages [Hz]',
-        (0.1, 30.0),
-    ),
-    **display_parameters(),
-    **fixed_while_configured(
-        'its zones are found on the mesh once; clean the node up or restart it',
-        zones_file=NodeParameter(
-            '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
-        ),
-    ),
-    'output_directory': NodeParameter(
-        'runs',
-        'Where ~/save_film writes [path]',
-        fixed_because='remote nodes must not choose where files are written; restart the node',
-    ),
-}
-
 
 class DepositionSimulator(PaintingNode):
     """Paints a mesh from `atomizer/pose` and `atomizer/state` and publishes the film.
@@ -64,7 +44,26 @@ class DepositionSimulator(PaintingNode):
         parts: the part in the cell, and its change.
     """
 
-    PARAMETERS = SIMULATOR
+    PARAMETERS = PAINTING | {
+        'publish_rate_hz': NodeParameter(
+            5.0,
+            'Rate of the statistics while the film changes, and highest rate of large messages '
+            '[Hz]',
+            (0.1, 30.0),
+        ),
+        **display_parameters(),
+        **fixed_while_configured(
+            'its zones are found on the mesh once; clean the node up or restart it',
+            zones_file=NodeParameter(
+                '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
+            ),
+        ),
+        'output_directory': NodeParameter(
+            'runs',
+            'Where ~/save_film writes [path]',
+            fixed_because='remote nodes must not choose where files are written; restart the node',
+        ),
+    }
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)

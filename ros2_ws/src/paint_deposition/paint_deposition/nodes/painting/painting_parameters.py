@@ -19,7 +19,6 @@ from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
-    ParameterTable,
     atomizers_parameter,
     direction_parameter,
     fixed_while_configured,
@@ -30,7 +29,7 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 
 
-def model_parameters(use: str) -> ParameterTable:
+def model_parameters(use: str) -> dict[str, NodeParameter]:
     """The rows `model_file` and `allow_user_effects`; `use` completes "Setting it reads it"."""
     return {
         'model_file': NodeParameter(

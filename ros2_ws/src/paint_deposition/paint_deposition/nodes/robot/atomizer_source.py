@@ -45,55 +45,6 @@ TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
 
-SOURCE = fixed_while_running(
-    'the subscriptions are made with it when the node starts; restart the node',
-    urdf_file=NodeParameter(
-        '',
-        'The robot, URDF, whose joint states give the poses; empty: tf gives them, or without '
-        'base_link the robot publishes them itself [path]',
-    ),
-    tip_link=NodeParameter(
-        '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
-    ),
-    base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
-    joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
-    joint_prefix=NodeParameter(
-        '',
-        "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]",
-    ),
-    angle_unit=NodeParameter(
-        '',
-        'Unit of joints that turn; empty: rad, unless they turn too far [name]',
-        choices=('', 'rad', 'deg'),
-    ),
-    tcp_offset=NodeParameter(
-        [],
-        'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link is '
-        'the TCP [m, -]',
-        constraints=f'{POSE_FORMAT}, or none',
-        allows=lambda value: not value or is_pose(value),
-        element=float,
-    ),
-    trigger=NodeParameter(
-        '',
-        f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
-    ),
-    flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
-    brush=NodeParameter(
-        '', f'Signal of the number of the brush: {SIGNAL}; empty: the only one [topic]'
-    ),
-    speed=NodeParameter(
-        '', f'Signal of the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
-    ),
-    speed_scale=NodeParameter(
-        1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
-    ),
-    calibrated_flow=NodeParameter(
-        1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
-    ),
-)
-
-
 class AtomizerSource(PaintNode):
     """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
@@ -102,7 +53,58 @@ class AtomizerSource(PaintNode):
     message, or at the time it was sent if there is none.
     """
 
-    PARAMETERS = SOURCE
+    PARAMETERS = fixed_while_running(
+        'the subscriptions are made with it when the node starts; restart the node',
+        urdf_file=NodeParameter(
+            '',
+            'The robot, URDF, whose joint states give the poses; empty: tf gives them, or without '
+            'base_link the robot publishes them itself [path]',
+        ),
+        tip_link=NodeParameter(
+            '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
+        ),
+        base_link=NodeParameter(
+            '', 'Link or frame of the poses; empty: the root of urdf_file [name]'
+        ),
+        joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
+        joint_prefix=NodeParameter(
+            '',
+            "What the joints' names have before those of urdf_file, or lack; empty: nothing "
+            '[name]',
+        ),
+        angle_unit=NodeParameter(
+            '',
+            'Unit of joints that turn; empty: rad, unless they turn too far [name]',
+            choices=('', 'rad', 'deg'),
+        ),
+        tcp_offset=NodeParameter(
+            [],
+            'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link '
+            'is the TCP [m, -]',
+            constraints=f'{POSE_FORMAT}, or none',
+            allows=lambda value: not value or is_pose(value),
+            element=float,
+        ),
+        trigger=NodeParameter(
+            '',
+            f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
+        ),
+        flow=NodeParameter(
+            '', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'
+        ),
+        brush=NodeParameter(
+            '', f'Signal of the number of the brush: {SIGNAL}; empty: the only one [topic]'
+        ),
+        speed=NodeParameter(
+            '', f'Signal of the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
+        ),
+        speed_scale=NodeParameter(
+            1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
+        ),
+        calibrated_flow=NodeParameter(
+            1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
+        ),
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('atomizer_source', **kwargs)

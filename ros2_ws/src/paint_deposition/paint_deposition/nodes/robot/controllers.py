@@ -164,23 +164,20 @@ class SignalSource(PaintNode):
         return Status(OK, 'following the signals', values)
 
 
-RWS = fixed_while_running(
-    'the signals are subscribed to with it; restart the node',
-    url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
-    user=NodeParameter(
-        'Default User', 'User of the controller; its password is in RWS_PASSWORD [name]'
-    ),
-    **SIGNALS,
-)
-
-
 class RwsSource(SignalSource):
     """Follows signals, as `EtherNetIP/Gun/doGun` or `doGun`, through a subscription of RWS 1.0.
 
     Events have no time of their own: `delay_s` is taken from their arrival.
     """
 
-    PARAMETERS = RWS
+    PARAMETERS = fixed_while_running(
+        'the signals are subscribed to with it; restart the node',
+        url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
+        user=NodeParameter(
+            'Default User', 'User of the controller; its password is in RWS_PASSWORD [name]'
+        ),
+        **SIGNALS,
+    )
     PASSWORD = 'RWS_PASSWORD'
 
     def __init__(self, **kwargs: Any):
@@ -244,29 +241,6 @@ def signal_values(event: str | bytes) -> Iterator[tuple[str, float]]:
             yield path, float(value)
 
 
-OPCUA = fixed_while_running(
-    'the signals are subscribed to with it; restart the node',
-    url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
-    period_s=NodeParameter(
-        0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
-    ),
-    user=NodeParameter(
-        '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
-    ),
-    security_policy=NodeParameter(
-        'None',
-        'How messages are signed and encrypted',
-        choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
-    ),
-    certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
-    private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),
-    server_certificate_file=NodeParameter(
-        '', 'Certificate that the server must have; empty: the one that it sends [path]'
-    ),
-    **SIGNALS,
-)
-
-
 class OpcuaSource(SignalSource):
     """Follows variables of a server, such as one of OPC 40702, by their node ids or browse paths.
 
@@ -274,7 +248,27 @@ class OpcuaSource(SignalSource):
     that sends none.
     """
 
-    PARAMETERS = OPCUA
+    PARAMETERS = fixed_while_running(
+        'the signals are subscribed to with it; restart the node',
+        url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
+        period_s=NodeParameter(
+            0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
+        ),
+        user=NodeParameter(
+            '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
+        ),
+        security_policy=NodeParameter(
+            'None',
+            'How messages are signed and encrypted',
+            choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
+        ),
+        certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
+        private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),
+        server_certificate_file=NodeParameter(
+            '', 'Certificate that the server must have; empty: the one that it sends [path]'
+        ),
+        **SIGNALS,
+    )
     PASSWORD = 'OPCUA_PASSWORD'
 
     def __init__(self, **kwargs: Any):

@@ -169,36 +169,6 @@ def _is_whole(robot: Any) -> bool:
     return (has_place or len(joints) > 0) and bool(np.isfinite(numbers).all())
 
 
-EGM = fixed_while_running(
-    'the stream is read with it; restart the node',
-    address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
-    robot_address=NodeParameter(
-        '', 'Address of the robot; empty: of the first that sends positions [IP]'
-    ),
-    port=NodeParameter(6510, "UDP port of the robot's UDPUC device [-]", (1, 65535)),
-    frame_id=NodeParameter(
-        'base_link', 'Name of the correction frame that EGMActPose or EGMStreamStart has [name]'
-    ),
-    joint_names=NodeParameter(
-        [f'joint_{k}' for k in range(1, 7)], "Names of the robot's joints [names]", element=str
-    ),
-    external_joints=NodeParameter(
-        [], "Names of the external axes, in the controller's order; empty: left out [names]",
-        element=str,
-    ),
-    external_scales=NodeParameter(
-        [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
-        constraints='numbers above 0, one for each external axis',
-        allows=lambda value: all(scale > 0.0 for scale in value or ()),
-        element=float,
-    ),
-    lag_s=NodeParameter(
-        0.015, 'Age of a position when it is sent, taken from its stamp; 0.010 to 0.025 [s]',
-        (0.0, 1.0),
-    ),
-)  # fmt: skip
-
-
 class EgmSource(PaintNode):
     """Publishes `atomizer/pose` and `joint_states` from the UDP packets of a robot.
 
@@ -207,7 +177,35 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
-    PARAMETERS = EGM
+    PARAMETERS = fixed_while_running(
+        'the stream is read with it; restart the node',
+        address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
+        robot_address=NodeParameter(
+            '', 'Address of the robot; empty: of the first that sends positions [IP]'
+        ),
+        port=NodeParameter(6510, "UDP port of the robot's UDPUC device [-]", (1, 65535)),
+        frame_id=NodeParameter(
+            'base_link',
+            'Name of the correction frame that EGMActPose or EGMStreamStart has [name]',
+        ),
+        joint_names=NodeParameter(
+            [f'joint_{k}' for k in range(1, 7)], "Names of the robot's joints [names]", element=str
+        ),
+        external_joints=NodeParameter(
+            [], "Names of the external axes, in the controller's order; empty: left out [names]",
+            element=str,
+        ),
+        external_scales=NodeParameter(
+            [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
+            constraints='numbers above 0, one for each external axis',
+            allows=lambda value: all(scale > 0.0 for scale in value or ()),
+            element=float,
+        ),
+        lag_s=NodeParameter(
+            0.015, 'Age of a position when it is sent, taken from its stamp; 0.010 to 0.025 [s]',
+            (0.0, 1.0),
+        ),
+    )  # fmt: skip
 
     def __init__(self, **kwargs: Any):
         super().__init__('egm_source', **kwargs)

@@ -165,7 +165,7 @@ def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter
     return NodeParameter(default, description, (0.0, 10_000.0))
 
 
-def display_parameters() -> ParameterTable:
+def display_parameters() -> dict[str, NodeParameter]:
     """The rows that say how a film is shown, and what film is wanted."""
     return {
         'color_min_um': thickness_parameter(
