@@ -1,10 +1,7 @@
 """What a recorder keeps: its parameters and topics, and the counts of each topic."""
 
-import itertools
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import Part
@@ -29,7 +26,6 @@ from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizers_parameter,
     fixed_while_configured,
-    require_file_name,
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
@@ -106,14 +102,6 @@ def part_data(part: Part, model_file: str) -> dict[str, str]:
     # The mesh file of a simulator on another machine may not exist here.
     mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
     return provenance(mesh_file, model_file) | data
-
-
-def unused_name(folder: Path, run: str) -> str:
-    """The name of a run, with date and time appended if it already exists."""
-    require_file_name('run', run)
-    dated = run + time.strftime('_%Y%m%d_%H%M%S')
-    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
-    return next(name for name in names if not (folder / name).exists())
 
 
 class RecordedTopic(AdaptiveSubscription):

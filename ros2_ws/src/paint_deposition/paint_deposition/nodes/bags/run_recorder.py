@@ -1,5 +1,6 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
+import itertools
 import shutil
 import time
 from collections import Counter
@@ -29,7 +30,6 @@ from paint_deposition.nodes.bags.recorded_topic import (
     bag_qos,
     default_topics,
     part_data,
-    unused_name,
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.messages import header
@@ -115,8 +115,15 @@ class RunRecorder(ManagedNode):
         """
         folder = Path(self.values['output_directory'])
         name = name or self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
-        name = name if keep_name else unused_name(folder, name)
-        return RunWriter(folder / name, custom_data, compression=self.values['compression'])
+        require_file_name('run', name)
+        run = folder / name
+        if run.exists() and not keep_name:
+            dated = name + time.strftime('_%Y%m%d_%H%M%S')
+            names = itertools.chain(
+                [dated], (f'{dated}_{number}' for number in itertools.count(2))
+            )
+            run = next(folder / each for each in names if not (folder / each).exists())
+        return RunWriter(run, custom_data, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
         for run in (self.run, self.leaving) if self.runs else ():

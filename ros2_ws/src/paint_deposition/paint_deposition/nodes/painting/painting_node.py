@@ -252,7 +252,7 @@ class PaintingNode(ManagedNode, ABC):
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
             self.models = self._next_models
-            self._repaint()
+            self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
             self.destroy_timer(self.show_timer)
             self.show_timer = self._new_show_timer()
@@ -264,7 +264,7 @@ class PaintingNode(ManagedNode, ABC):
     def _set_part_pose(self) -> None:
         self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
 
-    def _repaint(self) -> None:
+    def _repaint(self, from_start: bool = True) -> None:
         """Start to repaint with the current models and parameters, in a thread."""
         self._abort_repainting()
         surface, points, models = self.surface, self.points, self.models
@@ -275,7 +275,7 @@ class PaintingNode(ManagedNode, ABC):
                     try_effect(type(effect), effect.file)
             return self._unpainted(surface, points, models)
 
-        self.repainting = Repainting(self.film, make, self.values['repaint'])
+        self.repainting = Repainting(self.film, make, from_start)
 
     def _abort_repainting(self) -> None:
         if self.repainting is not None:
