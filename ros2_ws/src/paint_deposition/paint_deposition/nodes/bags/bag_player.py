@@ -163,8 +163,10 @@ class BagPlayer(PaintNode):
     def _create_transform_publishers(self, bag: Bag) -> None:
         """Without tf2_msgs none, and a warning that names the parameters to set instead."""
         self._transform_publishers: dict[bool, Publisher] = {}
-        named = [topic.name for topic in bag.topics_of(*TF_TYPES)] + part_pose_topics(bag)
         self._transform_topics: list[str] = []
+        named = [topic.name for topic in bag.topics_of(*TF_TYPES)] + part_pose_topics(bag)
+        if not named:
+            return
         try:
             from tf2_msgs.msg import TFMessage
         except ImportError:
@@ -172,14 +174,13 @@ class BagPlayer(PaintNode):
             if placed := read_frames(bag).placed('part'):
                 values = ', '.join(f'{value:.9g}' for value in placed[1].values)
                 place = f"part_parent_frame: '{placed[0]}' and part_pose: [{values}]"
-            if named:
-                self.get_logger().warning(
-                    f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
-                    f'replayed; set {place} of the simulator'
-                )
+            self.get_logger().warning(
+                f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
+                f'replayed; set {place} of the simulator'
+            )
             return
         self._transform_topics = named
-        for static in (False, True) if named else ():
+        for static in (False, True):
             durability = DurabilityPolicy.TRANSIENT_LOCAL if static else DurabilityPolicy.VOLATILE
             self._transform_publishers[static] = self.create_publisher(
                 TFMessage, f'/{STATIC}' if static else '/tf',
