@@ -1,13 +1,43 @@
 """Nodes of a small paint cell, spinning."""
 
+import time
+
 import numpy as np
 import pytest
 
 
 @pytest.fixture
-def simulator(ros_context, spin, tmp_path):
+def start(ros_context, spin):
+    """`start(node_class, namespace='', **parameters)`: a node that runs."""
+    from nodes.cell import parameters
+
+    def start(node_class, namespace='', **values):
+        chosen = parameters(**values)
+        node = node_class(context=ros_context, namespace=namespace, parameter_overrides=chosen)
+        spin(node)
+        return node
+
+    return start
+
+
+@pytest.fixture
+def closed(start):
+    """`closed(node_class, **parameters)`: a node that runs, and is closed at the end."""
+    made = []
+
+    def closed(node_class, **values):
+        made.append(start(node_class, **values))
+        return made[-1]
+
+    yield closed
+    for node in made:
+        node.close()
+
+
+@pytest.fixture
+def simulator(start, tmp_path):
     """`simulator(**parameters)`: a simulator of the panel that runs."""
-    from nodes.cell import parameters, write_panel
+    from nodes.cell import write_panel
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
     def simulator(**values) -> DepositionSimulator:
@@ -15,12 +45,32 @@ def simulator(ros_context, spin, tmp_path):
             'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.05,
             'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
             'output_directory': str(tmp_path / 'films'),
-        } | values  # fmt: skip
-        node = DepositionSimulator(context=ros_context, parameter_overrides=parameters(**chosen))
-        spin(node)
-        return node
+        }  # fmt: skip
+        return start(DepositionSimulator, **chosen | values)
 
     return simulator
+
+
+@pytest.fixture
+def record(start, tmp_path):
+    """`record(**parameters)`: a recorder of the run `run`, running."""
+    from paint_deposition.nodes.bags.run_recorder import RunRecorder
+
+    def record(**chosen) -> RunRecorder:
+        return start(RunRecorder, **{'output_directory': str(tmp_path), 'name': 'run'} | chosen)
+
+    return record
+
+
+@pytest.fixture
+def still(wait_until):
+    """`still(duration_s)`: let so much time pass, in which callbacks run."""
+
+    def still(duration_s: float) -> None:
+        end_s = time.monotonic() + duration_s
+        wait_until(lambda: time.monotonic() > end_s, what='the time')
+
+    return still
 
 
 @pytest.fixture
@@ -81,20 +131,3 @@ def painted(wait_until):
         return node.film.snapshot().film_um
 
     return painted
-
-
-@pytest.fixture
-def record(ros_context, spin, tmp_path):
-    """`record(**parameters)`: a recorder of the run `run`, running."""
-    from nodes.cell import parameters
-    from paint_deposition.nodes.bags.run_recorder import RunRecorder
-
-    def record(namespace='', **chosen) -> RunRecorder:
-        values = {'output_directory': str(tmp_path), 'name': 'run'} | chosen
-        recorder = RunRecorder(
-            context=ros_context, namespace=namespace, parameter_overrides=parameters(**values)
-        )
-        spin(recorder)
-        return recorder
-
-    return record

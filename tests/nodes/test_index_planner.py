@@ -1,37 +1,36 @@
-"""The index planner over real DDS."""
+"""The index planner over real DDS: the service, and passes as an action."""
 
 import math
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from action_msgs.msg import GoalStatus
 from diagnostic_msgs.msg import DiagnosticStatus
 from nav_msgs.msg import Path
+from paint_msgs.action import PlanPasses
 from paint_msgs.srv import RecommendIndex
+from rclpy.action import ActionClient
 
 from nodes.cell import PANEL_M, parameters, write_panel
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.planning.plan import plan
 from paint_deposition.planning.recommendation import recommend
-from paint_deposition.planning.requests import IndexRequest
+from paint_deposition.planning.requests import IndexRequest, PlanRequest
 
+COARSE = {'max_edge_length_m': 0.05, 'speed_m_per_s': 0.25}
 NARROW = DepositionModel(planar=PlanarPattern(K3=0.0, r_m=0.11, sigma1_m=0.045, sigma2_m=0.075))
 
 
 @pytest.fixture
-def planner(ros_context, spin, tmp_path):
+def planner(closed, tmp_path):
     """`planner(**parameters)`: an index planner that runs."""
-
-    def planner(**values) -> IndexPlanner:
-        chosen = parameters(**{'input_folders': [str(tmp_path)]} | values)
-        node = IndexPlanner(context=ros_context, parameter_overrides=chosen)
-        spin(node)
-        return node
-
-    return planner
+    return lambda **values: closed(IndexPlanner, **{'input_folders': [str(tmp_path)]} | values)
 
 
 @pytest.fixture
@@ -117,3 +116,76 @@ def test_passes_are_planned_on_a_mesh_and_latched(planner, viewer, wait_until, t
     assert np.ptp(at[:, 0]) > PANEL_M + 0.4
     stamps = [p.header.stamp.sec * 10**9 + p.header.stamp.nanosec for p in path.poses]
     assert all(later > earlier for earlier, later in pairwise(stamps))
+
+
+@pytest.fixture
+def pursue(onlooker, wait_until):
+    """`pursue(cancel_at='', **goal)`: the status, the result and the feedback.
+
+    A goal that is cancelled at a stage must end within two seconds.
+    """
+    user = onlooker({})
+
+    def pursue(cancel_at='', **goal):
+        client = ActionClient(user, PlanPasses, 'plan_passes')
+        wait_until(client.server_is_ready, what='the action')
+        heard, cancelled = [], []
+
+        def hear(message) -> None:
+            heard.append(message.feedback)
+            if message.feedback.stage == cancel_at and sent.done() and not cancelled:
+                cancelled.append(sent.result().cancel_goal_async())
+
+        sent = client.send_goal_async(PlanPasses.Goal(**goal), feedback_callback=hear)
+        wait_until(sent.done, what='the goal')
+        done = sent.result().get_result_async()
+        wait_until(lambda: cancelled or done.done(), what='the result')
+        wait_until(done.done, what='the end', timeout_s=2.0 if cancelled else 0.0)
+        client.destroy()
+        return done.result().status, done.result().result, heard
+
+    return pursue
+
+
+def test_passes_are_planned_with_feedback(planner, pursue, viewer, wait_until, tmp_path):
+    mesh = write_panel(tmp_path / 'panel.stl')
+    planner(**COARSE)
+    status, result, heard = pursue(mesh_file=str(mesh), target_um=15.0, direction='vertical')
+    assert status == GoalStatus.STATUS_SUCCEEDED, result.message
+    expected = plan(
+        read_mesh(mesh, max_edge_length_m=0.05),
+        DepositionModel(),
+        PlanRequest(direction='vertical', target_um=15.0),
+    )
+    assert result.message == expected.sentence
+    assert (result.passes, result.mean_um) == (len(expected.passes), expected.mean_um)
+    assert result.speed_m_per_s == expected.style.speed_m_per_s
+    stages = [feedback.stage for feedback in heard]
+    assert stages[:2] == ['begin', 'reading the mesh']
+    assert {'single passes', 'film'} <= set(stages)
+    wait_until(lambda: viewer.newest('planned_path'), what='the path')
+    path = viewer.newest('planned_path')
+    assert path == result.path
+    assert len(path.poses) > 10
+
+
+def test_the_service_answers_while_passes_are_planned_and_cancel_ends_it(
+    planner, pursue, onlooker, wait_until, tmp_path
+):
+    """What has no answer is aborted with the reason."""
+    mesh = write_panel(tmp_path / 'panel.stl')
+    planner(max_edge_length_m=0.01, speed_m_per_s=0.25)
+    client = onlooker({}).create_client(RecommendIndex, 'recommend_index')
+    wait_until(client.service_is_ready)
+    answer = client.call_async(RecommendIndex.Request(speed_m_per_s=0.3))
+    status, result, heard = pursue(cancel_at='single passes', mesh_file=str(mesh))
+    assert status == GoalStatus.STATUS_CANCELED
+    assert (result.success, result.message) == (False, 'cancelled')
+    assert heard[-1].stage == 'single passes'
+    wait_until(answer.done)
+    assert answer.result().success
+    status, result, _ = pursue()
+    assert status == GoalStatus.STATUS_ABORTED
+    assert result.message == 'mesh_file is empty: name the mesh of the part'
+    status, result, _ = pursue(mesh_file='nowhere.stl')
+    assert 'nowhere.stl: no such mesh file' in result.message

@@ -3,6 +3,7 @@
 import os
 import threading
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import pytest
@@ -62,14 +63,6 @@ def manager(viewer, call):
         return Manager(viewer, call, node.get_fully_qualified_name())
 
     return manager
-
-
-@pytest.fixture
-def recorder(ros_context, spin, tmp_path):
-    chosen = {'output_directory': str(tmp_path), 'name': 'run', 'autostart': False}
-    node = RunRecorder(context=ros_context, parameter_overrides=parameters(**chosen))
-    spin(node)
-    return node
 
 
 def test_a_simulator_goes_through_its_states(simulator, robot, manager, onlooker, call, painted,
@@ -197,10 +190,10 @@ class Faulty(ManagedNode):
         raise ZeroDivisionError('by nothing')
 
 
-def test_an_unexpected_error_leads_to_unconfigured(ros_context, spin, manager,
-                                                                  viewer, wait_until):  # fmt: skip
-    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
-    spin(node)
+def test_an_unexpected_error_leads_to_unconfigured(
+    start, ros_context, manager, viewer, wait_until
+):
+    node = start(partial(Faulty, 'faulty'), autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
     assert managed.configure() == (True, 'inactive')
@@ -211,8 +204,10 @@ def test_an_unexpected_error_leads_to_unconfigured(ros_context, spin, manager,
         Faulty('faulty', context=ros_context)
 
 
-def test_a_recorder_writes_one_whole_run_for_each_activation(recorder, ros_context, spin, manager,
-                                                             wait_until, tmp_path):  # fmt: skip
+def test_a_recorder_writes_one_whole_run_for_each_activation(
+    record, ros_context, spin, manager, wait_until, tmp_path
+):
+    recorder = record(autostart=False)
     managed = manager(recorder)
     source = Robot(ros_context)
     spin(source)
@@ -251,12 +246,11 @@ def of_this_process() -> tuple[int, int]:
 
 
 @pytest.mark.parametrize('node_class', [DepositionSimulator, RunRecorder])
-def test_repeated_cycles_leave_nothing_behind(ros_context, spin, manager, tmp_path, node_class):
+def test_repeated_cycles_leave_nothing_behind(start, manager, tmp_path, node_class):
     panel = {'mesh_file': str(SAMPLES / 'panel_study/panel.stl'), 'max_edge_length_m': 0.2}
     values = {'autostart': False, 'output_directory': str(tmp_path)}
     values |= panel if node_class is DepositionSimulator else {}
-    node = node_class(context=ros_context, parameter_overrides=parameters(**values))
-    spin(node)
+    node = start(node_class, **values)
     managed = manager(node)
 
     def entities() -> list[int]:

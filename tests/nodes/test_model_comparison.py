@@ -16,6 +16,7 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
+from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.runtime import topics
@@ -47,19 +48,13 @@ def readings(tmp_path):
 
 
 @pytest.fixture
-def comparison(ros_context, spin, readings, tmp_path):
+def comparison(start, readings, tmp_path):
     """`comparison(**parameters)`: a comparison with the readings that runs."""
-
-    def comparison(**values) -> ModelComparison:
-        chosen = {
-            'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
-            'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
-        } | values  # fmt: skip
-        node = ModelComparison(context=ros_context, parameter_overrides=parameters(**chosen))
-        spin(node)
-        return node
-
-    return comparison
+    chosen = {
+        'mesh_file': str(tmp_path / 'panel.stl'), 'max_edge_length_m': 0.05,
+        'measurements_file': str(readings), 'publish_rate_hz': 10.0, 'pose_queue_depth': 1000,
+    }  # fmt: skip
+    return lambda **values: start(ModelComparison, **chosen | values)
 
 
 @pytest.fixture
@@ -134,7 +129,7 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
 def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     comparison, robot, viewer, wait_until
 ):
-    node = comparison(color_radius_m=0.06, color_max_um=5.0)
+    node = comparison(color_max_um=5.0)
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
@@ -145,10 +140,11 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
     corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
     places = node.readings.positions_m
+    radius_m = radius_of_readings_m(places[::2])
     distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
     grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
-    assert grey[distance > 0.0601].all()
-    assert not grey[distance < 0.0599].any()
+    assert grey[distance > radius_m + 1e-4].all()
+    assert not grey[distance < radius_m - 1e-4].any()
     texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
     assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
 

@@ -2,7 +2,6 @@
 
 import os
 import random
-import time
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from rclpy.node import Node
 from std_msgs.msg import Float64
 from std_srvs.srv import Trigger
 
-from nodes.cell import offline_um, parameters, two_passes, write_panel
+from nodes.cell import offline_um, two_passes, write_panel
 from nodes.odd_messages import Peer, odd_message
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes.bags.bag_player import BagPlayer
@@ -19,23 +18,11 @@ from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
-from paint_deposition.nodes.robot.controllers import RwsSource
-from paint_deposition.nodes.robot.signal_source import SignalSource
 from paint_deposition.nodes.web_view import WebView
 from robot_arm import urdf
 
 MESSAGES = int(os.environ.get('PAINT_MESSAGES', '60'))
 MOTION = two_passes()
-
-
-class IdleSource(SignalSource):
-    """A source of signals whose controller says nothing."""
-
-    PARAMETERS = RwsSource.PARAMETERS
-
-    def follow(self, stopped) -> None:
-        while not stopped():
-            time.sleep(0.01)
 
 
 @pytest.fixture
@@ -57,33 +44,27 @@ def nodes(tmp_path):
         'joints': (AtomizerSource, {'urdf_file': str(arm), **signal}),
         'tf': (AtomizerSource, {'base_link': 'base', 'tip_link': 'tool0', **signal}),
         'trigger': (AtomizerSource, signal),
-        'signals': (lambda **o: IdleSource('signal_source', **o), {'trigger': 'gun'}),
         'player': (BagPlayer, {'bag': bag, 'rate': 0.0, 'loop': True, 'publish_clock': False}),
     }
 
 
 @pytest.fixture
-def made(nodes, ros_context, spin):
+def made(nodes, closed):
     """`made(name)`: that node, running."""
-    alive = []
 
     def made(name: str):
         kind, values = nodes[name]
-        alive.append(kind(context=ros_context, parameter_overrides=parameters(**values)))
-        spin(alive[-1])
-        return alive[-1]
+        return closed(kind, **values)
 
-    yield made
-    for node in alive:
-        node.close()
+    return made
 
 
 @pytest.mark.parametrize(
-    'name', ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger',
-             'signals', 'player'],
-)  # fmt: skip
+    'name',
+    ['simulator', 'comparison', 'web_view', 'recorder', 'joints', 'tf', 'trigger', 'player'],
+)
 def test_no_message_of_the_right_type_ends_a_node(
-    name, made, ros_context, spin, executor, wait_until
+    name, made, ros_context, spin, executor, wait_until, still
 ):
     if name == 'tf':
         pytest.importorskip('tf2_msgs')
@@ -106,8 +87,7 @@ def test_no_message_of_the_right_type_ends_a_node(
         peer.send([node, *others], rng)
         for _ in range(10):
             executor.spin_once(timeout_sec=0.0)
-    until_s = time.monotonic() + 1.5  # diagnostics, statistics and all other timers
-    wait_until(lambda: time.monotonic() > until_s)
+    still(1.5)  # diagnostics, statistics and all other timers
     for _ in range(3):  # what timers and services show of it
         node.publish_diagnostics()
     assert not node.finished.done(), node.finished.exception()

@@ -174,6 +174,12 @@ class Cell(RuleBasedStateMachine):
         self.wait_until(self.clients[name].service_is_ready, what=name)
         return self.clients[name].call_async(service.Request(**fields))
 
+    def transition(self, node: str, label: str) -> None:
+        request = ChangeState.Request()
+        request.transition.label = label
+        answer = self.call(ChangeState, f'{node}/change_state', transition=request.transition)
+        assert answer.success
+
     def settle(self) -> None:
         """All that was sent is painted."""
         if self.active:
@@ -365,11 +371,7 @@ class Cell(RuleBasedStateMachine):
     def pause(self) -> None:
         """Deactivate the simulator, or activate it again."""
         self.settle()
-        request = ChangeState.Request()
-        request.transition.label = 'deactivate' if self.active else 'activate'
-        name = f'{SIMULATOR}/change_state'
-        answer = self.call(ChangeState, name, transition=request.transition)
-        assert answer.success
+        self.transition(SIMULATOR, 'deactivate' if self.active else 'activate')
         self.active = not self.active
 
     @rule(change=st.sampled_from([
@@ -400,10 +402,7 @@ class Cell(RuleBasedStateMachine):
         self.wait_until(lambda: self.reports[RECORDER] >= so_far + WRITTEN_REPORTS, what='reports')
         if signal == 'cycle':
             for label in ('deactivate', 'activate'):
-                request = ChangeState.Request()
-                request.transition.label = label
-                name = f'{RECORDER}/change_state'
-                assert self.call(ChangeState, name, transition=request.transition).success
+                self.transition(RECORDER, label)
                 if label == 'deactivate':
                     self.wait_until(lambda: not self.robot.hearers()[1])
             if self.is_whole:

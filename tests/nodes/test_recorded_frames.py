@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from geometry_msgs.msg import PoseStamped
 from rcl_interfaces.msg import Parameter as ParameterMessage
 from rcl_interfaces.msg import ParameterType, ParameterValue
 from rcl_interfaces.srv import SetParameters
@@ -14,7 +15,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.bags.bag_player import BagPlayer
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
+from paint_deposition.nodes.runtime.messages import header
 
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.
@@ -29,12 +30,10 @@ def in_the_cell() -> Trajectory:
 
 
 @pytest.fixture
-def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path):
+def recorded(simulator, record, robot, painted, wait_until):
     """A run of poses in `base_link`, and the film that the simulator had of it."""
     node = simulator(part_pose=PART_POSE, part_parent_frame='base_link')
-    values = {'output_directory': str(tmp_path), 'name': 'run'}
-    recorder = RunRecorder(context=ros_context, parameter_overrides=parameters(**values))
-    spin(recorder)
+    recorder = record()
     wait_until(lambda: '/part_pose' in recorder.run.counts, what='the pose of the part recorded')
     source = robot(node)
     # The recorder subscribes once it has found the publisher.
@@ -46,9 +45,7 @@ def recorded(ros_context, spin, simulator, robot, painted, wait_until, tmp_path)
     return recorder.run.folder, film
 
 
-def test_it_is_simulated_with_the_recorded_pose_of_the_part(
-    recorded, simulator, ros_context, executor, capfd
-):
+def test_it_is_simulated_with_the_recorded_pose_of_the_part(recorded, start, simulator, capfd):
     run, film = recorded
     read = read_recording(run)
     assert read.frame_id == 'part'
@@ -60,23 +57,19 @@ def test_it_is_simulated_with_the_recorded_pose_of_the_part(
     if HAS_TF:
         return
     # The player names the simulator's parameters to set.
-    chosen = parameters(bag=str(run), start_paused=True)
-    executor.add_node(BagPlayer(context=ros_context, parameter_overrides=chosen))
+    start(BagPlayer, bag=str(run), start_paused=True)
     said = capfd.readouterr().err
     assert "part_parent_frame: 'base_link' and part_pose: [1, 0, 0.5, 0, 0, 0.70710" in said
 
 
 @pytest.mark.skipif(not HAS_TF, reason='needs tf2_msgs')
-def test_its_replay_brings_the_transforms_along(
-    recorded, ros_context, executor, simulator, painted, wait_until
-):
+def test_its_replay_brings_the_transforms_along(recorded, start, executor, simulator, painted):
     run, film = recorded
     for node in executor.get_nodes():
         executor.remove_node(node)
         node.destroy_node()
     node = simulator()
-    player = BagPlayer(context=ros_context, parameter_overrides=parameters(bag=str(run), rate=0.0))
-    executor.add_node(player)
+    start(BagPlayer, bag=str(run), rate=0.0)
     replayed = painted(node, len(MOTION))
     assert np.array_equal(replayed, film)
 
@@ -86,7 +79,7 @@ def test_the_pose_of_the_part_is_unset_by_an_empty_list_of_any_kind(simulator, o
     viewer = onlooker({})
     for kind in ('BYTE', 'BOOL', 'DOUBLE'):
         assert node.set_parameters(parameters(part_pose=PART_POSE))[0].successful
-        assert node.frame.lookup_transform('base_link', 0) is not None
+        assert node.frame.on_part(PoseStamped(header=header('base_link', 0))) is not None
         value = ParameterValue(type=getattr(ParameterType, f'PARAMETER_{kind}_ARRAY'))
         request = SetParameters.Request(
             parameters=[ParameterMessage(name='part_pose', value=value)]

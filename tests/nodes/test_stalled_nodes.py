@@ -1,13 +1,10 @@
 """What a cell has to bear: a node that stalls."""
 
-import time
-
 import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from paint_msgs.msg import PoseProgress, ThicknessStats
-from paint_msgs.srv import ChangePart
 
-from nodes.cell import Robot, offline_um, two_passes, write_panel
+from nodes.cell import Robot, two_passes, write_panel
 from nodes.processes import NodeProcess
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.nodes.runtime import topics
@@ -49,42 +46,6 @@ def test_a_simulator_that_stalls_for_seconds_loses_nothing(
         assert recorder.wait() == 0, recorder.err
         assert 'file complete: ' in recorder.err.splitlines()[-1]
     assert np.array_equal(read_recording(tmp_path / 'run').stamps_ns, MOTION.stamps_ns)
-
-
-def test_a_recorder_that_stalls_at_a_change_has_each_pose_in_the_run_of_its_part(
-    simulator, robot, ros_domain, wait_until, call, tmp_path
-):
-    """It hears of the part before it hears of the last poses on the part before."""
-    node = simulator()
-    folder = tmp_path / 'runs'
-    with NodeProcess(
-        tmp_path / 'rec', 'run_recorder', output_directory=folder, name='before'
-    ) as recorder:
-        source = robot(node)
-        wait_until(lambda: source.has_subscribers(2), what='both')
-        films = []
-        for part, rows in enumerate((slice(0, 500), slice(500, 1000), slice(1000, 1500))):
-            if part == 1:
-                recorder.stall()
-            source.send(MOTION, rows)
-            wait_until(lambda part=part: node.film.counts.received == 500, what='painted')
-            node.catch_up()
-            films.append(node.film.snapshot().film_um)
-            if part == 1:  # for longer than a queue of the system is emptied
-                until_s = time.monotonic() + 2.0
-                wait_until(lambda until_s=until_s: time.monotonic() > until_s)
-            answer = call(source, ChangePart, '/deposition_simulator/change_part',
-                          ChangePart.Request(serial=f'{part}'))  # fmt: skip
-            assert answer.success, answer.message
-            if part == 1:
-                recorder.go_on()
-        wait_until((folder / '2').is_dir, what='the last run')
-        recorder.interrupt_as_launch_does()
-        assert recorder.wait() == 0, recorder.err
-    for run, part in (('before', 0), ('0', 1), ('1', 2)):
-        motion = read_recording(folder / run)
-        assert np.array_equal(motion.stamps_ns, MOTION.stamps_ns[500 * part : 500 * part + 500])
-        assert np.array_equal(offline_um(node, motion), films[part])
 
 
 def test_a_film_is_in_doubt_while_its_recorder_is_stalled(

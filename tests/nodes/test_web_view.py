@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from chromium import CHROMIUM, Chromium
-from nodes.cell import parameters, two_passes, write_panel
+from nodes.cell import two_passes, write_panel
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.nodes.runtime.node import WARN
 from paint_deposition.nodes.web_view import WebView
@@ -32,20 +32,10 @@ def is_bare(scene: Scene) -> bool:
 
 
 @pytest.fixture
-def web_view(ros_context, spin, tmp_path):
+def web_view(closed, tmp_path):
     """`web_view(**parameters)`: the page's node, beside a simulator of the panel."""
-    made = []
-
-    def web_view(**values) -> WebView:
-        panel = {'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.05}
-        given = parameters(**panel | {'port': 0} | values)
-        made.append(WebView(context=ros_context, parameter_overrides=given))
-        spin(made[-1])
-        return made[-1]
-
-    yield web_view
-    for node in made:
-        node.close()
+    panel = {'mesh_file': str(write_panel(tmp_path / 'panel.stl')), 'max_edge_length_m': 0.05}
+    return lambda **values: closed(WebView, **panel | {'port': 0} | values)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')

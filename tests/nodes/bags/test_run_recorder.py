@@ -6,8 +6,8 @@ import time
 import numpy as np
 import pytest
 from geometry_msgs.msg import PoseStamped
-from paint_msgs.msg import AtomizerState, Part, ThicknessStats
-from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
+from paint_msgs.msg import Part, ThicknessStats
+from rclpy.qos import QoSProfile, ReliabilityPolicy
 from rclpy.serialization import deserialize_message
 from std_msgs.msg import Bool, String
 
@@ -18,7 +18,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.nodes.bags.bag_player import BagPlayer
 from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
@@ -27,13 +26,11 @@ from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
 
-def test_every_byte_of_a_replay_is_recorded(ros_context, record, spin, wait_until, tmp_path):
+def test_every_byte_of_a_replay_is_recorded(play, record, wait_until, tmp_path):
     written = straight_pass(900)
     bag = write_pose_bag(tmp_path / 'pass', written)
     recorder = record()
-    replay = parameters(bag=str(bag), rate=0.0, state_topic='/atomizer/state')
-    player = BagPlayer(context=ros_context, parameter_overrides=replay)
-    spin(player)
+    player = play(bag, rate=0.0, state_topic='/atomizer/state')
     wait_until(player.finished.done, what='the end of the replay')
     information = finish(recorder)
     assert counts(information)['/atomizer/pose'] == 900
@@ -63,19 +60,6 @@ def test_latched_messages_are_recorded_as_latched(record, cell, wait_until):
     assert deserialize_message(data, ThicknessStats) == ThicknessStats(mean_um=41.5)
 
 
-def test_a_second_weaker_publisher_is_recorded_too(record, publisher, wait_until, cell):
-    recorder = record()
-    first = publisher(PoseStamped, 'atomizer/pose', QoSProfile(depth=50))
-    first.publish(pose(START_NS))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 1, what='the first pose')
-    second = publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
-    wait_until(lambda: second.get_subscription_count() == 1, what='a subscription that fits')
-    first.publish(pose(START_NS + 1))
-    second.publish(pose(START_NS + 2))
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == 3, what='the poses of both')
-    finish(recorder)
-
-
 def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell, wait_until):
     """Those that are in the queue come before those that a second subscription hears."""
     recorder = record()
@@ -87,7 +71,7 @@ def test_a_weaker_publisher_leaves_poses_in_their_order(record, publisher, cell,
     weak = cell.create_publisher(PoseStamped, 'atomizer/pose', BEST_EFFORT)
     until_s = time.monotonic() + 30.0
     while weak.get_subscription_count() == 0 and time.monotonic() < until_s:
-        recorder.recorded['/atomizer/pose'].subscribe(500)
+        recorder.recorded['/atomizer/pose'].match_qos()
     for k in range(200, 300):
         first.publish(pose(START_NS + k))
     wait_until(lambda: recorder.run.counts['/atomizer/pose'] == 300, what='all poses')
@@ -129,9 +113,8 @@ def test_poses_in_the_queue_at_the_end_are_recorded(record, publisher, wait_unti
     assert counts(finish(recorder)) == {'/atomizer/pose': 500}
 
 
-def test_a_model_changed_meanwhile_is_in_the_recording(record, ros_context, spin, wait_until):
-    planner = IndexPlanner(context=ros_context)
-    spin(planner)
+def test_a_model_changed_meanwhile_is_in_the_recording(record, start, wait_until):
+    planner = start(IndexPlanner)
     recorder = record()
     events = [p for p in planner.publishers if p.topic_name == '/parameter_events']
     wait_until(
@@ -157,60 +140,6 @@ def test_bad_input_is_reported_at_the_start(record):
     ):
         with pytest.raises(PaintError, match=says):
             record(**values)
-
-
-def test_of_two_states_with_one_stamp_the_newer_is_in_force(ros_context, record, spin, onlooker,
-                                                            wait_until, tmp_path):  # fmt: skip
-    """One is of the part before; the other is of this part, and taken after its first pose."""
-    recorder, robot, place = record(), Robot(ros_context), (np.zeros(3), FACING_PANEL)
-    spin(robot)
-    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
-    wait_until(lambda: robot.has_subscribers(1), what='the recorder')
-    robot.send_state(START_NS, 1.0)
-    robot.send_pose(START_NS, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
-    parts.publish(Part(run='1', header=header('part', START_NS)))
-    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
-    robot.send_state(START_NS, 0.5)
-    robot.send_pose(START_NS + 1, *place)
-    robot.send_pose(START_NS + 2, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 2, what='the poses')
-    wait_until(lambda: recorder.run.counts.get('/atomizer/state') == 2, what='the state')
-    recorder.close()
-    motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
-    assert motion.trigger_flow[-1] == 0.5
-
-
-@pytest.mark.parametrize('heard', ['all along', 'afterwards'])
-def test_a_run_begins_with_all_states_since_a_clock_was_set_back_and_none_from_before(
-    ros_context, record, spin, onlooker, wait_until, tmp_path, heard
-):
-    robot, place = Robot(ros_context), (np.zeros(3), FACING_PANEL)
-    robot.destroy_publisher(robot.state_publisher)
-    latched = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    robot.state_publisher = robot.create_publisher(AtomizerState, 'atomizer/state', latched)
-    spin(robot)
-    parts = onlooker().create_publisher(Part, 'part', topics.LATCHED)
-    recorder = record() if heard == 'all along' else None
-    if recorder:
-        wait_until(lambda: robot.has_subscribers(1), what='the recorder')
-    robot.send_state(START_NS, 1.0)
-    robot.send_pose(START_NS, *place)
-    if recorder:
-        wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
-    again_ns = START_NS - 3_600_000_000_000
-    robot.send_state(again_ns, 0.5)
-    robot.send_state(again_ns + 3, 0.7)
-    recorder = recorder or record()
-    wait_until(lambda: recorder.run.counts.get('/atomizer/state') == 3, what='the states')
-    parts.publish(Part(run='1', header=header('part', START_NS)))
-    wait_until(lambda: recorder.run.folder.name == '1', what='the run')
-    for number in range(5):
-        robot.send_pose(again_ns + number, *place)
-    wait_until(lambda: recorder.run.counts.get('/atomizer/pose') == 5, what='the poses')
-    recorder.close()
-    motion = read_recording(tmp_path / '1', state_topic='/atomizer/state')
-    assert motion.trigger_stamps_ns.tolist() == [again_ns, again_ns + 3]
 
 
 def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(

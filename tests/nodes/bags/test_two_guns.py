@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from nodes.cell import Robot, offline_um, parameters, two_passes
+from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.api.simulation import simulate
 from paint_deposition.files.motion_files import read_gun_motions
 from paint_deposition.files.motion_source import MotionSource
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
 
 GUNS = ['robot_1', 'robot_2']
 HIGH, OTHER = two_passes(poses=400), two_passes(poses=320)
@@ -18,16 +17,13 @@ POSES = len(HIGH) + len(LOW)
 
 
 def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
-    simulator, ros_context, spin, wait_until, painted, play, tmp_path
+    simulator, record, ros_context, spin, wait_until, painted, play
 ):
     """Live, from one bag by a player for each gun, and offline: the same film to the last bit."""
     node = simulator(atomizers=GUNS)
-    recorder = RunRecorder(
-        context=ros_context,
-        parameter_overrides=parameters(atomizers=GUNS, output_directory=str(tmp_path), name='run'),
-    )
+    recorder = record(atomizers=GUNS)
     robots = [Robot(ros_context, namespace=name) for name in GUNS]
-    spin(recorder, *robots)
+    spin(*robots)
     publishers = [p for robot in robots for p in (robot.pose_publisher, robot.state_publisher)]
     wait_until(lambda: all(p.get_subscription_count() == 2 for p in publishers), what='discovery')
     for start in range(0, len(HIGH), 37):

@@ -24,7 +24,6 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
@@ -86,57 +85,55 @@ def asked(onlooker, wait_until):
     return asked
 
 
-def test_each_part_has_its_film_and_its_run(simulator, robot, painted, change, wider, onlooker,
-                                            wait_until, tmp_path):  # fmt: skip
-    node = simulator()
+def test_each_part_has_its_film_and_its_run(
+    simulator, robot, record, painted, change, wider, onlooker, wait_until, tmp_path
+):
+    """In one folder, if simulator and recorder have the same `output_directory`."""
+    folder = tmp_path / 'films'
+    node = simulator(part_pose=[0.0] * 6 + [1.0], part_parent_frame='cell')
+    recorder = record(output_directory=str(folder), name='before')
     viewer = onlooker(
         {'part': (Part, topics.LATCHED), 'thickness/stats': (ThicknessStats, topics.LATCHED)}
     )
-    source = robot(node)
-    first = change(serial='4711', type='door')
-    assert first.success, first.message
-    assert (first.run, list(first.paths)) == ('4711', [])
-    source.send(MOTION)
-    film = painted(node, len(MOTION))
-    second = change(serial='4712', type='wide door', mesh_file=wider)
-    assert second.success, second.message
-    folder = tmp_path / 'films/4711'
-    assert list(second.paths) == [str(folder / f'film.{end}') for end in ('ply', 'csv', 'json')]
-    saved = np.loadtxt(folder / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-    assert saved == pytest.approx(film, rel=1e-8)
-    figures = json.loads((folder / 'film.json').read_text())
-    assert figures['part'].items() >= {'serial': '4711', 'type': 'door', 'coat': 1}.items()
-    assert figures['poses']['received'] == len(MOTION)
-    assert node.film.snapshot().film_um.max() == 0.0
+    source = robot(node, recorder)
+    motions, films = (MOTION, later(MOTION)), []
+    for number, (motion, mesh) in enumerate(zip(motions, (node.mesh_file, wider), strict=True)):
+        answer = change(serial=f'47-{number}', type='door', mesh_file=mesh)
+        assert (answer.success, answer.run) == (True, f'47-{number}'), answer.message
+        before = [str(folder / '47-0' / f'film.{end}') for end in ('ply', 'csv', 'json')]
+        assert list(answer.paths) == (before if number else [])
+        assert node.film.snapshot().film_um.max() == 0.0
+        wait_until(lambda n=number: recorder.run.folder.name == f'47-{n}', what='the run')
+        source.send(motion)
+        films.append(painted(node, len(MOTION)))
+        assert np.array_equal(films[-1], offline_um(node, motion))
+        wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == len(MOTION))
     assert np.ptp(node.points.positions_m[:, 0]) == pytest.approx(1.3 * PANEL_M)
-    source.send(later(MOTION))
-    assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
-    wait_until(lambda: viewer.shows('part', lambda p: p.serial == '4712'), what='the part')
+    wait_until(lambda: viewer.shows('part', lambda p: p.serial == '47-1'), what='the part')
     part = viewer.newest('part')
-    assert (part.type, part.coat, part.mesh_file) == ('wide door', 1, wider)
-    now = '4712', len(MOTION)
+    assert (part.type, part.coat, part.mesh_file) == ('door', 1, wider)
+    now = '47-1', len(MOTION)
     wait_until(lambda: viewer.shows('thickness/stats', lambda s: (s.run, s.poses_received) == now))
-
-
-def test_poses_belong_to_the_part_that_was_there_when_they_were_sent(
-    simulator, robot, painted, asked, wider, wait_until
-):
-    """Those before a request wait beside it; those after it wait while the mesh is read."""
-    node = simulator(pose_queue_depth=5000, max_edge_length_m=0.015)
-    source = robot(node)
-    asked(prepare=True)  # so that the service is known
-    source.send(MOTION)
-    future = asked(serial='1', mesh_file=wider)
-    wait_until(lambda: node.parts.waiting, what='the request')
-    source.send(later(MOTION))
-    wait_until(future.done, what='the change')
-    answer = future.result()
-    assert answer.success, answer.message
-    figures = json.loads(Path(answer.paths[2]).read_text())
-    assert figures['poses']['received'] == len(MOTION)
-    film = painted(node, len(MOTION))
-    assert node.mesh_file == wider
-    assert np.array_equal(film, offline_um(node, later(MOTION)))
+    recorder.close()
+    node.close()
+    for number, (motion, film) in enumerate(zip(motions, films, strict=True)):
+        run = folder / f'47-{number}'
+        recorded = read_recording(run, None, '/atomizer/state')
+        assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
+        with open_bag(run) as bag:
+            messages = {topic.name: topic.message_count for topic in bag.topics}
+        # Where the part stands was published once, before the first of them.
+        assert messages['/part'] == messages['/part_pose'] == 1
+        # The second begins with the state in which the gun was left.
+        assert messages['/atomizer/state'] == len(motion.triggers) + number
+        assert messages['/thickness/field']
+        assert f'serial: 47-{number}' in (run / 'metadata.yaml').read_text()
+        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
+        assert saved == pytest.approx(film, rel=1e-7)
+        figures = json.loads((run / 'film.json').read_text())
+        described = {'serial': f'47-{number}', 'type': 'door', 'coat': 1}
+        assert figures['part'].items() >= described.items()
+        assert figures['poses']['received'] == len(MOTION)
 
 
 def test_the_gun_stays_as_it_is_and_its_brush_must_be_in_a_new_model(
@@ -246,21 +243,6 @@ def test_what_cannot_be_is_refused_and_the_part_stays(simulator, robot, painted,
     assert not (tmp_path / 'films').exists()
 
 
-def test_a_recording_is_read_only_beside_the_runs_and_in_folders_named_at_the_start(
-    simulator, change, tmp_path, tmp_path_factory
-):
-    parts, elsewhere = (tmp_path_factory.mktemp(name) for name in ('parts', 'elsewhere'))
-    simulator(mesh_file=str(write_panel(parts / 'panel.stl')))
-    for folder in (tmp_path / 'films/1', parts / '1', elsewhere / '1'):
-        folder.mkdir(parents=True)
-    for run in (tmp_path / 'films/1', parts / '1'):
-        assert 'holds no .mcap file' in change(serial='1', resume=str(run)).message
-    (tmp_path / 'films/link').symlink_to(elsewhere / '1')
-    for run in (elsewhere / '1', tmp_path / 'films/link', tmp_path / 'films/../../'):
-        answer = change(serial='1', resume=str(run))
-        assert 'is in no folder that deposition_simulator was given' in answer.message
-
-
 def test_a_film_is_kept_until_it_is_on_disk(simulator, robot, painted, change, tmp_path):
     """The part changes all the same, and the answer says both."""
     folder = tmp_path / 'films'
@@ -296,42 +278,6 @@ def test_a_pose_that_is_refused_after_the_change_costs_no_film(simulator, robot,
     assert (answer.success, answer.run) == (False, '2')
     assert 'it stands where the part before did: not now' in answer.message
     assert (tmp_path / 'films/1/film.csv').is_file()
-
-
-def test_the_recorder_begins_a_run_for_each_part(simulator, robot, painted, change, ros_context,
-                                                 spin, wait_until, tmp_path):  # fmt: skip
-    folder = tmp_path / 'films'
-    where = [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
-    node = simulator(part_pose=where, part_parent_frame='cell')
-    recorder = RunRecorder(
-        context=ros_context,
-        parameter_overrides=parameters(output_directory=str(folder), name='before'),
-    )
-    spin(recorder)
-    source = robot(node, recorder)
-    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
-        assert change(serial=f'47-{number}', type='door').success
-        wait_until(lambda n=number: recorder.run.folder.name == f'47-{n}', what='the run')
-        source.send(motion)
-        painted(node, len(MOTION))
-        wait_until(lambda: recorder.run.counts.get('/atomizer/pose', 0) == len(MOTION))
-    recorder.close()
-    node.close()
-    for number, motion in enumerate((MOTION, later(MOTION)), start=1):
-        run = folder / f'47-{number}'
-        recorded = read_recording(run, None, '/atomizer/state')
-        assert np.array_equal(recorded.stamps_ns, motion.stamps_ns)
-        with open_bag(run) as bag:
-            messages = {topic.name: topic.message_count for topic in bag.topics}
-        # Where the part stands was published once, before the first of them.
-        assert messages['/part'] == messages['/part_pose'] == 1
-        # The second begins with the state in which the gun was left.
-        assert messages['/atomizer/state'] == len(motion.triggers) + number - 1
-        assert messages['/thickness/field']
-        told = (run / 'metadata.yaml').read_text()
-        assert f'serial: 47-{number}' in told
-        saved = np.loadtxt(run / 'film.csv', delimiter=',', skiprows=1)[:, 3]
-        assert saved == pytest.approx(offline_um(node, motion), rel=1e-7)
 
 
 @pytest.mark.parametrize(('pose', 'frame'), [([], 'part'), ([0.0] * 6 + [1.0], 'cell')])
@@ -420,38 +366,3 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))
-
-
-def test_a_part_is_resumed_from_its_recording_after_a_crash(
-    record, simulator, robot, painted, call, onlooker, executor, wait_until, tmp_path
-):
-    """Poses go on all the time; the recorder goes on with the run, and the film is whole."""
-    recorder, node = record(output_directory=str(tmp_path / 'runs')), simulator()
-    source, operator = robot(node), onlooker({})
-    wait_until(lambda: source.has_subscribers(2), what='both')
-    assert call(operator, ChangePart, SERVICE, ChangePart.Request(serial='7')).success
-    wait_until(lambda: recorder.run.folder.name == '7', what='the run')
-    source.send(MOTION, slice(0, 100))
-    painted(node, 100)
-    executor.remove_node(node)
-    node.destroy_node()
-    source.send(MOTION, slice(100, 150))
-    again = simulator()
-    wait_until(lambda: source.is_subscribed_by(again), what='the next simulator')
-    source.send(MOTION, slice(150, 200))
-    painted(again, 50)
-    client = operator.create_client(ChangePart, SERVICE)
-    wait_until(client.service_is_ready)
-    run = str(tmp_path / 'runs/7')
-    future = client.call_async(ChangePart.Request(serial='7', resume=run))
-    wait_until(lambda: again.parts.waiting, what='the request')
-    source.send(MOTION, slice(200, 250))
-    wait_until(future.done, what='the answer')
-    assert future.result().success, future.result().message
-    assert future.result().run == '7'
-    source.send(MOTION, slice(250, None))
-    film = painted(again, len(MOTION))
-    assert np.array_equal(film, offline_um(again, MOTION))
-    assert again.film.counts.rejected == 0
-    wait_until(lambda: recorder.run.counts['/atomizer/pose'] == len(MOTION), what='the recorder')
-    assert recorder.run.folder.name == '7'

@@ -25,16 +25,6 @@ def node(simulator, tmp_path):
     return simulator(model_file=str(tmp_path / 'brushes.yaml'))
 
 
-def test_the_live_film_of_brushes_is_the_offline_film(node, robot, painted, onlooker, wait_until):
-    viewer = onlooker()
-    robot(node).send(MOTION)
-    film = painted(node)
-    assert np.array_equal(film, offline_um(node, MOTION, MODEL))
-    assert film.max() > 1.0
-    gun = 'spraying, flow 1, brush 2'
-    wait_until(lambda: viewer.value(POSES, 'gun') == gun, what=gun)
-
-
 def test_a_brush_that_is_not_in_the_model_is_refused_and_those_it_has_are_named(
     node, robot, painted, onlooker, wait_until, tmp_path
 ):

@@ -90,10 +90,6 @@ def test_poses_are_painted_while_an_effect_of_ones_own_is_tried_out(
     assert '\n' not in problem
     assert np.array_equal(node.film.snapshot().film_um, painted_anew)
     wait_until(lambda: viewer.reports('deposition_simulator: film', problem), what='diagnostics')
-    # Painting again, for another reason, is done with the model that is in use.
-    node.set_parameters(parameters(max_pose_gap_s=0.3))
-    wait_until(lambda: not node.repainting, what='repainting')
-    assert (node.model_problem, node.film.guns[0].max_pose_gap_s) == ('', 0.3)
 
 
 def test_effect_files_need_leave_at_the_start_and_later(simulator, tmp_path):
@@ -155,22 +151,3 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted,
     expected = before + 0.1 * (whole - before)
     # The state before the change had a tenth of a second that was not settled yet.
     assert np.abs(painted(node) - expected).max() < 0.05 * whole.max()
-
-
-def test_a_gun_that_was_off_before_a_reset_stays_off_in_a_new_model(
-    simulator, robot, painted, wait_until, set_model
-):
-    """The model is taken over after the reset and before the next pose."""
-    node = simulator()
-    source = robot(node)
-    motion = two_passes(trigger=False)
-    source.send(motion, slice(0, 100))
-    source.send_state(motion.stamps_ns[100], 0.0)
-    source.send(motion, slice(100, 300))
-    painted(node, 300)
-    node.reset()
-    set_model(node, THIN)
-    wait_until(lambda: not node.repainting, what='the new model')
-    source.send(motion, slice(300, None))
-    assert painted(node, 300).max() == 0.0
-    assert node.film.guns[0].model == THIN

@@ -1,10 +1,13 @@
 """Poses that wait for their transform: in order, for a while, each counted once."""
 
+from collections import deque
+
+import numpy as np
 from geometry_msgs.msg import PoseStamped
 from rclpy.time import Time
 
 from paint_deposition.motion.frame_tree import NoTransform
-from paint_deposition.nodes.painting.frames import TF_TIMEOUT_S, TfQueue
+from paint_deposition.nodes.painting.frames import TF_TIMEOUT_S, TfQueue, placed_in_order
 
 
 class Part:
@@ -14,17 +17,23 @@ class Part:
         self.known_until_ns, self.may_come = 0, may_come
         self.placed: list[int] = []
         self.refused: list[int] = []
-        self.queue = TfQueue(self._transform, lambda pose, _: self.refused.append(_stamp_ns(pose)))
+        self.queue: TfQueue = deque()
 
     def take(self, stamp_ns: int, now_s: float) -> None:
         pose = PoseStamped()
         pose.header.stamp = Time(nanoseconds=stamp_ns).to_msg()
-        self.queue.add(pose, now_s)
+        self.queue.append((now_s, pose))
+        self.process(now_s)
 
-    def _transform(self, pose: PoseStamped) -> None:
+    def process(self, now_s: float) -> None:
+        for pose, placed in placed_in_order(self.queue, self._place, now_s):
+            refused = isinstance(placed, NoTransform)
+            (self.refused if refused else self.placed).append(_stamp_ns(pose))
+
+    def _place(self, pose: PoseStamped) -> tuple[np.ndarray, np.ndarray]:
         if _stamp_ns(pose) > self.known_until_ns:
             raise NoTransform('not known', self.may_come)
-        self.placed.append(_stamp_ns(pose))
+        return np.zeros(3), np.zeros(4)
 
 
 def _stamp_ns(pose: PoseStamped) -> int:
@@ -37,7 +46,7 @@ def test_a_late_transform_lets_the_poses_through_in_order():
         part.take(stamp_ns, now_s=stamp_ns * 1e-3)
     assert (part.placed, len(part.queue)) == ([], 3)
     part.known_until_ns = 8
-    part.queue.process(now_s=0.020)
+    part.process(now_s=0.020)
     assert (part.placed, len(part.queue)) == ([4, 8], 1)
     part.known_until_ns = 16
     part.take(16, now_s=0.024)
@@ -48,9 +57,9 @@ def test_a_pose_is_refused_when_its_time_is_up_or_nothing_can_come():
     part = Part()
     part.take(4, now_s=0.0)
     part.take(8, now_s=0.1)
-    part.queue.process(now_s=TF_TIMEOUT_S - 1e-3)
+    part.process(now_s=TF_TIMEOUT_S - 1e-3)
     assert part.refused == []
-    part.queue.process(now_s=TF_TIMEOUT_S)
+    part.process(now_s=TF_TIMEOUT_S)
     assert (part.refused, len(part.queue)) == ([4], 1)
     never = Part(may_come=False)
     never.take(4, now_s=0.0)

@@ -1,6 +1,5 @@
 """What the gun's states do to the film while it is painted."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
@@ -85,8 +84,9 @@ def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, pai
     wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
 
 
-def test_each_robot_is_heard_as_reliably_as_it_sends(simulator, ros_context, spin, painted,
-                                                     wait_until):  # fmt: skip
+def test_each_robot_is_heard_as_reliably_as_it_sends(
+    simulator, ros_context, spin, painted, wait_until, still
+):
     """A best-effort robot beside a reliable one, of which no pose may be lost for that."""
     node = simulator(pose_queue_depth=5000)
     first = Robot(ros_context)
@@ -111,8 +111,7 @@ def test_each_robot_is_heard_as_reliably_as_it_sends(simulator, ros_context, spi
     while reliability() != [ReliabilityPolicy.RELIABLE]:
         first.send(UNTRIGGERED, slice(row, row + 1))
         row += row < 599
-        until_s = time.monotonic() + 0.01
-        wait_until(lambda until_s=until_s: time.monotonic() > until_s)
+        still(0.01)
     first.send(UNTRIGGERED, slice(row, 600))
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')

@@ -13,7 +13,6 @@ from rclpy.time import Time
 from sensor_msgs.msg import JointState
 from std_msgs.msg import Bool, Float64, UInt16
 
-from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.robot.atomizer_source import AtomizerSource
@@ -66,17 +65,11 @@ def test_a_driver_that_returns_with_another_quality_of_service_is_heard(
 
 
 @pytest.fixture
-def source(ros_context, spin, tmp_path):
+def source(start, tmp_path):
     """`source(**parameters)`: the node, with the arm's URDF."""
-
-    def source(**values) -> AtomizerSource:
-        (tmp_path / 'arm.urdf').write_text(urdf())
-        chosen = {'urdf_file': str(tmp_path / 'arm.urdf')} | values
-        node = AtomizerSource(context=ros_context, parameter_overrides=parameters(**chosen))
-        spin(node)
-        return node
-
-    return source
+    (tmp_path / 'arm.urdf').write_text(urdf())
+    arm = {'urdf_file': str(tmp_path / 'arm.urdf')}
+    return lambda **values: start(AtomizerSource, **arm | values)
 
 
 @pytest.fixture

@@ -10,7 +10,6 @@ from geometry_msgs.msg import PoseStamped
 from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
-from nodes.cell import parameters
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.robot.egm_source import EgmSource, EgmStream
@@ -63,12 +62,13 @@ def test_positions_have_the_controllers_clock_and_late_packets_do_not_delay_them
     arrived = begin_ns + (sent_ms + late_ms) * 1_000_000
     packets = [egm_robot(k + 7, int(ms)) for k, ms in enumerate(sent_ms)]
     samples = [stream.take(*each) for each in zip(packets, arrived.tolist(), strict=True)]
-    stamps = np.array([sample.stamp_ns for sample in samples])
+    stamps = np.array([sample[0] for sample in samples])
     # All but the first, which was the fastest so far.
     assert np.array_equal(stamps[1:], begin_ns + (sent_ms[1:] + 1) * 1_000_000 - LAG_NS)
-    assert samples[-1].pose == pytest.approx((0.8125, -0.24025, 0.955, 0.5, -0.5, 0.5, 0.5))
-    assert np.degrees(samples[-1].joints_rad) == pytest.approx(DEGREES)
-    assert samples[-1].external.tolist() == [1500.0, 0.0]
+    _, pose, joints_rad, external = samples[-1]
+    assert pose == pytest.approx((0.8125, -0.24025, 0.955, 0.5, -0.5, 0.5, 0.5))
+    assert np.degrees(joints_rad) == pytest.approx(DEGREES)
+    assert external.tolist() == [1500.0, 0.0]
 
 
 def test_packets_are_counted_by_their_numbers_and_a_restart_is_none_of_them():
@@ -105,13 +105,11 @@ def test_a_step_of_the_controllers_clock_does_not_move_the_stamps(step_ms):
     begin_ms = 2**32 - 100 if step_ms == -(2**32) else 100_000
     for k in range(60):
         tm_ms = begin_ms + 4 * k + (step_ms if k >= 25 else 0)
-        sample = stream.take(egm_robot(k + 7, tm_ms), now_ns + 4_000_000 * k)
-        assert sample.stamp_ns == now_ns + 4_000_000 * k - LAG_NS
+        stamp, *_ = stream.take(egm_robot(k + 7, tm_ms), now_ns + 4_000_000 * k)
+        assert stamp == now_ns + 4_000_000 * k - LAG_NS
 
 
-def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
-    ros_context, spin, onlooker, wait_until
-):
+def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(start, onlooker, wait_until):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as free:
         free.bind(('127.0.0.1', 0))
         port = free.getsockname()[1]
@@ -125,10 +123,9 @@ def test_the_node_publishes_what_the_robot_streams_and_sends_nothing(
             'joint_states': (JointState, QoSProfile(depth=500)),
         }
     )
-    node = EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
-    spin(node)
+    start(EgmSource, **chosen)
     with pytest.raises(PaintError, match=r'cannot listen on .*or give another port'):
-        EgmSource(context=ros_context, parameter_overrides=parameters(**chosen))
+        start(EgmSource, **chosen)
     wait_until(lambda: viewer.count_publishers('atomizer/pose'), what='discovery')
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as robot:
         robot.bind(('127.0.0.1', 0))

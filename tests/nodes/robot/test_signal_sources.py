@@ -25,7 +25,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.robot.controllers import OpcuaSource, RwsSource
-from paint_deposition.nodes.robot.signal_source import StartsOfMotion
 
 GUN, FLOW = 'EtherNetIP/Gun/doGun', 'EtherNetIP/Gun/aoFlow'
 EVENT = (
@@ -161,12 +160,11 @@ def states(onlooker):
     return onlooker({'atomizer/state': (AtomizerState, LATCHED_STATES)})
 
 
-def test_signals_of_a_controller_switch_the_gun(ros_context, spin, states, wait_until):
+def test_signals_of_a_controller_switch_the_gun(start, states, wait_until):
     controller = Controller()
     with controller.running() as url:
         values = {'trigger': 'doGun', 'flow': FLOW, 'calibrated_flow': 250.0, 'delay_s': 0.05}
-        node = RwsSource(context=ros_context, parameter_overrides=parameters(url=url, **values))
-        spin(node)
+        node = start(RwsSource, url=url, **values)
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         wait_until(lambda: controller.socket is not None)
         assert controller.subscribed == {
@@ -191,12 +189,11 @@ def test_signals_of_a_controller_switch_the_gun(ros_context, spin, states, wait_
         wait_until(lambda: controller.sessions == 0, what='the end of the session')
 
 
-def test_the_cookie_of_a_controller_goes_to_no_other_host(ros_context, spin, states, wait_until):
+def test_the_cookie_of_a_controller_goes_to_no_other_host(start, states, wait_until):
     controller = Controller()
     controller.host = 'localhost'
     with controller.running() as url:
-        values = parameters(url=url, trigger='doGun', flow=FLOW)
-        spin(RwsSource(context=ros_context, parameter_overrides=values))
+        start(RwsSource, url=url, trigger='doGun', flow=FLOW)
         wait_until(lambda: states.reports('rws_source: signals', 'another host', b'\x02'))
         assert controller.cookie == ''
 
@@ -208,16 +205,15 @@ class _OneUser:
 
 
 def test_a_supply_may_ask_for_a_user_and_encryption(
-    ros_context, spin, states, wait_until, free_port, tmp_path, monkeypatch
+    start, states, wait_until, free_port, tmp_path, monkeypatch
 ):
     """The password is in no parameter and in no diagnostics."""
-    files = {kind: tmp_path / f'{kind}.der' for kind in ('certificate', 'private_key')}
+    files = {
+        'certificate': tmp_path / 'certificate.der', 'private_key': tmp_path / 'private_key.pem',
+    }  # fmt: skip
     key = generate_private_key()
-    dump_pem = key.private_bytes(
-        Encoding.PEM, PrivateFormat.PKCS8, NoEncryption()
-    )  # fmt: skip
-    files['private_key'] = tmp_path / 'private_key.pem'
-    files['private_key'].write_bytes(dump_pem)
+    pem = key.private_bytes(Encoding.PEM, PrivateFormat.PKCS8, NoEncryption())
+    files['private_key'].write_bytes(pem)
     names, host = {'commonName': 'cell'}, socket.gethostname()
     made = generate_self_signed_app_certificate(
         key, 'urn:cell', names, [x509.DNSName(host)], [ExtendedKeyUsageOID.CLIENT_AUTH]
@@ -226,30 +222,22 @@ def test_a_supply_may_ask_for_a_user_and_encryption(
     monkeypatch.setenv('OPCUA_PASSWORD', 'secret')
     address = f'opc.tcp://127.0.0.1:{free_port}'
     with Supply(address, files).running():
-        node = OpcuaSource(
-            context=ros_context,
-            parameter_overrides=parameters(
-                url=address, trigger='ns=2;s=Gun.Open', user='cell',
-                security_policy='Basic256Sha256',
-                certificate_file=str(files['certificate']),
-                private_key_file=str(files['private_key']),
-            ),
+        node = start(
+            OpcuaSource, url=address, trigger='ns=2;s=Gun.Open', user='cell',
+            security_policy='Basic256Sha256', certificate_file=str(files['certificate']),
+            private_key_file=str(files['private_key']),
         )  # fmt: skip
-        spin(node)
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         assert 'secret' not in str(node.values)
 
 
 def test_variables_of_a_material_supply_count_from_their_own_time(
-    ros_context, spin, states, wait_until, free_port
+    start, states, wait_until, free_port
 ):
     address = f'opc.tcp://127.0.0.1:{free_port}'
     with Supply(address).running() as supply:
         values = {'trigger': 'ns=2;s=Gun.Open', 'voltage': '2:Gun/2:Voltage'}
-        node = OpcuaSource(
-            context=ros_context, parameter_overrides=parameters(url=address, **values)
-        )
-        spin(node)
+        start(OpcuaSource, url=address, **values)
         wait_until(lambda: len(states.heard['atomizer/state']) == 1, what='the first state')
         # Behind the state before, or the opening would count from that.
         first_s = 1e-9 * stamp_ns(states.newest('atomizer/state').header)
@@ -288,34 +276,17 @@ def test_values_from_before_a_connection_are_not_called_late(ros_context):
     class Twice(OpcuaSource):
         connections = 0
 
-        def follow(self, stopped) -> None:
+        def follow(self) -> None:
             self.connections += 1
-            for _ in range(3000 if self.connections > 1 else 1):
-                self.take('gun', 1.0, time.time_ns() - (0 if self.lags() else 80_000_000_000))
+            for number in range(3000 if self.connections > 1 else 1):
+                self.take('gun', 1.0, time.time_ns() - (0 if number else 80_000_000_000))
             raise OSError('broken off')
-
-        def lags(self) -> int:
-            return 'gun' not in self._silent
 
     node = Twice(context=ros_context, parameter_overrides=parameters(trigger='gun'))
     while node.connections < 3:
         status = node.status()
         assert 'after its own time' not in status.message
     node.destroy_node()
-
-
-def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():
-    starts = StartsOfMotion()
-    begin_ns = 1_760_000_000_000_000_000
-    times_s = np.arange(0.0, 12.0, 0.004)
-    # At rest for a second of every three, then at 0.4 m/s.
-    for time_s, moved in zip(times_s, 0.4 * np.cumsum(times_s % 3.0 > 1.0) * 0.004, strict=True):
-        starts.add_pose(begin_ns + round(1e9 * time_s), np.array([moved, 0.0, 1.0]))
-        if abs(time_s % 3.0 - 1.12) < 1e-6:
-            starts.add_opening(begin_ns + round(1e9 * time_s))
-    delay_s, number = starts.delay_s()
-    assert number == 4
-    assert delay_s == pytest.approx(0.12, abs=0.01)
 
 
 @pytest.mark.parametrize(
@@ -326,7 +297,7 @@ def test_the_delay_is_from_the_start_of_the_motion_to_the_opening():
         ({'trigger': 'a', 'url': 'http://me:secret@127.0.0.1:9'}, 'url holds a login, .*RWS_PASS'),
     ],
 )
-def test_signals_that_are_not_named_are_refused(ros_context, values, words):
+def test_signals_that_are_not_named_are_refused(start, values, words):
     with pytest.raises(PaintError, match=words) as refused:
-        RwsSource(context=ros_context, parameter_overrides=parameters(**values))
+        start(RwsSource, **values)
     assert 'secret' not in str(refused.value)

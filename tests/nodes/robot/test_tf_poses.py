@@ -28,12 +28,10 @@ def viewer(onlooker):
 
 
 @pytest.fixture
-def broadcaster(ros_context, spin, viewer, wait_until):
-    node = AtomizerSource(
-        context=ros_context, parameter_overrides=parameters(base_link='world', tcp_offset=TCP)
-    )
+def broadcaster(start, ros_context, spin, viewer, wait_until):
+    start(AtomizerSource, base_link='world', tcp_offset=TCP)
     sender = Broadcaster(ros_context)
-    spin(node, sender)
+    spin(sender)
     wait_until(sender.has_subscribers, what='discovery')
     wait_until(lambda: viewer.count_publishers('atomizer/pose'))
     return sender

@@ -4,7 +4,6 @@ import math
 
 import pytest
 from rcl_interfaces.msg import ParameterType
-from rclpy.node import Node
 
 from nodes.cell import parameters
 from paint_deposition.errors import PaintError
@@ -13,7 +12,8 @@ from paint_deposition.nodes.bags.run_recorder import RunRecorder
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
-from paint_deposition.nodes.runtime.parameters import NodeParameter, declare_parameters
+from paint_deposition.nodes.runtime.node import PaintNode
+from paint_deposition.nodes.runtime.parameters import NodeParameter
 
 NODES = (BagPlayer, DepositionSimulator, IndexPlanner, ModelComparison, RunRecorder)
 
@@ -36,10 +36,13 @@ TABLE = {
 def declared(ros_context, executor):
     """`declared(name=value, ...)`: a node with the table under these overrides, and its values."""
 
+    class Tester(PaintNode):
+        PARAMETERS = TABLE
+
     def declared(**overrides):
-        node = Node('tester', context=ros_context, parameter_overrides=parameters(**overrides))
+        node = Tester('tester', context=ros_context, parameter_overrides=parameters(**overrides))
         executor.add_node(node)
-        return node, declare_parameters(node, TABLE)
+        return node, dict(node.values)
 
     return declared
 
@@ -88,8 +91,8 @@ def test_later_changes_are_checked_too(declared):
         ('rate_hz', float('nan'), 'rate_hz'),
         ('compression', 'zip', "give 'zstd' or 'none'"),
         ('odd', 4, 'give an odd number'),
-        ('mesh_file', 'other.stl', 'read-only'),
-        ('topics', ['a'], 'read-only'),
+        ('mesh_file', 'other.stl', 'cannot change while the node runs: it is read once'),
+        ('topics', ['a'], 'cannot change while the node runs: of the run'),
         ('queue_depth', 'deep', 'Wrong parameter type'),
     ):
         (result,) = node.set_parameters(parameters(**{name: value}))

@@ -138,10 +138,6 @@ class LiveFilm:
         self._carried, self._brushes = carried, brushes
         self._clear()
 
-    def forget_trigger(self) -> None:
-        """Forget how the gun was before a reset; what comes next says it."""
-        self._carried, self._brushes = [], set()
-
     def _clear(self) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(

@@ -48,41 +48,37 @@ SPACING_M = 0.02
 Progress = Callable[[str, float], None]
 
 
-PLANNER = dict(
-    **model_parameters(''),
-    brush=NodeParameter(
-        0,
-        'Number of the brush to plan for, of a model with several; 0: the only one [-]',
-        (0, MOST),
-    ),
-    width_m=requested(IndexRequest, 'width_m', none='only that of a request'),
-    length_m=requested(IndexRequest, 'length_m'),
-    standoff_m=requested(PlanRequest, 'standoff_m'),
-    travel_rad=requested(PlanRequest, 'travel_rad'),
-    gun_turns=requested(IndexRequest, 'gun_turns', False),
-    **fixed_while_running(
-        'passes are planned once, when the node starts; restart the node with the new value',
-        **mesh_parameters(max_edge_length_m=0.02),
-        direction=requested(PlanRequest, 'direction', 'horizontal'),
-        speed_m_per_s=requested(PlanRequest, 'speed_m_per_s', 0.3, none='from target_um'),
-        target_um=requested(PlanRequest, 'target_um', none='none'),
-        index_m=requested(PlanRequest, 'index_m'),
-        smoothing_radius_m=requested(PlanRequest, 'smoothing_radius_m', 0.1),
-        acceleration_m_per_s2=requested(PlanRequest, 'acceleration_m_per_s2', 2.0),
-        outward=direction_parameter(
-            'Direction from the part to the gun, any length; empty: the mean normal [-]'
-        ),
-    ),
-)
-
-
 class IndexPlanner(PaintNode):
     """Provides `recommend_index` and `plan_passes`; with a mesh, plans passes at the start.
 
     The planned motion is published on `planned_path`, latched, in the frame of the mesh.
     """
 
-    PARAMETERS = PLANNER
+    PARAMETERS = model_parameters('') | dict(
+        brush=NodeParameter(
+            0,
+            'Number of the brush to plan for, of a model with several; 0: the only one [-]',
+            (0, MOST),
+        ),
+        width_m=requested(IndexRequest, 'width_m', none='only that of a request'),
+        length_m=requested(IndexRequest, 'length_m'),
+        standoff_m=requested(PlanRequest, 'standoff_m'),
+        travel_rad=requested(PlanRequest, 'travel_rad'),
+        gun_turns=requested(IndexRequest, 'gun_turns', False),
+        **fixed_while_running(
+            'passes are planned once, when the node starts; restart the node with the new value',
+            **mesh_parameters(max_edge_length_m=0.02),
+            direction=requested(PlanRequest, 'direction', 'horizontal'),
+            speed_m_per_s=requested(PlanRequest, 'speed_m_per_s', 0.3, none='from target_um'),
+            target_um=requested(PlanRequest, 'target_um', none='none'),
+            index_m=requested(PlanRequest, 'index_m'),
+            smoothing_radius_m=requested(PlanRequest, 'smoothing_radius_m', 0.1),
+            acceleration_m_per_s2=requested(PlanRequest, 'acceleration_m_per_s2', 2.0),
+            outward=direction_parameter(
+                'Direction from the part to the gun, any length; empty: the mean normal [-]'
+            ),
+        ),
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('index_planner', **kwargs)

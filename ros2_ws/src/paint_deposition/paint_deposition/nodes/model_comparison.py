@@ -1,6 +1,7 @@
 """Node `model_comparison`: compares gauge readings with the film of a model during painting."""
 
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -34,24 +35,6 @@ from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
-COMPARISON = dict(
-    **PAINTING,
-    **fixed_while_configured(
-        'the film is painted where they were taken; clean the node up or restart it',
-        measurements_file=NodeParameter(
-            '', 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh [path]'
-        ),
-    ),
-    color_max_um=thickness_parameter(
-        'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
-    ),
-    color_radius_m=NodeParameter(
-        0.0,
-        'Radius of the colour around a reading; 0: from the spacing of the readings [m]',
-        (0.0, 5.0),
-    ),
-)
-
 
 class ModelComparison(PaintingNode):
     """Paints the points of gauge readings and publishes their residuals.
@@ -61,19 +44,30 @@ class ModelComparison(PaintingNode):
     them are for display only.
     """
 
-    PARAMETERS = COMPARISON
+    PARAMETERS = PAINTING | dict(
+        **fixed_while_configured(
+            'the film is painted where they were taken; clean the node up or restart it',
+            measurements_file=NodeParameter(
+                '',
+                'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh '
+                '[path]',
+            ),
+        ),
+        color_max_um=thickness_parameter(
+            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+        ),
+    )
+    PRECISION = 'double'
 
     def __init__(self, **kwargs: Any):
         super().__init__('model_comparison', **kwargs)
 
     def _configure(self) -> None:
         super()._configure()
-        self._mesh_publisher, self._stats_publisher, self._legend_publisher = (
-            self.create_publisher(message, f'comparison/{topic}', topics.LATCHED)
-            for message, topic in (
-                (Marker, 'mesh'), (ComparisonStats, 'stats'), (MarkerArray, 'legend'),
-            )
-        )  # fmt: skip
+        latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
+        self._mesh_publisher = latched(Marker, 'comparison/mesh')
+        self._stats_publisher = latched(ComparisonStats, 'comparison/stats')
+        self._legend_publisher = latched(MarkerArray, 'comparison/legend')
         self.create_trigger_service('~/compare', self._compare)
         self._publish_legend()
         self.publish()
@@ -91,34 +85,34 @@ class ModelComparison(PaintingNode):
         self.get_logger().info(self.readings.understood)
         self._noise = gauge_noise(self.readings)
 
-    def _points_on(self, surface: Surface) -> SurfacePoints:
-        return self._experiment.points
+    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
+        def experiment_on(surface: Surface) -> Experiment:
+            return Experiment.of('live', surface, SprayPath.empty(), self.readings)
 
-    def _set_surface(self, surface: Surface) -> None:
         try:
-            self._experiment = self._experiment_on(surface)
+            self._experiment = experiment_on(surface)
         except ReadingsError:
             # Until the gun tells which side of an open sheet is outward, readings with normals do.
             if self._is_read:
                 raise
             surface = turned(surface)
-            self._experiment = self._experiment_on(surface)
+            self._experiment = experiment_on(surface)
         self._is_read = True
-        super()._set_surface(surface)
+        return surface, self._experiment.points
+
+    def _surface_changed(self) -> None:
+        super()._surface_changed()
+        surface = self.surface
         for doubt in readings_in_doubt(surface, self.readings, np.zeros(len(self.readings))):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
         self._spread_colours()
 
-    def _experiment_on(self, surface: Surface) -> Experiment:
-        return Experiment.of('live', surface, SprayPath.empty(), self.readings)
-
     def _spread_colours(self) -> None:
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
-        radius_m = self.values['color_radius_m']
-        self._spreading = interpolation_matrix(self.surface, places, normals, radius_m)
+        self._spreading = interpolation_matrix(self.surface, places, normals)
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
@@ -131,8 +125,6 @@ class ModelComparison(PaintingNode):
 
     def _on_change(self, names: set[str]) -> None:
         super()._on_change(names)
-        if 'color_radius_m' in names:
-            self._spread_colours()
         if 'color_max_um' in names:
             self._publish_legend()
         self._shown = None

@@ -4,6 +4,7 @@ import contextlib
 import os
 import sys
 import time
+from collections import deque
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
@@ -22,10 +23,14 @@ from paint_deposition.files.recordings.headers import (
     trigger_change,
 )
 from paint_deposition.film.colour_scales import film_scale
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
+from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
+from paint_deposition.nodes.painting.frames import (
+    PartFrame,
+    TfQueue,
+    placed_in_order,
+)
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
@@ -33,10 +38,10 @@ from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
+    display_parameters,
     fixed_while_running,
     mesh_parameters,
-    require_colours,
-    thickness_parameter,
+    require_display,
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.facing import turned
@@ -47,42 +52,30 @@ from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKE
 SILENT_S = 2.0
 
 
-WEB_VIEW = dict(
-    **fixed_while_running(
-        'the page is served with it; restart the node with the new value',
-        **mesh_parameters(max_edge_length_m=0.01),
-        down=direction_parameter('As for deposition_simulator [-]'),
-        atomizers=atomizers_parameter('to show'),
-        host=NodeParameter(
-            DEFAULT_HOST,
-            'Address to listen on; any but that of this machine alone needs a token [name]',
-        ),
-        port=NodeParameter(DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)),
-        token=NodeParameter(
-            '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
-        ),
-    ),
-    color_min_um=thickness_parameter(
-        'Film at the lower end of the colours; both ends 0: automatic [µm]'
-    ),
-    color_max_um=thickness_parameter(
-        'Film at the upper end of the colours; both ends 0: automatic [µm]'
-    ),
-    painted_above_um=thickness_parameter(
-        'Thinner film is shown as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-    ),
-    target_um=thickness_parameter('Film wanted; 0: none [µm]'),
-    target_tolerance_um=thickness_parameter('Allowed difference from the target [µm]'),
-)
-
-
 class WebView(PaintNode):
     """Serves the live page with what the simulator publishes; it computes no film itself.
 
     The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
     """
 
-    PARAMETERS = WEB_VIEW
+    PARAMETERS = display_parameters() | dict(
+        fixed_while_running(
+            'the page is served with it; restart the node with the new value',
+            **mesh_parameters(max_edge_length_m=0.01),
+            down=direction_parameter('As for deposition_simulator [-]'),
+            atomizers=atomizers_parameter('to show'),
+            host=NodeParameter(
+                DEFAULT_HOST,
+                'Address to listen on; any but that of this machine alone needs a token [name]',
+            ),
+            port=NodeParameter(
+                DEFAULT_PORT, 'Port to listen on; 0: one that is free [-]', (0, 65535)
+            ),
+            token=NodeParameter(
+                '', f'Token that browsers must give; empty: that of {TOKEN}, or made [name]'
+            ),
+        )
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('web_view', **kwargs)
@@ -117,9 +110,8 @@ class WebView(PaintNode):
         self._frame = PartFrame(self, self.values['frame_id'])
         self._flow: dict[str, float] = {}
         # The simulator, which cannot paint a pose without a transform, says why.
-        self._waiting = {
-            name: TfQueue(partial(self._move_gun, name), lambda *_: None)
-            for name in self.values['atomizers'] or ['']
+        self._waiting: dict[str, TfQueue] = {
+            name: deque() for name in self.values['atomizers'] or ['']
         }
         # Stamp of the newest figures; their time, which goes on where a stream is restarted.
         self._newest_ns, self._time_s = 0, 0.0
@@ -140,8 +132,7 @@ class WebView(PaintNode):
         self.page.close()
 
     def _validate(self, values: Mapping[str, Any]) -> None:
-        require_colours(values)
-        require_band(values['target_um'], values['target_tolerance_um'])
+        require_display(values)
 
     def _on_change(self, names: set[str]) -> None:
         self._show_scale()
@@ -221,8 +212,10 @@ class WebView(PaintNode):
         self._frame.take_pending()
         for topic in self._inputs:
             topic.take_pending()
-        for waiting in self._waiting.values():
-            waiting.process(time.monotonic())
+        for gun, waiting in self._waiting.items():
+            for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
+                if not isinstance(placed, NoTransform):
+                    self._move_gun(gun, pose, *placed)
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
@@ -233,10 +226,11 @@ class WebView(PaintNode):
             self._flow[gun] = trigger_change(state).flow
 
     def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
-        self._waiting[gun].add(message, time.monotonic())
+        self._waiting[gun].append((time.monotonic(), message))
 
-    def _move_gun(self, gun: str, message: PoseStamped) -> None:
-        position_m, quaternion = self._frame.on_part(message)
+    def _move_gun(
+        self, gun: str, message: PoseStamped, position_m: np.ndarray, quaternion: np.ndarray
+    ) -> None:
         stamps = np.array([stamp_ns(message.header)])
         batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
         for position, z_axis in zip(*batch.finite_axes(), strict=True):

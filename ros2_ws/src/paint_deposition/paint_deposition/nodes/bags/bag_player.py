@@ -2,76 +2,49 @@
 
 import math
 import threading
+import time
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
+from heapq import merge
+from itertools import groupby
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from geometry_msgs.msg import PoseStamped
+import numpy as np
+from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState
 from rclpy.publisher import Publisher
-from rclpy.qos import QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.serialization import deserialize_message, serialize_message
 from rclpy.time import Time
 from rosgraph_msgs.msg import Clock
+from std_msgs.msg import Bool
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.bag_files import BagTopic, open_bag
+from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
 from paint_deposition.files.recordings.bags import motion_of, trajectory_of
+from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
-from paint_deposition.files.recordings.pose_topics import POSE_TYPE, choose_pose_topic
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
-from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
-from paint_deposition.nodes.bags.replayed_messages import (
-    ReplayedTransforms,
-    ReplayMessage,
-    pose_messages,
-    replay_messages,
+from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.pose_topics import (
+    PART_POSE_TYPE,
+    POSE_TYPE,
+    STATIC,
+    choose_pose_topic,
+    part_pose_topics,
+    read_frames,
 )
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
+from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, relative_flow
+from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
+from paint_deposition.nodes.runtime.messages import header, header_stamp_ns, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
-PLAYER = fixed_while_running(
-    'the replay has begun with it; start another player',
-    bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
-    pose_topic=NodeParameter(
-        '',
-        "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only one "
-        '[topic]',
-    ),
-    tf=NodeParameter(
-        [],
-        'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
-        'empty: they do not [names]',
-        constraints='two names, or none',
-        allows=lambda value: not value or len(value) == 2,
-        element=str,
-    ),
-    urdf=NodeParameter(
-        '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
-    ),
-    tip_link=NodeParameter(
-        '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
-    ),
-    base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
-    state_topic=NodeParameter(
-        '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
-    ),
-    rate=NodeParameter(
-        1.0,
-        'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
-        (0.0, math.inf),
-    ),
-    loop=NodeParameter(False, 'Start again at the end [true/false]'),
-    start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
-    wait_for_subscribers=NodeParameter(
-        1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
-    ),
-    window=NodeParameter(
-        200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
-    ),
-    publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
-)
+LOG_TIME = attrgetter('log_time_ns')
 
 
 class BagPlayer(PaintNode):
@@ -86,7 +59,47 @@ class BagPlayer(PaintNode):
     same time while the replay is paused.
     """
 
-    PARAMETERS = PLAYER
+    PARAMETERS = fixed_while_running(
+        'the replay has begun with it; start another player',
+        bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
+        pose_topic=NodeParameter(
+            '',
+            "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only "
+            'one [topic]',
+        ),
+        tf=NodeParameter(
+            [],
+            'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
+            'empty: they do not [names]',
+            constraints='two names, or none',
+            allows=lambda value: not value or len(value) == 2,
+            element=str,
+        ),
+        urdf=NodeParameter(
+            '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
+        ),
+        tip_link=NodeParameter(
+            '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
+        ),
+        base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
+        state_topic=NodeParameter(
+            '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
+        ),
+        rate=NodeParameter(
+            1.0,
+            'Speed relative to the recording; 0: as fast as the subscribers take poses [-]',
+            (0.0, math.inf),
+        ),
+        loop=NodeParameter(False, 'Start again at the end [true/false]'),
+        start_paused=NodeParameter(False, 'Wait for ~/resume before the start [true/false]'),
+        wait_for_subscribers=NodeParameter(
+            1, 'Subscribers of atomizer/pose to wait for before the start [count]', (0, math.inf)
+        ),
+        window=NodeParameter(
+            200, 'Poses ahead of the slowest subscriber at rate 0 [count]', (1, 10_000)
+        ),
+        publish_clock=NodeParameter(True, 'Publish /clock [true/false]'),
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('bag_player', **kwargs)
@@ -118,35 +131,61 @@ class BagPlayer(PaintNode):
         values = self.values
         if not values['bag']:
             raise PaintError('bag_player: bag is empty: give the path of a recording')
+        if values['tf'] and values['urdf']:
+            raise PaintError('bag_player: tf and urdf are given: poses come from one of them')
+        robot = None
+        if values['urdf']:
+            robot = Robot.read(
+                Path(values['urdf']), values['tip_link'] or None, values['base_link'] or None
+            )
+        motion = values['pose_topic'] or None, values['tf'] or None, robot
         with open_bag(values['bag']) as bag:
-            self._transforms = ReplayedTransforms(self, bag)
-            robot = None
-            if values['tf'] and values['urdf']:
-                raise PaintError('bag_player: tf and urdf are given: poses come from one of them')
-            if values['urdf']:
-                robot = Robot.read(
-                    Path(values['urdf']), values['tip_link'] or None, values['base_link'] or None
-                )
-            given = values['pose_topic'] or None, values['tf'] or None, robot
-            # The topic of the poses, or the poses of a bag that has none.
+            self._create_transform_publishers(bag)
+            # The topic of the poses, or the computed poses of a bag that has none.
             self._pose_topic, self._motion = '', None
-            topic = None if robot or values['tf'] else choose_pose_topic(bag, given[0])
+            topic = None if robot or values['tf'] else choose_pose_topic(bag, motion[0])
             if topic and topic.type == POSE_TYPE:
                 self._pose_topic = topic.name
             else:
-                self._motion = motion_of(bag, *given)
+                self._motion = motion_of(bag, *motion)
             self._state_topic: BagTopic | None = None
             unused = [topic.name for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE)]
             if values['state_topic']:
                 self._state_topic = choose_state_topic(bag, values['state_topic'])
                 if self._state_topic.type == BOOL_TYPE:
                     # Raises an error unless recorder and robot had the same clock.
-                    trajectory_of(bag, given[0], values['state_topic'], *given[1:])
+                    trajectory_of(bag, motion[0], values['state_topic'], *motion[1:])
             elif unused:
-                known = ' '.join(unused)
                 self.get_logger().info(
-                    f'no state_topic: the gun always sprays; the bag has {known}'
+                    f'no state_topic: the gun always sprays; the bag has {" ".join(unused)}'
                 )
+
+    def _create_transform_publishers(self, bag: Bag) -> None:
+        """Without tf2_msgs none, and a warning that names the parameters to set instead."""
+        self._transform_publishers: dict[bool, Publisher] = {}
+        self._transform_topics: list[str] = []
+        named = [topic.name for topic in bag.topics_of(*TF_TYPES)] + part_pose_topics(bag)
+        if not named:
+            return
+        try:
+            from tf2_msgs.msg import TFMessage
+        except ImportError:
+            place = 'part_parent_frame and part_pose'
+            if placed := read_frames(bag).placed('part'):
+                values = ', '.join(f'{value:.9g}' for value in placed[1].values)
+                place = f"part_parent_frame: '{placed[0]}' and part_pose: [{values}]"
+            self.get_logger().warning(
+                f'{bag.path} has transforms, and tf2_msgs is not installed: they are not '
+                f'replayed; set {place} of the simulator'
+            )
+            return
+        self._transform_topics = named
+        for static in (False, True):
+            durability = DurabilityPolicy.TRANSIENT_LOCAL if static else DurabilityPolicy.VOLATILE
+            self._transform_publishers[static] = self.create_publisher(
+                TFMessage, f'/{STATIC}' if static else '/tf',
+                QoSProfile(depth=100, durability=durability),
+            )  # fmt: skip
 
     # --- called by the executor
 
@@ -187,9 +226,8 @@ class BagPlayer(PaintNode):
     def _play_once(self) -> None:
         begun = False
         with open_bag(self.values['bag']) as bag:
-            computed = pose_messages(*self._motion) if self._motion else ()
-            topics = self._pose_topic, self._state_topic, self._transforms.topics
-            for message in replay_messages(bag, *topics, computed):
+            as_state = state_converter(bag, self._state_topic)
+            for message in self._messages(bag):
                 if not begun:
                     begun = True
                     self._time.change(started=False, time_ns=message.log_time_ns)
@@ -200,9 +238,18 @@ class BagPlayer(PaintNode):
                 if self.stopped.is_set():
                     return
                 self._time.jump_to(message.log_time_ns)
-                self._publish(message)
+                self._publish(message, as_state)
         self._time.change(started=False)
         self._publish_clock()
+
+    def _messages(self, bag: Bag) -> Iterator[RawMessage]:
+        """Poses, states and transforms by log time; at equal times, poses last."""
+        named = [self._pose_topic, self._state_topic.name if self._state_topic else '']
+        read = [*filter(None, named), *self._transform_topics]
+        poses: Iterable[RawMessage] = computed_poses(*self._motion) if self._motion else ()
+        messages = merge(bag.messages(read) if read else (), poses, key=LOG_TIME)
+        for _, simultaneous in groupby(messages, key=LOG_TIME):
+            yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
 
     def _wait_until_due(self, log_time_ns: int) -> None:
         """Wait for the end of a pause, the time of a message, and the flow control."""
@@ -212,19 +259,64 @@ class BagPlayer(PaintNode):
         if self.values['rate'] == 0.0:
             self._flow_control.wait_for_room()
 
-    def _publish(self, message: ReplayMessage) -> None:
-        if message.transform:
-            self._transforms.publish(message.transform)
-        elif message.is_pose:
-            self._flow_control.add_sent(message.stamp_ns)
+    def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
+        if message.topic == self._pose_topic:
+            self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
+        elif message.topic in self._transform_topics:
+            self._publish_transform(message)
         else:
-            self._state_publisher.publish(message.cdr)
+            self._state_publisher.publish(as_state(message))
             self.states_published += 1
+
+    def _publish_transform(self, message: RawMessage) -> None:
+        """A recorded `part_pose` becomes a static transform."""
+        cdr, is_place = message.cdr, message.type == PART_POSE_TYPE
+        publisher = self._transform_publishers[is_place or message.topic.endswith(STATIC)]
+        if is_place:
+            placed = deserialize_message(cdr, TransformStamped)
+            cdr = serialize_message(publisher.msg_type(transforms=[placed]))
+        publisher.publish(cdr)
 
     def _publish_clock(self) -> None:
         with self._clock_order:
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
+
+
+def computed_poses(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawMessage]:
+    """Serialised poses of a motion that is no topic of its own; log times (N,) never go back."""
+    logged_ns = np.maximum.accumulate(log_times_ns).tolist()
+    poses = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
+    for stamp, at_ns, values in zip(motion.stamps_ns.tolist(), logged_ns, poses, strict=True):
+        pose = serialize_message(pose_message(motion.frame_id, stamp, values))
+        yield RawMessage('', '', at_ns, pose)
+
+
+def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:
+    """What makes the bytes of an AtomizerState from a recorded Bool or state."""
+    is_bool = states is None or states.type == BOOL_TYPE
+    own_hash = definitions.installed(STATE_TYPE).type_hash
+    if states is not None and not is_bool and bag.type_hash(states) == own_hash:
+        return lambda message: message.cdr
+    kinds = AtomizerState.get_fields_and_field_types()
+    doubles = [name for name, kind in kinds.items() if kind == 'double']
+
+    def as_state(message: RawMessage) -> bytes:
+        state = AtomizerState(**dict.fromkeys(doubles, math.nan))  # unknown
+        if is_bool:
+            state.header = header('', message.log_time_ns)
+            state.spraying = deserialize_message(message.cdr, Bool).data
+            state.flow = relative_flow(state.spraying)
+        else:  # another version of the message: fields of the same name are copied
+            recorded = bag.decode(message)
+            state.header = header(recorded.header.frame_id, stamp_ns(recorded.header))
+            state.spraying = bool(recorded.spraying)
+            state.brush = int(getattr(recorded, 'brush', ONLY_BRUSH))
+            for name in doubles:
+                setattr(state, name, float(getattr(recorded, name, math.nan)))
+        return serialize_message(state)
+
+    return as_state

@@ -82,10 +82,10 @@ class ReplayClock:
     def _remaining_s(self, time_ns: int) -> float:
         if self._rate == 0.0:
             return 0.0 if self.running else math.inf
-        if self._since_s is None or self._time_ns is None:
+        now_ns = self.time_ns
+        if self._since_s is None or now_ns is None:
             return math.inf
-        passed_s = time.monotonic() - self._since_s
-        return (time_ns - self._time_ns) * 1e-9 / self._rate - passed_s
+        return (time_ns - now_ns) * 1e-9 / self._rate
 
 
 @dataclass
@@ -102,30 +102,47 @@ class Subscriber:
     never_reported: bool = False
 
 
-class PoseWindow:
-    """The poses that were sent, and how many of them each reporting subscriber has taken.
+class FlowControl:
+    """Keeps a publisher of poses at most `window` poses ahead of its subscribers.
 
-    A subscriber that joins, or joins again, starts with the next pose. Its reports identify the
-    newest pose it has taken by the stamp; poses lost before that one are not waited for. All
-    times are monotonic seconds. Thread-safe.
+    It waits for each pose to be reported by the subscribers that publish PoseProgress on
+    `atomizer/progress`, and for the middleware's acknowledgement by the others. A subscriber that
+    joins, or joins again, starts with the next pose. Its reports identify the newest pose it has
+    taken by the stamp; poses lost before that one are not waited for.
+
+    The waiting methods are for one thread beside the executor, and return early once `stopped` is
+    set. All times are monotonic seconds.
 
     Attributes:
-        subscribers: those present, by their full names.
+        subscribers: those present that report, by their full names.
+        status: what is waited for.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
+        self._node, self._publisher = node, publisher
+        self._window, self._stopped = window, stopped
         self._lock = threading.Lock()
-        self._published = 0
-        self._published_s = 0.0
+        self._sent, self._sent_s = 0, 0.0
         # Larger than the largest window.
         self._stamps: deque[int] = deque(maxlen=20_000)
         self.subscribers: dict[str, Subscriber] = {}
+        self._discovered_s = -math.inf
+        self._mute: set[str] = set()
+        self.status = 'starting'
+        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
+
+    # --- who has taken what
+
+    @property
+    def poses_ahead(self) -> int:
+        """Poses that the slowest reporting subscriber has not taken yet."""
+        return max(self.lag(time.monotonic()).values(), default=0)
 
     def add_sent(self, stamp_ns: int, now_s: float) -> None:
-        """Add a pose that was sent, by its stamp."""
+        """Add a pose that is about to be published, by its stamp."""
         with self._lock:
-            self._published += 1
-            self._published_s = now_s
+            self._sent += 1
+            self._sent_s = now_s
             self._stamps.append(stamp_ns)
 
     def set_subscribers(self, names: Iterable[str], now_s: float) -> None:
@@ -133,8 +150,7 @@ class PoseWindow:
         with self._lock:
             known = self.subscribers
             self.subscribers = {
-                name: known.get(name) or Subscriber(self._published, now_s)
-                for name in sorted(names)
+                name: known.get(name) or Subscriber(self._sent, now_s) for name in sorted(names)
             }
 
     def report(self, name: str | None, stamp_ns: int, now_s: float) -> None:
@@ -142,7 +158,7 @@ class PoseWindow:
         with self._lock:
             # Of poses with equal stamps, the newest.
             back = next((k for k, s in enumerate(reversed(self._stamps)) if s == stamp_ns), None)
-            taken = 0 if back is None else self._published - back
+            taken = 0 if back is None else self._sent - back
             for known, subscriber in self.subscribers.items():
                 if name in (None, known):
                     subscriber.reported_s, subscriber.never_reported = now_s, False
@@ -154,14 +170,14 @@ class PoseWindow:
         with self._lock:
             waited_for = {}
             for name, subscriber in self.subscribers.items():
-                if subscriber.taken < self._published:
+                if subscriber.taken < self._sent:
                     self._time_out(subscriber, now_s)
-                if subscriber.taken < self._published and not subscriber.never_reported:
-                    waited_for[name] = self._published - subscriber.taken
+                if subscriber.taken < self._sent and not subscriber.never_reported:
+                    waited_for[name] = self._sent - subscriber.taken
             return waited_for
 
     def _time_out(self, subscriber: Subscriber, now_s: float) -> None:
-        quiet_since_s = max(self._published_s, subscriber.advanced_s)
+        quiet_since_s = max(self._sent_s, subscriber.advanced_s)
         if subscriber.reported_s is None:
             subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
         elif (
@@ -169,38 +185,24 @@ class PoseWindow:
             # Without reports in this time it may be busy.
             and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
         ):
-            subscriber.lost += self._published - subscriber.taken
-            subscriber.taken = self._published
+            subscriber.lost += self._sent - subscriber.taken
+            subscriber.taken = self._sent
 
+    def _take_report(self, progress: PoseProgress) -> None:
+        stamp = stamp_ns(progress.header)
+        self.report(progress.reporter or None, stamp, time.monotonic())
 
-class FlowControl:
-    """Keeps a publisher of poses at most `window` poses ahead of its subscribers.
+    def _discover(self) -> frozenset[str]:
+        """Full names of the subscribers that also publish progress."""
+        self._discovered_s = time.monotonic()
+        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
+        progress = self._node.resolve_topic_name(PROGRESS_TOPIC)
+        reporters = self._node.get_publishers_info_by_topic(progress)
+        names = frozenset(map(node_name, takers)) & frozenset(map(node_name, reporters))
+        self.set_subscribers(names, self._discovered_s)
+        return names
 
-    It waits for each pose to be reported by the subscribers that publish PoseProgress on
-    `atomizer/progress`, and for the middleware's acknowledgement by the others. The waiting
-    methods are for one thread beside the executor, and return early once `stopped` is set.
-    `status` describes what is waited for.
-    """
-
-    def __init__(self, node: Node, publisher: Publisher, window: int, stopped: threading.Event):
-        self._node, self._publisher = node, publisher
-        self._limit, self._stopped = window, stopped
-        self._window = PoseWindow()
-        self._sent = 0
-        self._discovered_s = -math.inf
-        self._never_reported: set[str] = set()
-        self.status = 'starting'
-        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
-
-    @property
-    def poses_ahead(self) -> int:
-        """Poses that the slowest reporting subscriber has not taken yet."""
-        return max(self._window.lag(time.monotonic()).values(), default=0)
-
-    def add_sent(self, pose_stamp_ns: int) -> None:
-        """Add a pose that is about to be published."""
-        self._sent += 1
-        self._window.add_sent(pose_stamp_ns, time.monotonic())
+    # --- waiting
 
     def wait_for_subscribers(self, wanted: int) -> None:
         """Wait until there are so many subscribers and no more appear for a moment."""
@@ -223,9 +225,9 @@ class FlowControl:
 
     def wait_for_room(self) -> None:
         """Wait until one more pose fits into the window."""
-        if self._sent % self._limit == 0:
+        if self._sent % self._window == 0:
             self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN)
-        self._wait_for_lag_below(self._limit)
+        self._wait_for_lag_below(self._window)
 
     def wait_until_taken(self) -> None:
         """Wait until every pose is taken or known to be lost."""
@@ -234,7 +236,7 @@ class FlowControl:
         while not self._stopped.is_set() and time.monotonic() < deadline_s:
             if self._publisher.wait_for_all_acked(ACKNOWLEDGED_WITHIN):
                 break
-        for name, subscriber in self._window.subscribers.items():
+        for name, subscriber in self.subscribers.items():
             if subscriber.lost:
                 self._node.get_logger().warning(f'{name} has lost {subscriber.lost} poses')
 
@@ -244,18 +246,10 @@ class FlowControl:
             now_s = time.monotonic()
             if now_s - self._discovered_s > GRAPH_PERIOD_S:
                 self._discover()
-            behind = self._window.lag(now_s)
+            behind = self.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            never_reported = {
-                name for name, s in self._window.subscribers.items() if s.never_reported
-            }
-            for name in never_reported - self._never_reported:
-                self._node.get_logger().warning(
-                    f'{name} has never reported its progress: it is no longer waited for, and '
-                    'may lose poses when its queue overflows'
-                )
-            self._never_reported = never_reported
+            self._warn_of_mute_subscribers()
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
@@ -263,20 +257,15 @@ class FlowControl:
             self._stopped.wait(0.001)
         self.status = 'playing'
 
+    def _warn_of_mute_subscribers(self) -> None:
+        mute = {name for name, s in self.subscribers.items() if s.never_reported}
+        for name in mute - self._mute:
+            self._node.get_logger().warning(
+                f'{name} has never reported its progress: it is no longer waited for, and may '
+                'lose poses when its queue overflows'
+            )
+        self._mute = mute
+
     def _log_status(self, status: str) -> None:
         self.status = status
         self._node.get_logger().info(status)
-
-    def _take_report(self, progress: PoseProgress) -> None:
-        stamp = stamp_ns(progress.header)
-        self._window.report(progress.reporter or None, stamp, time.monotonic())
-
-    def _discover(self) -> frozenset[str]:
-        """Full names of the subscribers that also publish progress."""
-        self._discovered_s = time.monotonic()
-        takers = self._node.get_subscriptions_info_by_topic(self._publisher.topic_name)
-        progress = self._node.resolve_topic_name(PROGRESS_TOPIC)
-        reporters = self._node.get_publishers_info_by_topic(progress)
-        names = frozenset(map(node_name, takers)) & frozenset(map(node_name, reporters))
-        self._window.set_subscribers(names, self._discovered_s)
-        return names

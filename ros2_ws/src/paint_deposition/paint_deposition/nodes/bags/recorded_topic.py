@@ -1,15 +1,10 @@
 """What a recorder keeps: its parameters and topics, and the counts of each topic."""
 
-import itertools
-import math
 import os
-import time
 from collections.abc import Callable, Mapping, Sequence
-from pathlib import Path
 from typing import Any
 
 from paint_msgs.msg import Part
-from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosbags.interfaces import (
@@ -24,21 +19,19 @@ from rosbags.interfaces import (
 from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
 from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.messages import (
-    MOST_PUBLISHERS,
-    SequenceNumbers,
-    header_stamp_ns,
-    message_class,
-)
+from paint_deposition.nodes.runtime.messages import header_stamp_ns, message_class
 from paint_deposition.nodes.runtime.parameters import (
     FILE_NAME,
     FILE_NAME_RULE,
     NodeParameter,
     atomizers_parameter,
     fixed_while_configured,
-    require_file_name,
 )
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
+from paint_deposition.nodes.runtime.topics import (
+    MOST_PUBLISHERS,
+    AdaptiveSubscription,
+    gun_topic,
+)
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
@@ -111,35 +104,8 @@ def part_data(part: Part, model_file: str) -> dict[str, str]:
     return provenance(mesh_file, model_file) | data
 
 
-def unused_name(folder: Path, run: str) -> str:
-    """The name of a run, with date and time appended if it already exists."""
-    require_file_name('run', run)
-    dated = run + time.strftime('_%Y%m%d_%H%M%S')
-    names = itertools.chain([run, dated], (f'{dated}_{number}' for number in itertools.count(2)))
-    return next(name for name in names if not (folder / name).exists())
-
-
-class FirstMessage:
-    """How a publisher was first heard: the number of its message, and after how long [ns]."""
-
-    def __init__(self, number: int, sent_ns: int, waited_ns: int) -> None:
-        self._number, self._sent_ns, self._waited_ns = number, sent_ns, waited_ns
-        self._period_ns = math.inf
-
-    def add(self, number: int, sent_ns: int) -> None:
-        """Take a later message: the first few tell how often the publisher sends."""
-        if 0 < number - self._number <= 50:
-            self._period_ns = (sent_ns - self._sent_ns) / (number - self._number)
-
-    @property
-    def before_discovery(self) -> int:
-        """Messages sent before the first one, but not those from before the recording."""
-        sent_meanwhile = max(self._waited_ns, 0) / max(self._period_ns, 1.0)
-        return int(min(self._number - 1, sent_meanwhile))
-
-
-class RecordedTopic:
-    """Subscribes to the serialised messages of a topic.
+class RecordedTopic(AdaptiveSubscription):
+    """A subscription to the serialised messages of a topic, which counts what a run lacks.
 
     `max_gap_ns` is the longest interval between header stamps that is no gap; None: gaps are not
     counted. `begun_ns` is when the run began.
@@ -159,35 +125,42 @@ class RecordedTopic:
         take: TakeMessage,
         max_gap_ns: int | None,
         begun_ns: int,
+        depth: int,
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
-        self.messages = 0
-        self._sequence = SequenceNumbers()
+        self.messages = self.lost = self._log_time_ns = 0
+        # How each publisher was first heard: number of the message, when it was sent, and how
+        # long after the begin of the run; and how many came before, by its rate.
+        self._first: dict[bytes, tuple[int, int, int]] = {}
+        self._before_first: dict[bytes, int] = {}
+        self._pass_on, self._max_gap_ns = take, max_gap_ns
         self.reset_counts(begun_ns)
-        self._log_time_ns = 0
-        self._node = node
-        self._message_class = message_class(run_topic.type)
-        self._take = take
-        self._max_gap_ns = max_gap_ns
-        self._subscription: AdaptiveSubscription | None = None
+        super().__init__(
+            node, message_class(run_topic.type), self.name, self._record, depth=depth,
+            latched=True, raw=True, polled=False,
+        )  # fmt: skip
 
     def reset_counts(self, begun_ns: int) -> None:
         """Set the counts of the run, which began then, to zero."""
-        self._begun_ns = begun_ns
-        self._lost_before = self._sequence.lost
+        self._begun_ns, self._lost_before = begun_ns, self.lost
         self.unnumbered = self.gaps = 0
         self.longest_gap_ns = self.newest_stamp_ns = 0
-        self._first_messages: dict[bytes, FirstMessage] = {}
+        self._first = {gid: (number, sent, 0) for gid, (number, sent, _) in self._first.items()}
+        self._before_first.clear()
+
+    def unsubscribe(self) -> None:
+        super().unsubscribe()
+        self._first.clear()
 
     @property
     def missed(self) -> int:
         """Messages lost in the run after the first one of their publisher."""
-        return self._sequence.lost - self._lost_before
+        return self.lost - self._lost_before
 
     @property
     def before_discovery(self) -> int:
         """Messages sent while this was recording, before the first one of their publisher."""
-        return sum(first.before_discovery for first in self._first_messages.values())
+        return sum(self._before_first.values())
 
     @property
     def losses(self) -> str:
@@ -198,48 +171,30 @@ class RecordedTopic:
         before = f', {first} {MISSED_BEFORE_DISCOVERY}' if first else ''
         return f'{self.missed} missed{before}'
 
-    def subscribe(self, depth: int) -> None:
-        """Subscribe, or match the quality of service to that of the publishers."""
-        if self._subscription is not None:
-            self._subscription.match_qos()
-            return
-        self._subscription = AdaptiveSubscription(
-            self._node, self._message_class, self.name, self._on_message, depth=depth,
-            latched=True, raw=True, polled=False,
-        )  # fmt: skip
-
-    def unsubscribe(self) -> None:
-        """Take what is in the queue; what is sent until the next subscription is not missed."""
-        if self._subscription is not None:
-            self._subscription.destroy()
-            self._subscription = None
-        self._sequence.forget()
-
-    def drain(self) -> None:
-        """Take all messages in the queue, without the executor."""
-        if self._subscription is not None:
-            self._subscription.take_pending()
-
-    def _on_message(self, cdr: bytes, info: Mapping[str, Any]) -> None:
+    def _record(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
-        self._count_missed(info)
+        if info.get('publication_sequence_number') is None or info.get('publisher_gid') is None:
+            self.unnumbered += 1
+        else:
+            self._count_before_first(info)
         if self._max_gap_ns is not None:
             self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
         # Log times order the messages; times of receipt may go back a little under load.
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
-        self._take(self.name, cdr, self._log_time_ns, info['source_timestamp'])
+        self._pass_on(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
-    def _count_missed(self, info: Mapping[str, Any]) -> None:
-        number, gid = info.get('publication_sequence_number'), info.get('publisher_gid')
-        if number is None or gid is None:
-            self.unnumbered += 1
-            return
-        gid, sent_ns = gid['data'], info['source_timestamp']
-        if self._sequence.take(gid, number) and len(self._first_messages) < MOST_PUBLISHERS:
-            waited_ns = info['received_timestamp'] - self._begun_ns
-            self._first_messages[gid] = FirstMessage(number, sent_ns, waited_ns)
-        if gid in self._first_messages:
-            self._first_messages[gid].add(number, sent_ns)
+    def _count_before_first(self, info: Mapping[str, Any]) -> None:
+        """Count what a publisher sent in the run before it was heard, by how often it sends."""
+        publisher, number = info['publisher_gid']['data'], info['publication_sequence_number']
+        sent_ns = info['source_timestamp']
+        if publisher not in self._first and len(self._first) < MOST_PUBLISHERS:
+            waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
+            self._first[publisher] = number, sent_ns, waited_ns
+        first, first_sent_ns, waited_ns = self._first.get(publisher, (number, 0, 0))
+        # The first few tell.
+        if 0 < number - first <= 50:
+            period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
+            self._before_first[publisher] = int(min(first - 1, waited_ns / period_ns))
 
     def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
         gap_ns = stamp_ns - self.newest_stamp_ns
@@ -251,18 +206,18 @@ class RecordedTopic:
 
 def bag_qos(profile: QoSProfile) -> Qos:
     """A publisher's QoS profile in the form in which bags store it."""
+    deadline, lifespan, lease = (
+        QosTime(*divmod(duration.nanoseconds, 10**9))
+        for duration in (profile.deadline, profile.lifespan, profile.liveliness_lease_duration)
+    )
     return Qos(
         QosHistory[profile.history.name],
         profile.depth,
         QosReliability[profile.reliability.name],
         QosDurability[profile.durability.name],
-        _qos_time(profile.deadline),
-        _qos_time(profile.lifespan),
+        deadline,
+        lifespan,
         QosLiveliness[profile.liveliness.name],
-        _qos_time(profile.liveliness_lease_duration),
+        lease,
         profile.avoid_ros_namespace_conventions,
     )
-
-
-def _qos_time(duration: Duration) -> QosTime:
-    return QosTime(*divmod(duration.nanoseconds, 10**9))

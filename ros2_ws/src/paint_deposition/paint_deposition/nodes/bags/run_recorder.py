@@ -1,5 +1,6 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
+import itertools
 import shutil
 import time
 from collections import Counter
@@ -29,7 +30,6 @@ from paint_deposition.nodes.bags.recorded_topic import (
     bag_qos,
     default_topics,
     part_data,
-    unused_name,
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.messages import header
@@ -87,8 +87,8 @@ class RunRecorder(ManagedNode):
 
     def _activate(self) -> None:
         # Only after a run of this node's own is another name chosen for one that exists.
-        name = unused_name(self._folder, self._own_name) if self.runs else self._own_name
-        self._begin_run(self._create_run(name, self._custom_data), time.time_ns())
+        new_run = self._create_run('', self._custom_data, keep_name=not self.runs)
+        self._begin_run(new_run, time.time_ns())
         self.runs += 1
         # Run and stamp of the part, as it was announced.
         self._part: tuple[str, int] | None = None
@@ -97,8 +97,6 @@ class RunRecorder(ManagedNode):
         # last of them was sent. Poses that came even later.
         self.leaving: RunWriter | None = None
         self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
-        # Poses of these topics have not come since it left.
-        self._behind: set[str] = set()
         self.create_steady_timer(0.1, self._discover)
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(0.2, self._report_progress)
@@ -109,17 +107,23 @@ class RunRecorder(ManagedNode):
         if self.values['name']:
             require_file_name('name', self.values['name'])
 
-    @property
-    def _folder(self) -> Path:
-        return Path(self.values['output_directory'])
+    def _create_run(self, name: str, custom_data: dict[str, str], keep_name: bool) -> RunWriter:
+        """A run of this name, if any; with date and time if it exists, unless it keeps its name.
 
-    @property
-    def _own_name(self) -> str:
-        return self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
-
-    def _create_run(self, name: str, custom_data: dict[str, str]) -> RunWriter:
-        folder = self._folder / name
-        return RunWriter(folder, custom_data, compression=self.values['compression'])
+        Raises:
+            PaintError: the name is none for a folder, or the run exists, or cannot be made.
+        """
+        folder = Path(self.values['output_directory'])
+        name = name or self.values['name'] or time.strftime('run_%Y%m%d_%H%M%S')
+        require_file_name('run', name)
+        run = folder / name
+        if run.exists() and not keep_name:
+            dated = name + time.strftime('_%Y%m%d_%H%M%S')
+            names = itertools.chain(
+                [dated], (f'{dated}_{number}' for number in itertools.count(2))
+            )
+            run = next(folder / each for each in names if not (folder / each).exists())
+        return RunWriter(run, custom_data, compression=self.values['compression'])
 
     def destroy_node(self) -> None:
         for run in (self.run, self.leaving) if self.runs else ():
@@ -147,17 +151,18 @@ class RunRecorder(ManagedNode):
         types = sorted({publisher.topic_type for publisher in publishers})
         if len(types) > 1:
             raise RecordingError(f'{name} is published as {" and ".join(types)}')
+        if name in self.recorded:
+            self.recorded[name].match_qos()
+            return
         is_pose = types[0] == POSE_TYPE
-        depth = 5000 if is_pose or name == TF else 100
-        topic = self.recorded.get(name)
-        if topic is None:
-            max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
-            offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
-            run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-            topic = RecordedTopic(self, run_topic, self._write, max_gap_ns, self._begun_ns)
-            self._guarded(self.run.add_topic, run_topic)
-            self.recorded[name] = topic
-        topic.subscribe(depth)
+        max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
+        offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
+        run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
+        self._guarded(self.run.add_topic, run_topic)
+        self.recorded[name] = RecordedTopic(
+            self, run_topic, self._write, max_gap_ns, self._begun_ns,
+            depth=5000 if is_pose or name == TF else 100,
+        )  # fmt: skip
 
     # --- writing
 
@@ -171,9 +176,6 @@ class RunRecorder(ManagedNode):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
             if name in self._progress:
                 return
-        elif self.leaving is not None and name in self._behind:
-            self._behind.discard(name)
-            self._leave_soon()
         elif self.leaving is not None and name == TF in self.leaving.counts:
             self._guarded(self.leaving.write, name, cdr, log_time_ns, sent_ns)
         for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
@@ -196,16 +198,11 @@ class RunRecorder(ManagedNode):
         self.leaving.keep_another(name)
         self._leaves_s = time.monotonic() + LATE_S
 
-    def _leave_soon(self) -> None:
-        if not self._behind:
-            # A publisher keeps the order: after its first pose for the next part none comes.
-            self._leaves_s = min(self._leaves_s, time.monotonic() + 0.3)
-
     def _drain(self) -> None:
         """Take what is in the queues of all topics but that of the part."""
         for topic in self.recorded.values():
             if topic.name != self._part_topic:
-                topic.drain()
+                topic.take_pending()
 
     def _end_of_leaving(self) -> None:
         """Complete the run of the part that has left."""
@@ -223,8 +220,8 @@ class RunRecorder(ManagedNode):
         if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
             return  # a reset from before this recorder
         try:
-            name = unused_name(self._folder, part.run or self._own_name)
-            new_run = self._create_run(name, part_data(part, self.values['model_file']))
+            data = part_data(part, self.values['model_file'])
+            new_run = self._create_run(part.run, data, keep_name=False)
             self._drain()
             self._end_of_leaving()
             # Some messages were sent for this part, and are in the run before, too.
@@ -232,9 +229,6 @@ class RunRecorder(ManagedNode):
             self.run.keep({name: self.run.counts[name] - count for name, count in early.items()})
             self.leaving, self._lost_of_leaving = self.run, self._losses
             self._leaves_s = time.monotonic() + LATE_S
-            self._behind = {name for name in self._progress if self.run.counts.get(name)}
-            self._behind -= early.keys()
-            self._leave_soon()
             self._begin_run(new_run, log_time_ns)
             self.get_logger().info(f'recording {part.run} into {self.run.folder}')
         except RecordingError as error:
@@ -266,11 +260,13 @@ class RunRecorder(ManagedNode):
         self.fail(error)
 
     def _report_progress(self) -> None:
-        reporter = self.get_fully_qualified_name()
         for name in self._progress.keys() & self.recorded.keys():
             topic = self.recorded[name]
-            report = PoseProgress(reporter=reporter, poses_received=topic.messages)
-            report.header = header('', topic.newest_stamp_ns)
+            report = PoseProgress(
+                header=header('', topic.newest_stamp_ns),
+                reporter=self.get_fully_qualified_name(),
+                poses_received=topic.messages,
+            )
             self._progress[name].publish(report)
 
     # --- ending
@@ -287,7 +283,7 @@ class RunRecorder(ManagedNode):
     def _deactivate(self) -> None:
         for topic in self.recorded.values():
             if topic.name in self._always_heard:
-                topic.drain()
+                topic.take_pending()
             else:
                 topic.unsubscribe()
         self._initial_messages.end_motion()

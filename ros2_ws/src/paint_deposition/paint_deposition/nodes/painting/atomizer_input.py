@@ -3,10 +3,9 @@
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -18,7 +17,11 @@ from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
-from paint_deposition.nodes.painting.frames import PartFrame, TfQueue
+from paint_deposition.nodes.painting.frames import (
+    PartFrame,
+    TfQueue,
+    placed_in_order,
+)
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
@@ -68,20 +71,17 @@ class AtomizerInput:
         on_poses: Callable[[PoseBatch], None],
         on_state: Callable[[TriggerChange], None],
     ) -> None:
-        self._node, self._frame = node, frame
+        self._node, self._frame, self.name = node, frame, name
         self._on_poses, self._on_state = on_poses, on_state
-        self.name = name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
         self.poses_received = self.newest_ns = self.sent_ns = 0
-        self.refused_s = self.pose_s = -math.inf
-        self.spraying = False
+        self.refused_s = self.pose_s = self._flushed_s = -math.inf
+        self.spraying, self.programmed_m_per_s = False, 0.0
         self.speed = SpeedNow()
-        self.programmed_m_per_s = 0.0
         self._newest: PoseStamped | None = None
         # Stamp of a state that is ahead of the poses, and when it was sent [ns].
         self._state_ahead: tuple[int, int] | None = None
-        self._flushed_s = -math.inf
         # What was taken from the queues, and when it was sent.
         self._new_poses: list[tuple[PoseStamped, int]] = []
         self._new_states: list[tuple[AtomizerState, int]] = []
@@ -89,20 +89,26 @@ class AtomizerInput:
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
-        self.tf_queue = TfQueue(self._transform, self._reject)
+        self.tf_queue: TfQueue = deque()
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
-        poses, states = (partial(self._note, new) for new in (self._new_poses, self._new_states))
         self._topics = [
-            subscribe(PoseStamped, self._pose_topic, poses),
+            subscribe(
+                PoseStamped, self._pose_topic,
+                lambda pose, info: self._new_poses.append((pose, info['source_timestamp'])),
+            ),
             # A latched state from before the node started is still in effect.
-            subscribe(AtomizerState, self._state_topic, states, latched=True),
-        ]
+            subscribe(
+                AtomizerState, self._state_topic,
+                lambda state, info: self._new_states.append((state, info['source_timestamp'])),
+                latched=True,
+            ),
+        ]  # fmt: skip
         self.reset_counts()
         self._progress = node.create_publisher(
             PoseProgress, gun_topic(name, PROGRESS_TOPIC), topics.PROGRESS
         )
         # Polled: waking up for each pose would cost more than painting it.
-        node.create_steady_timer(0.02, self._take)
+        node.create_steady_timer(0.02, partial(self.take_pending, at_once=False))
         node.create_steady_timer(0.2, self._report_progress)
 
     @property
@@ -115,15 +121,10 @@ class AtomizerInput:
         """Messages that the middleware has lost since the last reset."""
         return sum(topic.lost for topic in self._topics) - self._lost_before
 
-    @property
-    def received_ns(self) -> int:
-        """Stamp of the newest pose received, 0 before the first."""
-        return stamp_ns(self._newest.header) if self._newest is not None else 0
-
     def reset(self) -> None:
         """Reset the counts; poses that were not passed on yet are dropped."""
         self.reset_counts()
-        self.newest_ns = self.received_ns
+        self.newest_ns = stamp_ns(self._newest.header) if self._newest is not None else 0
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
@@ -140,14 +141,6 @@ class AtomizerInput:
         self.intervals = Intervals()
         self.jumps = Jumps()
 
-    def count_unpainted(self, poses: int) -> None:
-        """Count poses received while the node is not active."""
-        if not self.unpainted:
-            self._node.get_logger().warning(
-                f'{self._pose_topic}: poses arrive and are not painted: the node is inactive'
-            )
-        self.unpainted += poses
-
     # --- holding
 
     def hold(self, after_ns: int) -> None:
@@ -163,14 +156,6 @@ class AtomizerInput:
             self._process(message, 0)
         self.flush()
 
-    def drop_held(self, until_ns: int) -> None:
-        """Drop kept poses up to the newest with this stamp, and those before it."""
-        held = self._held or []
-        stamps = [stamp_ns(k.header) if isinstance(k, PoseStamped) else -1 for k in held]
-        if until_ns in stamps:
-            end = len(stamps) - stamps[::-1].index(until_ns)
-            held[:end] = [k for k in held[:end] if isinstance(k, AtomizerState)]
-
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
             # Hours of poses.
@@ -181,17 +166,16 @@ class AtomizerInput:
         elif isinstance(message, AtomizerState):
             self._process_state(message)
         else:
-            self.tf_queue.add(message, time.monotonic())
+            self.tf_queue.append((time.monotonic(), message))
+            self._place()
 
     # --- batches
 
-    def take_pending(self) -> None:
-        """Take all messages in the queues and pass them on."""
-        self._drain()
-        self.flush()
+    def take_pending(self, at_once: bool = True) -> None:
+        """Take all messages in the queues, each state before the first pose that was sent later.
 
-    def _drain(self) -> None:
-        """Process what is in the queues, each state before the first pose that was sent later."""
+        They are passed on at once, or when they fill a batch or have waited for long enough.
+        """
         self._frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
@@ -206,16 +190,14 @@ class AtomizerInput:
         for state in states:
             self._take_state(*state)
 
-    def _take(self) -> None:
-        self._drain()
-        waited = time.monotonic() - self._flushed_s >= 0.05
-        if waited or len(self._poses) >= POSES_PER_BATCH:
+        has_waited = time.monotonic() - self._flushed_s >= 0.05
+        if at_once or has_waited or len(self._poses) >= POSES_PER_BATCH:
             self.flush()
 
     def flush(self) -> None:
         """Pass on the next batch; poses that wait for their transform are not in it."""
         self._flushed_s = time.monotonic()
-        self.tf_queue.process(self._flushed_s)
+        self._place()
         if not self._poses:
             return
         stamps, positions, quaternions = map(np.array, zip(*self._poses, strict=True))
@@ -235,9 +217,6 @@ class AtomizerInput:
             )
         self._on_poses(batch)
 
-    def _note(self, new: list[tuple[Any, int]], message: Any, info: Mapping[str, Any]) -> None:
-        new.append((message, info['source_timestamp']))
-
     # --- poses
 
     def _take_pose(self, message: PoseStamped, sent_ns: int) -> None:
@@ -254,10 +233,14 @@ class AtomizerInput:
         if self.poses_received % POSES_PER_BATCH == 0:
             self._report_progress()
 
-    def _transform(self, message: PoseStamped) -> None:
-        pose = self._frame.on_part(message)
-        self.anomalies['poses without a frame'] += not message.header.frame_id
-        self._poses.append((stamp_ns(message.header), *pose))
+    def _place(self) -> None:
+        """Put the poses whose transforms are known into the next batch."""
+        for pose, placed in placed_in_order(self.tf_queue, self._frame.on_part, time.monotonic()):
+            if isinstance(placed, NoTransform):
+                self._reject(pose, placed)
+            else:
+                self.anomalies['poses without a frame'] += not pose.header.frame_id
+                self._poses.append((stamp_ns(pose.header), *placed))
 
     def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
         frame_id = message.header.frame_id

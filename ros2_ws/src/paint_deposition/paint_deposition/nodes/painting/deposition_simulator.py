@@ -1,7 +1,7 @@
 """Node `deposition_simulator`: the film on a part as the atomizer paints it."""
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
@@ -10,9 +10,12 @@ from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
-from paint_deposition.nodes.painting.film_display import FilmDisplay
-from paint_deposition.nodes.painting.film_files import film_writer
+from paint_deposition.nodes.painting.film_display import (
+    FilmDisplay,
+    shares,
+    statistics_of,
+    volume_by_gun,
+)
 from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
@@ -20,54 +23,14 @@ from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
+    display_parameters,
     fixed_while_configured,
-    require_colours,
+    require_display,
     require_file_name,
-    thickness_parameter,
 )
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-
-SIMULATOR = PAINTING | {
-    'publish_rate_hz': NodeParameter(
-        5.0,
-        'Rate of the statistics while the film changes, and highest rate of large messages [Hz]',
-        (0.1, 30.0),
-    ),
-    **fixed_while_configured(
-        'the film so far was computed in it; clean the node up or restart it',
-        precision=NodeParameter(
-            'single',
-            'Arithmetic on the mesh; single is good to a millionth of the peak [name]',
-            choices=('single', 'double'),
-        ),
-    ),
-    'color_min_um': thickness_parameter(
-        'Film at the lower end of the colours; both ends 0: automatic [µm]'
-    ),
-    'color_max_um': thickness_parameter(
-        'Film at the upper end of the colours; both ends 0: automatic [µm]'
-    ),
-    'painted_above_um': thickness_parameter(
-        'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-    ),
-    'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
-    'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
-    **fixed_while_configured(
-        'its zones are found on the mesh once; clean the node up or restart it',
-        zones_file=NodeParameter(
-            '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
-        ),
-    ),
-    'publish_mesh': NodeParameter(
-        True, 'Publish the coloured mesh; for 275,000 vertices 65 MB per subscriber [true/false]'
-    ),
-    'output_directory': NodeParameter(
-        'runs',
-        'Where ~/save_film writes [path]',
-        fixed_because='remote nodes must not choose where files are written; restart the node',
-    ),
-}
+from paint_deposition.report.writers.write import write_film
 
 
 class DepositionSimulator(PaintingNode):
@@ -81,7 +44,26 @@ class DepositionSimulator(PaintingNode):
         parts: the part in the cell, and its change.
     """
 
-    PARAMETERS = SIMULATOR
+    PARAMETERS = PAINTING | {
+        'publish_rate_hz': NodeParameter(
+            5.0,
+            'Rate of the statistics while the film changes, and highest rate of large messages '
+            '[Hz]',
+            (0.1, 30.0),
+        ),
+        **display_parameters(),
+        **fixed_while_configured(
+            'its zones are found on the mesh once; clean the node up or restart it',
+            zones_file=NodeParameter(
+                '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
+            ),
+        ),
+        'output_directory': NodeParameter(
+            'runs',
+            'Where ~/save_film writes [path]',
+            fixed_because='remote nodes must not choose where files are written; restart the node',
+        ),
+    }
 
     def __init__(self, **kwargs: Any):
         super().__init__('deposition_simulator', **kwargs)
@@ -117,16 +99,15 @@ class DepositionSimulator(PaintingNode):
         )
         return Status(WARN, beside, status.values)
 
-    def _points_on(self, surface: Surface) -> SurfacePoints:
-        return surface.points()
-
     def _read_part(self) -> None:
         self._mesh_version = mesh_version(self.mesh_file)
 
+    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
+        return surface, surface.points()
+
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)
-        require_colours(values)
-        require_band(values['target_um'], values['target_tolerance_um'])
+        require_display(values)
 
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""
@@ -152,7 +133,7 @@ class DepositionSimulator(PaintingNode):
         try:
             require_file_name('name', stem)
             self.catch_up()
-            write = film_writer(self, Path(self.values['output_directory']), stem)
+            write = self.film_writer(Path(self.values['output_directory']), stem)
             paths = await self.result_of(self._saving.submit(write))
         except Exception as error:  # reported to the caller of the service
             response.message = str(error)
@@ -161,3 +142,64 @@ class DepositionSimulator(PaintingNode):
         response.paths = [str(path) for path in paths]
         response.message = f'wrote {", ".join(path.name for path in paths)}'
         return response
+
+    def film_writer(
+        self, folder: Path, stem: str, part: Mapping[str, Any] | None = None
+    ) -> Callable[[], list[Path]]:
+        """A function that writes the film as it is now and returns the paths; for any thread.
+
+        Args:
+            folder, stem: of the files.
+            part: description of the part for the statistics file.
+        """
+        film, surface, zones = self.film.snapshot(), self.surface, self.zones
+        values, names, details = dict(self.values), self.gun_names, self._details()
+        counts = [gun.counts.to_dict() for gun in self.film.guns]
+        if part:
+            details['part'] = part
+
+        def write() -> list[Path]:
+            laid_cm3 = volume_by_gun(names, surface, film)
+            files = values['model_files'] or [values['model_file']] * len(names)
+            details['atomizers'] = [
+                {
+                    'name': name,
+                    'model_file': file,
+                    'painted_volume_cm3': laid_cm3[name],
+                    'share': share,
+                    'emitted_volume_cm3': gun.emitted_cm3,
+                    'poses': poses,
+                }
+                for (name, share), file, gun, poses in zip(
+                    shares(laid_cm3).items(), files, film.guns, counts, strict=True
+                )
+            ]
+            film_um = film.film_um
+            figures = statistics_of(values, surface, film_um, film.emitted_cm3, zones)
+            if any(gun.model.brushes for gun in film.guns):
+                details['paint'] = film.used.figures(figures.mean_um, figures.painted_volume_cm3)
+            return write_film(
+                folder, surface, film_um, figures, zones=zones, stem=stem,
+                statistics_file=f'{stem}.json', details=details,
+                color_range_um=(values['color_min_um'], values['color_max_um']),
+            )  # fmt: skip
+
+        return write
+
+    def _details(self) -> dict[str, Any]:
+        """What the statistics file says beside the figures of the film."""
+        refused = [source.refused_frames.items() for source in self.inputs]
+        effects = (effect.id for gun in self.film.guns for effect in gun.model.effects)
+        return {
+            'mesh_file': self.mesh_file,
+            'mesh_id': self.surface.mesh_id,
+            'frame_id': self.frame.frame_id,
+            'down': self.surface.down,
+            'model_file': self.values['model_file'],
+            'zones_file': self.values['zones_file'],
+            'effects': list(dict.fromkeys(effects)),
+            'poses': self.film.counts.to_dict(),
+            'poses_in_other_frames': {
+                frame: count for frames in refused for frame, count in frames
+            },
+        }

@@ -3,7 +3,8 @@
 import sys
 import time
 from array import array
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,13 +21,14 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from paint_deposition.film.colour_scales import TABLE, ColourScale, film_scale
 from paint_deposition.film.common_film import CommonFilm
-from paint_deposition.nodes.painting.film_files import shares, statistics_of, volume_by_gun
+from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
 from paint_deposition.nodes.runtime.topics import gun_topic
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
 
 # The share of a core that building and publishing a large message may take.
 MAX_CORE_SHARE = 0.2
@@ -38,6 +40,29 @@ STATS_FIELDS = (
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
 BAR_STEPS = 64
+
+
+def statistics_of(
+    values: Mapping[str, Any],
+    surface: Surface,
+    film_um: np.ndarray,
+    emitted_cm3: float,
+    zones: PointZones | None,
+) -> FilmStatistics:
+    """The statistics of a film (V,), by the targets and the thresholds among the parameters."""
+    chosen = {k: values[k] for k in ('painted_above_um', 'target_um', 'target_tolerance_um')}
+    return film_statistics(film_um, surface.vertex_areas_m2, emitted_cm3, zones=zones, **chosen)
+
+
+def volume_by_gun(guns: Sequence[str], surface: Surface, film: CommonFilm) -> dict[str, float]:
+    """Solids that each gun laid on the part, by its name [cm3]."""
+    return dict(zip(guns, film.laid_cm3(surface.vertex_areas_m2).tolist(), strict=True))
+
+
+def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
+    """Each gun's share of the paint on the part, 0 to 1; 0 for all without paint."""
+    total = sum(laid_cm3.values())
+    return {gun: laid / total if total else 0.0 for gun, laid in laid_cm3.items()}
 
 
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
@@ -174,28 +199,24 @@ class FilmDisplay:
             self._legend.publish(legend(self._scale, 'µm', node.surface, at.frame_id))
 
     def _publish_large(self, film: CommonFilm, at: Header) -> None:
-        film_um, surface, values = self._film_um, self._node.surface, self._node.values
-
-        def mesh() -> bytes:
-            if self._mesh is None:
-                self._mesh = ColouredMesh(
-                    surface.vertices_m, surface.faces, at.frame_id, 'thickness'
-                )
-            rows = self._scale.rows(film_um, film_um > values['painted_above_um'])
-            stamp_ns = self._node.film.newest_ns or 0
-            return self._mesh.serialise(stamp_ns, self._scale.palette, rows)
-
-        large: dict[str, Callable[[], Any]] = {
+        film_um, surface = self._film_um, self._node.surface
+        make: dict[str, Callable[[], Any]] = {
+            'thickness/mesh': lambda: self._mesh_message(at.frame_id),
             'thickness/cloud': lambda: cloud_message(surface, film_um, at),
             'thickness/field': lambda: field_message(surface, film_um, at),
-        } | {
-            topic: lambda gun=gun: field_message(surface, film.shares_um[gun], at)
-            for gun, topic in enumerate(self._share_topics)
         }
-        if values['publish_mesh']:
-            large['thickness/mesh'] = mesh
-        for topic, make in large.items():
-            self._large[topic].publish_if_wanted(self._version, make)
+        for gun, topic in enumerate(self._share_topics):
+            make[topic] = partial(lambda k: field_message(surface, film.shares_um[k], at), gun)
+        for topic, message in make.items():
+            self._large[topic].publish_if_wanted(self._version, message)
+
+    def _mesh_message(self, frame_id: str) -> bytes:
+        surface = self._node.surface
+        if self._mesh is None:
+            self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'thickness')
+        is_painted = self._film_um > self._node.values['painted_above_um']
+        rows = self._scale.rows(self._film_um, is_painted)
+        return self._mesh.serialise(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
     def _publish_stats(self) -> None:
         """Publish the statistics if the film or a count has changed."""

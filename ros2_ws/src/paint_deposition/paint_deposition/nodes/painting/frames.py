@@ -2,7 +2,7 @@
 
 import contextlib
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -94,16 +94,8 @@ class PartFrame:
         pose, frame_id = pose_of(message.pose), message.header.frame_id
         if is_frame(frame_id, self.frame_id):
             return pose
-        return self.lookup_transform(frame_id, stamp_ns(message.header)).applied(*pose)
-
-    def lookup_transform(self, frame_id: str, at_ns: int) -> Rigid:
-        """The transform from another frame into the part's at that time.
-
-        Raises:
-            NoTransform: there is none, or none yet.
-        """
         try:
-            return self._tree.lookup(frame_id, self.frame_id, at_ns)
+            into_part = self._tree.lookup(frame_id, self.frame_id, stamp_ns(message.header))
         except NoTransform as missing:
             is_connected = self._tree.moving_between(frame_id, self.frame_id) is not None
             remedy = 'set part_pose and part_parent_frame, or frame_id'
@@ -111,48 +103,34 @@ class PartFrame:
                 remedy = 'publish tf without gaps and by the clock of the poses'
             may_come = missing.may_come and bool(self.tf_topics)
             raise NoTransform(f'{missing}; {remedy}', may_come) from None
+        return into_part.applied(*pose)
 
 
-class TfQueue:
-    """Poses that wait, in order, for their transform; as tf2's MessageFilter does.
+# Poses that wait, in order, for their transform, and since when [monotonic s].
+TfQueue = deque[tuple[float, PoseStamped]]
+Place = tuple[np.ndarray, np.ndarray]
 
-    A pose without a transform delays all behind it. It is rejected if the transform cannot come
-    any more, after `TF_TIMEOUT_S`, or if more than `MAX_WAITING` poses wait. Times are
-    monotonic seconds.
 
-    Args:
-        transform: transforms a pose and passes it on, or raises NoTransform.
-        reject: called with the poses that are rejected, and why.
+def placed_in_order(
+    waiting: TfQueue, place: Callable[[PoseStamped], Place], now_s: float
+) -> Iterator[tuple[PoseStamped, Place | NoTransform]]:
+    """Take poses from a queue, the oldest first, until one has to wait for its transform.
+
+    As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot come
+    any more, after `TF_TIMEOUT_S`, or if more than `MAX_WAITING` poses wait.
+
+    Yields:
+        Each pose, and its place or why it has none.
     """
-
-    def __init__(
-        self,
-        transform: Callable[[PoseStamped], None],
-        reject: Callable[[PoseStamped, NoTransform], None],
-    ) -> None:
-        self._transform, self._reject = transform, reject
-        self._waiting: deque[tuple[float, PoseStamped]] = deque()
-
-    def __len__(self) -> int:
-        return len(self._waiting)
-
-    def add(self, pose: PoseStamped, now_s: float) -> None:
-        """Queue a pose received now, and process the queue."""
-        self._waiting.append((now_s, pose))
-        self.process(now_s)
-
-    def process(self, now_s: float) -> None:
-        """Transform poses, from the oldest on, until one has to wait."""
-        while self._waiting:
-            since_s, pose = self._waiting[0]
-            try:
-                self._transform(pose)
-            except NoTransform as missing:
-                in_time = now_s - since_s < TF_TIMEOUT_S and len(self._waiting) <= MAX_WAITING
-                if missing.may_come and in_time:
-                    return
-                self._reject(pose, missing)
-            self._waiting.popleft()
-
-    def clear(self) -> None:
-        self._waiting.clear()
+    while waiting:
+        since_s, pose = waiting[0]
+        placed: Place | NoTransform
+        try:
+            placed = place(pose)
+        except NoTransform as missing:
+            in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= MAX_WAITING
+            if missing.may_come and in_time:
+                return
+            placed = missing
+        waiting.popleft()
+        yield pose, placed

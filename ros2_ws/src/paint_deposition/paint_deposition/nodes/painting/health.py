@@ -1,6 +1,5 @@
 """The diagnostics of the nodes that paint, and whether their film can be trusted."""
 
-import functools
 import math
 import time
 from collections.abc import Callable, Mapping
@@ -26,71 +25,102 @@ from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, gun_topic, nod
 # Without poses for so long, a gun that sprays is reported.
 SILENT_S = 2.0
 NO_BRUSH = 'no state names one of the brushes yet: nothing is painted'
-# Labels of the counts of poses and states.
-COUNT_LABELS = {
-    'gaps': 'gaps',
-    'restarts': 'restarts of the stream',
-    'repeated_stamps': 'repeated stamps',
-    'repeated_samples': 'repeated samples',
-    'backward_stamps': 'backward stamps',
-    'not_finite': 'poses that are not finite',
-    'not_unit_quaternions': 'quaternions not of unit length',
-    'late_triggers': 'late states',
+# What a count of poses and states is called, and whether the film lacks something because of it.
+COUNTS = {
+    'gaps': ('gaps', False),
+    'restarts': ('restarts of the stream', False),
+    'repeated_stamps': ('repeated stamps', False),
+    'repeated_samples': ('repeated samples', False),
+    'backward_stamps': ('backward stamps', True),
+    'not_finite': ('poses that are not finite', True),
+    'not_unit_quaternions': ('quaternions not of unit length', True),
+    'late_triggers': ('late states', True),
 }
+LOST, REFUSED = 'messages lost by the middleware', 'poses refused for their frame'
+UNPAINTED = 'poses not painted while inactive'
+DOUBTFUL = {name for name, lacks in COUNTS.values() if lacks} | {
+    LOST, REFUSED, UNPAINTED, STATES_REFUSED,
+}  # fmt: skip
+
+
+def painting_tasks(
+    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
+) -> dict[str, Callable[[], Status]]:
+    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
+    poses = {
+        gun_topic(source.name, 'poses'): partial(poses_status, node, number)
+        for number, source in enumerate(node.inputs)
+    }
+    return {**poses, 'film': lambda: film_status(node, film_values())}
+
+
+def what_was_wrong(source: AtomizerInput, film: LiveFilm) -> dict[str, int]:
+    """How often something was wrong with a gun's poses and states since the last reset."""
+    return {
+        **{words: getattr(film.counts, name) for name, (words, _) in COUNTS.items()},
+        'steps faster than a robot': source.jumps.count,
+        **source.anomalies,
+        LOST: source.messages_lost,
+        REFUSED: source.poses_refused,
+    }
 
 
 def poses_status(node: PaintingNode, number: int) -> Status:
     """The status of a gun's poses and states since the last reset."""
     source, film = node.inputs[number], node.film.guns[number]
     counts, rhythm_ns = film.counts, source.intervals.typical_ns
-    counted = {words: getattr(counts, name) for name, words in COUNT_LABELS.items()}
-    counted |= {
-        'steps faster than a robot': source.jumps.count, **source.anomalies,
-        'messages lost by the middleware': source.messages_lost,
-    }  # fmt: skip
-    programmed = source.programmed_m_per_s
-    gun = _gun_text(film)
+    programmed, wrong = source.programmed_m_per_s, what_was_wrong(source, film)
+    gun = 'off'
+    if film.flow is None:
+        gun = NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
+    elif film.flow:
+        gun = f'spraying, flow {film.flow:g}' + (f', brush {film.brush}' if film.brush else '')
     values: dict[str, object] = {
         'poses taken': counts.received,
         'poses refused': counts.rejected + source.poses_refused,
-        **counted,
+        **wrong,
         'longest interval [s]': f'{source.intervals.longest_ns * 1e-9:.3f}',
         'intervals over 1.5 times the usual one': source.intervals.long,
         'usual rate [Hz]': f'{1e9 / rhythm_ns:.1f}' if rhythm_ns else 'unknown',
         'speed [m/s]': f'{source.speed.m_per_s:.3f}',
         'programmed speed [m/s]': f'{programmed:.3f}' if programmed > 0.0 else 'unknown',
         'fastest step [m/s]': f'{source.jumps.fastest_m_per_s:.1f}',
-        'poses not painted while inactive': source.unpainted,
+        UNPAINTED: source.unpainted,
         'poses in the tf queue': len(source.tf_queue),
         'gun': gun,
     }
-    if not node.active and source.unpainted:
-        words = f'inactive: {source.unpainted} poses came and were not painted'
-        return Status(WARN, words, values)
     if not node.active:
+        if source.unpainted:
+            words = f'inactive: {source.unpainted} poses came and were not painted'
+            return Status(WARN, words, values)
         return Status(OK, 'inactive', values)
     if another := _state_of_another_type(node, source.name):
         node.get_logger().error(another, once=True)
         return Status(ERROR, another, values)
-    now_s = time.monotonic()
-    if source.refused_frames and now_s - source.refused_s < 5.0:
+    if source.refused_frames and time.monotonic() - source.refused_s < 5.0:
         frames = ', '.join(f"'{frame}'" for frame in source.refused_frames)
         words = (
             f'{source.poses_refused} poses refused: they are in frame {frames}, the mesh is in '
             f"'{node.frame.frame_id}' and {source.refusal}"
         )
         return Status(ERROR, words, values)
-    wrong = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
-    silent_s = now_s - source.pose_s
-    if source.spraying and silent_s > SILENT_S:
-        since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
-        wrong.append(f'the gun sprays, and no pose has come {since}')
-    counted['poses refused for their frame'] = source.poses_refused
-    wrong += [f'{count} {words}' for words, count in counted.items() if count]
-    wrong += sorted(source.state_errors)
-    if wrong:
-        return Status(WARN, ', '.join(wrong), values)
-    return Status(OK, 'waiting for poses' if silent_s > SILENT_S else 'painting', values)
+    warnings = [NO_BRUSH] if gun == NO_BRUSH and counts.received else []
+    warnings += sprays_without_poses(source)
+    warnings += [f'{count} {words}' for words, count in wrong.items() if count]
+    warnings += sorted(source.state_errors)
+    if warnings:
+        return Status(WARN, ', '.join(warnings), values)
+    is_silent = time.monotonic() - source.pose_s > SILENT_S
+    return Status(OK, 'waiting for poses' if is_silent else 'painting', values)
+
+
+def sprays_without_poses(source: AtomizerInput) -> list[str]:
+    """That a gun sprays and no pose comes, if that is so."""
+    silent_s = time.monotonic() - source.pose_s
+    if not source.spraying or silent_s <= SILENT_S:
+        return []
+    since = f'for {silent_s:.0f} s' if math.isfinite(silent_s) else 'since the start'
+    return [f'the gun sprays, and no pose has come {since}']
 
 
 def _state_of_another_type(node: PaintingNode, gun: str) -> str:
@@ -107,8 +137,7 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """The status of part, model and computing time."""
-    guns = node.film.guns
-    factor = node.real_time_factor
+    guns, factor = node.film.guns, node.real_time_factor
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
@@ -134,24 +163,6 @@ def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status
     return Status(OK, 'preparing a changed model' if node.repainting else 'up to date', values)
 
 
-def _gun_text(film: LiveFilm) -> str:
-    if film.flow is None:
-        return NO_BRUSH if len(film.model.brushes) > 1 else 'no state seen: always spraying'
-    of_brush = f', brush {film.brush}' if film.brush else ''
-    return f'spraying, flow {film.flow:g}{of_brush}' if film.flow else 'off'
-
-
-def painting_tasks(
-    node: PaintingNode, film_values: Callable[[], Mapping[str, object]] = dict
-) -> dict[str, Callable[[], Status]]:
-    """The diagnostic tasks by name; `film_values` returns further values for the film's."""
-    poses = {
-        gun_topic(source.name, 'poses'): functools.partial(poses_status, node, number)
-        for number, source in enumerate(node.inputs)
-    }
-    return {**poses, 'film': lambda: film_status(node, film_values())}
-
-
 class FilmTrust:
     """Publishes `thickness/trust`, latched and twice a second: the level and the reasons.
 
@@ -174,47 +185,32 @@ class FilmTrust:
 
     def publish(self) -> None:
         """Publish the status of the film as it is now."""
-        doubts = [doubt for number in range(len(self._node.inputs)) for doubt in self._of(number)]
-        if self._node.model_problem:
-            doubts.append(self._node.model_problem)
+        node, doubts = self._node, []
+        for source, film in zip(node.inputs, node.film.guns, strict=True):
+            wrong = what_was_wrong(source, film) | {UNPAINTED: source.unpainted}
+            found = [f'{n} {words}' for words, n in wrong.items() if n and words in DOUBTFUL]
+            found += sprays_without_poses(source) + self._behind(source)
+            doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
+        if node.model_problem:
+            doubts.append(node.model_problem)
         self._publisher.publish(
             DiagnosticStatus(
                 level=WARN if doubts else OK, name=topics.TRUST_TOPIC,
                 message='; '.join(doubts) or 'all that was sent is in the film',
-                hardware_id=self._node.get_fully_qualified_name(),
+                hardware_id=node.get_fully_qualified_name(),
             )
         )  # fmt: skip
 
-    def _of(self, number: int) -> list[str]:
-        """What is doubtful of a gun's share since the last reset."""
-        source, counts = self._node.inputs[number], self._node.film.guns[number].counts
-        counted = {
-            'messages lost': source.messages_lost,
-            'poses refused': source.poses_refused,
-            'poses that are none': counts.not_finite + counts.not_unit_quaternions,
-            'poses that came behind others': counts.backward_stamps,
-            'late states': counts.late_triggers,
-            STATES_REFUSED: source.anomalies[STATES_REFUSED],
-            'poses not painted while inactive': source.unpainted,
-        }
-        doubts = [f'{count} {what}' for what, count in counted.items() if count]
-        silent_s = time.monotonic() - source.pose_s
-        if source.spraying and silent_s > SILENT_S:
-            doubts.append(f'the gun sprays, and no pose has come for {silent_s:.0f} s')
-        doubts += self._behind(source)
-        return [f'{source.name}: {doubt}' if source.name else doubt for doubt in doubts]
-
     def _behind(self, source: AtomizerInput) -> list[str]:
         """Who is behind with the poses of a gun."""
-        reports = {name: it for (gun, name), it in self._reports.items() if gun == source.name}
-        if not reports:
-            return []
         topic = self._node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
-        there = {node_name(info) for info in self._node.get_publishers_info_by_topic(topic)}
+        present = {node_name(info) for info in self._node.get_publishers_info_by_topic(topic)}
         doubts = []
-        for name, (newest_ns, heard_s) in reports.items():
-            if name not in there:  # it has ended
-                del self._reports[source.name, name]
+        for (gun, name), (newest_ns, heard_s) in tuple(self._reports.items()):
+            if gun != source.name:
+                continue
+            if name not in present:  # it has ended
+                del self._reports[gun, name]
             elif time.monotonic() - heard_s > 3.0:
                 doubts.append(f'{name} has stalled')
             elif source.newest_ns - newest_ns > 2_000_000_000:

@@ -3,7 +3,8 @@
 import time
 from abc import ABC, abstractmethod
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,8 +12,11 @@ import numpy as np
 from rclpy.timer import Timer
 
 from paint_deposition.effects.catalogue import read_effect_file, try_effect
+from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
+from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
+from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
@@ -21,12 +25,11 @@ from paint_deposition.nodes.painting.painting_parameters import (
     PreparedPart,
     models_from_parameters,
     read_part,
-    unpainted_films,
-    warm_up,
-    zones_on,
 )
 from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
+from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
@@ -50,9 +53,9 @@ class PaintingNode(ManagedNode, ABC):
         model_problem: why the models that were set last are not in use, '' if they are.
     """
 
+    PRECISION = 'single'
     repainting: Repainting | None = None
     model_problem = ''
-    _notes_logged = 0
     _shown: CommonFilm | None = None
 
     def _configure(self) -> None:
@@ -87,34 +90,65 @@ class PaintingNode(ManagedNode, ABC):
         self._times_s: list[deque[tuple[float, float]]] = [
             deque(maxlen=100) for _ in self.gun_names
         ]
-        self.model_problem, self._notes_logged = '', 0
+        self.model_problem = ''
+        self._noted: set[str] = set()
         self.frame = PartFrame(self, self.values['frame_id'])
         self._set_part_pose()
         self.models = models_from_parameters(self.values)
         self._read_part()
-        self._set_surface(read_part(self.values, self.mesh_file))
-        self.zones = zones_on(self.values, self.mesh_file, self.surface)
-        self._outward_side = OutwardSide(len(self.gun_names))
-        self.film = unpainted_films(self.surface, self.points, self.models, self.values)
         self.get_logger().info('getting ready; a new model is compiled first')
-        warm_up(self.surface, self.film)
+        self._take_part(self.prepare(self.mesh_file))
 
     # --- for the subclass
 
     @abstractmethod
-    def _points_on(self, surface: Surface) -> SurfacePoints:
-        """The points of the part to paint."""
+    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
+        """The points of the part to paint, and its surface with the side outward that they need.
+
+        Raises:
+            PaintError: they are not on the surface.
+        """
 
     def _read_part(self) -> None:
         """Read what ``_points_on`` needs; called before the mesh is read."""
 
-    def _set_surface(self, surface: Surface) -> None:
-        """Set the part, at the start and when it is turned inside out."""
-        self.surface = surface
-        self.points = self._points_on(surface)
-        for note in surface.notes[self._notes_logged :]:
-            self.get_logger().warning(note)
-        self._notes_logged = len(surface.notes)
+    def prepare(self, mesh_file: str) -> PreparedPart:
+        """The part of a mesh, ready to be painted; a large one takes a second, in any thread.
+
+        Raises:
+            PaintError: mesh or zones cannot be read, or a zone has no vertex of the part.
+        """
+        values, zones = self.values, None
+        surface, points = self._points_on(read_part(values, mesh_file))
+        if values.get('zones_file'):
+            zones = read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
+        film = self._unpainted(surface, points, self.models)
+        film.warm_up()
+        facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for a gun's rays
+        return PreparedPart(surface, points, film, zones)
+
+    def _unpainted(
+        self, surface: Surface, points: SurfacePoints, models: Iterable[DepositionModel]
+    ) -> LiveFilms:
+        """An unpainted film for the model of each gun."""
+        named = ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')
+        options: dict[str, Any] = {name: self.values[name] for name in named}
+        options |= {'precision': self.PRECISION, 'occluder': surface.occluder}
+        return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
+
+    def _take_part(self, part: PreparedPart) -> None:
+        """Paint this part from now on."""
+        self.surface, self.points, self.zones = part.surface, part.points, part.zones
+        self.film, self._shown = part.film, None
+        self._outward_side = OutwardSide(len(self.gun_names))
+        self._surface_changed()
+
+    def _surface_changed(self) -> None:
+        """Follow another surface, or the same turned inside out; its notes are said once."""
+        for note in self.surface.notes:
+            if note not in self._noted:
+                self.get_logger().warning(note)
+        self._noted |= {*self.surface.notes}
 
     @abstractmethod
     def publish(self) -> None:
@@ -125,7 +159,13 @@ class PaintingNode(ManagedNode, ABC):
     def _add_poses(self, gun: int, batch: PoseBatch) -> None:
         """Paint poses of a gun, given by its number, if the node is active."""
         if not self.active:
-            self.inputs[gun].count_unpainted(len(batch))
+            source = self.inputs[gun]
+            if not source.unpainted:
+                topic = gun_topic(source.name, 'atomizer/pose')
+                self.get_logger().warning(
+                    f'{topic}: poses arrive and are not painted: the node is inactive'
+                )
+            source.unpainted += len(batch)
             return
         began_s = time.monotonic()
         self.film.guns[gun].add_poses(batch)
@@ -164,17 +204,14 @@ class PaintingNode(ManagedNode, ABC):
         """
         film = part.film
         if any(new.model != now for new, now in zip(film.guns, self.models, strict=True)):
-            film = unpainted_films(part.surface, part.points, self.models, self.values)
+            film = self._unpainted(part.surface, part.points, self.models)
         for new, old in zip(film.guns, self.film.guns, strict=True):
-            new.max_pose_gap_s = self.values['max_pose_gap_s']
             new.trigger_latency_s = self.values['trigger_latency_s']
             new.reset_keeping_trigger_of(old)
         for source in self.inputs:
             source.reset_counts()
-        self.mesh_file, self.surface, self.points = mesh_file, part.surface, part.points
-        self.zones, self.film, self._shown = part.zones, film, None
-        self._notes_logged = len(part.surface.notes)
-        self._outward_side = OutwardSide(len(self.gun_names))
+        self.mesh_file = mesh_file
+        self._take_part(replace(part, film=film))
         if self.repainting is not None:
             self._repaint()
 
@@ -203,12 +240,6 @@ class PaintingNode(ManagedNode, ABC):
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
 
     def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'max_pose_gap_s' in names and not self.film.complete:
-            memory = f'pose_memory ({self.values["pose_memory"]} poses)'
-            raise PaintError(
-                f'max_pose_gap_s: the motion is longer than {memory} and cannot be painted again; '
-                'reset first'
-            )
         if names & MODEL_PARAMETERS:
             # Effect files are tested in the thread that repaints, so that poses do not wait.
             self._next_models = models_from_parameters(values, read_effect_file)
@@ -221,8 +252,7 @@ class PaintingNode(ManagedNode, ABC):
                 gun.trigger_latency_s = self.values['trigger_latency_s']
         if names & MODEL_PARAMETERS:
             self.models = self._next_models
-        if names & {*MODEL_PARAMETERS, 'max_pose_gap_s'}:
-            self._repaint(from_start=self.values['repaint'] or 'max_pose_gap_s' in names)
+            self._repaint(from_start=self.values['repaint'])
         if 'publish_rate_hz' in names:
             self.destroy_timer(self.show_timer)
             self.show_timer = self._new_show_timer()
@@ -243,7 +273,7 @@ class PaintingNode(ManagedNode, ABC):
             for effect in (effect for model in models for effect in model.effects):
                 if effect.file is not None:
                     try_effect(type(effect), effect.file)
-            return unpainted_films(surface, points, models, self.values)
+            return self._unpainted(surface, points, models)
 
         self.repainting = Repainting(self.film, make, from_start)
 
@@ -257,13 +287,24 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None and self.repainting.done:
             self._adopt_repainted(self.repainting)
         oriented = self._outward_side.orient(self.surface, self.film.guns)
-        if oriented is not self.surface:
-            try:
-                self._turn_inside_out(oriented)
-            except PaintError as error:  # readings that were taken on its other side, say
-                self._outward_side = OutwardSide(0)
-                self.model_problem = f'the gun paints the other side of the part: {error}'
-                self.get_logger().error(self.model_problem)
+        if oriented is self.surface:
+            return
+        try:
+            self.surface, self.points = self._points_on(oriented)
+        except PaintError as error:  # readings that were taken on its other side, say
+            self._outward_side = OutwardSide(0)
+            self.model_problem = f'the gun paints the other side of the part: {error}'
+            self.get_logger().error(self.model_problem)
+            return
+        # The motion so far is painted again, with the other side outward.
+        models = [gun.model for gun in self.film.guns]
+        turned = self._unpainted(self.surface, self.points, models)
+        for new, old in zip(turned.guns, self.film.guns, strict=True):
+            new.replay(old.log.events())
+        self.film = turned
+        self._surface_changed()
+        if self.repainting is not None:
+            self._repaint()
 
     def _adopt_repainted(self, repainting: Repainting) -> None:
         self.repainting = None
@@ -279,14 +320,3 @@ class PaintingNode(ManagedNode, ABC):
             self._repaint()
         else:
             self.film = film
-
-    def _turn_inside_out(self, surface: Surface) -> None:
-        """Repaint the motion so far on the part with its other side outward."""
-        self._set_surface(surface)
-        models = [gun.model for gun in self.film.guns]
-        turned = unpainted_films(self.surface, self.points, models, self.values)
-        for new, old in zip(turned.guns, self.film.guns, strict=True):
-            new.replay(old.log.events())
-        self.film = turned
-        if self.repainting is not None:
-            self._repaint()

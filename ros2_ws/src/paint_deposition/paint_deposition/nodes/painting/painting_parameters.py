@@ -1,6 +1,6 @@
 """The parameters that nodes with a film share, and the models, parts and films built from them."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,27 +13,23 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import LoadEffect, read_model
-from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import LiveFilms, require_same_film_effects
-from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
-    ParameterTable,
     atomizers_parameter,
     direction_parameter,
     fixed_while_configured,
     mesh_parameters,
 )
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 
 
-def model_parameters(use: str) -> ParameterTable:
+def model_parameters(use: str) -> dict[str, NodeParameter]:
     """The rows `model_file` and `allow_user_effects`; `use` completes "Setting it reads it"."""
     return {
         'model_file': NodeParameter(
@@ -72,12 +68,6 @@ PAINTING = dict(
     part_parent_frame=NodeParameter(
         '', 'Frame that part_pose is given in; poses in it are transformed [name]'
     ),
-    max_pose_gap_s=NodeParameter(
-        0.25,
-        'A longer interval between pose stamps is gun off; a change paints the motion so far '
-        'again [s]',
-        (0.001, 60.0),
-    ),
     trigger_latency_s=NodeParameter(
         0.1,
         'How late a state may arrive, by the stamps of the poses, and still switch the gun at its '
@@ -86,6 +76,9 @@ PAINTING = dict(
     ),
     **fixed_while_configured(
         'the subscriptions and the pose memory are made with it; clean the node up or restart it',
+        max_pose_gap_s=NodeParameter(
+            0.25, 'A longer interval between pose stamps is gun off [s]', (0.001, 60.0)
+        ),
         atomizers=atomizers_parameter('that paint this part'),
         pose_queue_depth=NodeParameter(
             5000,
@@ -124,11 +117,16 @@ def model_from_parameters(
     Raises:
         ModelError: the model is invalid, or names an effect file without `allow_user_effects`.
     """
+
+    def refuse(path: Path) -> type[Effect]:
+        raise ModelError(
+            f'effect file {path} is not run, because it is Python code; if you trust it, start '
+            'the node with allow_user_effects:=true'
+        )
+
     if not values['model_file']:
         return DepositionModel()
-    return read_model(
-        values['model_file'], load if values['allow_user_effects'] else _refuse_effect_file
-    )
+    return read_model(values['model_file'], load if values['allow_user_effects'] else refuse)
 
 
 def models_from_parameters(
@@ -153,13 +151,6 @@ def models_from_parameters(
     return models
 
 
-def _refuse_effect_file(path: Path) -> type[Effect]:
-    raise ModelError(
-        f'effect file {path} is not run, because it is Python code; if you trust it, start the '
-        'node with allow_user_effects:=true'
-    )
-
-
 @dataclass(frozen=True)
 class PreparedPart:
     """A part ready to be painted: its refined surface, points on it, unpainted film, and zones."""
@@ -167,7 +158,7 @@ class PreparedPart:
     surface: Surface
     points: SurfacePoints
     film: LiveFilms
-    zones: PointZones | None = None
+    zones: PointZones | None
 
 
 def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
@@ -180,35 +171,3 @@ def read_part(values: Mapping[str, Any], mesh_file: str) -> Surface:
         raise PaintError("mesh_file is empty: give the part's mesh")
     down = np.array(values['down']) if values['down'] else None
     return read_mesh(mesh_file, values['mesh_scale'], values['max_edge_length_m'], down)
-
-
-def zones_on(values: Mapping[str, Any], mesh_file: str, surface: Surface) -> PointZones | None:
-    """The zones of a part's vertices by a node's parameters, if they name any.
-
-    Raises:
-        PaintError: the zones cannot be read, or one has no vertex of the part.
-    """
-    if not values.get('zones_file'):
-        return None
-    return read_zones(values['zones_file'], mesh_file, values['mesh_scale']).on(surface)
-
-
-def unpainted_films(
-    surface: Surface,
-    points: SurfacePoints,
-    models: Iterable[DepositionModel],
-    values: Mapping[str, Any],
-) -> LiveFilms:
-    """An unpainted film for the model of each gun, by a node's parameters."""
-    options: dict[str, Any] = {
-        'precision': values.get('precision', 'double'),
-        'occluder': surface.occluder,
-        **{n: values[n] for n in ('max_pose_gap_s', 'trigger_latency_s', 'pose_memory')},
-    }
-    return LiveFilms(tuple(LiveFilm(points, model, **options) for model in models))
-
-
-def warm_up(surface: Surface, film: LiveFilms) -> None:
-    """Compile and compute what painting needs; a large part takes a second."""
-    film.warm_up()
-    facing(surface, np.zeros((1, 3)), np.eye(3)[2:])  # builds the tree for rays along a gun's axis

@@ -1,5 +1,7 @@
 """Changing the part in the cell: the film is saved, and a new film and a new run begin."""
 
+from __future__ import annotations
+
 import os
 import threading
 import time
@@ -7,6 +9,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from datetime import datetime, timezone
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from paint_msgs.msg import Part
 from paint_msgs.srv import ChangePart
@@ -15,26 +18,14 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.film.live_film import without_refused_states
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange, events_of
-from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.nodes.painting.film_files import (
-    film_writer,
-    read_recorded_part,
-)
-from paint_deposition.nodes.painting.painting_node import PaintingNode
-from paint_deposition.nodes.painting.painting_parameters import (
-    PreparedPart,
-    read_part,
-    unpainted_films,
-    warm_up,
-    zones_on,
-)
+from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header
-from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, real_path
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
+
+if TYPE_CHECKING:
+    from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
 # A change that takes longer delays the first poses on the part, and is reported.
 LATE_S = 0.05
@@ -69,7 +60,7 @@ class PartChange:
 
     def __init__(
         self,
-        node: PaintingNode,
+        node: DepositionSimulator,
         version: Version,
         saving: ThreadPoolExecutor,
         group: CallbackGroup,
@@ -155,41 +146,11 @@ class PartChange:
         began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
-        unplaced = ''
         self.waiting = True
         try:
             notes += await self._receive_all(following.last_sent_ns)
-            since_ns = self._newest_ns()
-            version = mesh_version(following.mesh_file)
-            ready = None
-            if not request.coat:
-                read = self._prepared(version)
-                ready = read.result() if read.done() else await node.result_of(read)
-            motions, told = None, None
-            if request.resume:
-                motions, told = await self._recorded(request.resume)
-            # What was painted since a crash is of the part that is resumed, and saved with it.
-            is_resumed = motions is not None and not self.part.serial
-            if node.film.counts.received and not is_resumed:
-                self._unsaved.append(self._film_writer())
-            if ready is not None:
-                log = [[*gun.log.events()] if is_resumed else [] for gun in node.film.guns]
-                node.change_part(version[0], ready)
-                self._version = version
-                if motions is not None:
-                    notes.append(self._resume(motions, log))
-            if told is not None and told.run == following.run:
-                following = told  # as it was announced: its recorder goes on with its run
-                since_ns = stamp_ns(told.header)
-            self.part, self._since = following, datetime.now(timezone.utc)
-            self._run, self._resets = following.run, 0
-            self._publish(since_ns, request.part_pose)
-            # After the part, so that a recorder knows whose pose it is.
-            if len(request.part_pose):
-                kind, pose = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
-                placed = node.set_parameters_atomically([Parameter('part_pose', kind, pose)])
-                if not placed.successful:
-                    unplaced = f'it stands where the part before did: {placed.reason}'
+            await self._begin(following, request)
+            unplaced = self._place(request.part_pose)
         finally:
             self.waiting = False
             node.release()
@@ -199,10 +160,45 @@ class PartChange:
             saved = await node.result_of(self._saving.submit(self._save_films))
             response.paths = [str(path) for path in saved]
             notes.append(f'wrote {", ".join(response.paths)}' if saved else '')
+        called = following.serial + (f' ({following.type})' if following.type else '')
+        done = f'coat {following.coat} on {called}: on top of the film so far'
+        if not request.coat:
+            ready = f'bare metal, ready after {self._gap_s * 1e3:.0f} ms'
+            done = f'{called} on {following.mesh_file}: {ready}'
         notes += [self._save_error, unplaced]
-        response.message = '; '.join(filter(None, [self._sentence(), *notes]))
+        response.message = '; '.join(filter(None, [done, *notes]))
         node.get_logger().info(response.message)
         return unplaced
+
+    async def _begin(self, following: Part, request: ChangePart.Request) -> None:
+        """Begin on the part that follows, or on another coat."""
+        node, since_ns = self._node, self._newest_ns()
+        version, part = mesh_version(following.mesh_file), None
+        if not request.coat:
+            read = self._prepared(version)
+            part = read.result() if read.done() else await node.result_of(read)
+        if node.film.counts.received:
+            self._unsaved.append(self._film_writer())
+        if part is not None:
+            node.change_part(version[0], part)
+            self._version = version
+        self.part, self._since = following, datetime.now(timezone.utc)
+        self._run, self._resets = following.run, 0
+        self._publish(since_ns, request.part_pose)
+
+    def _place(self, part_pose: Sequence[float]) -> str:
+        """Say where the part stands, after the part: a recorder then knows whose pose it is.
+
+        Returns:
+            Why it stands where the part before did, if it does.
+        """
+        if not len(part_pose):
+            return ''
+        pose = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, list(part_pose))
+        placed = self._node.set_parameters_atomically([pose])
+        return '' if placed.successful else (
+            f'it stands where the part before did: {placed.reason}'
+        )  # fmt: skip
 
     async def _receive_all(self, last_sent_ns: int) -> list[str]:
         """Paint what was sent until then, and keep what was sent later.
@@ -234,8 +230,6 @@ class PartChange:
             PaintError: the request is inconsistent, or the run already exists.
         """
         require_file_name('serial', request.serial)
-        if request.resume and (request.coat or not request.serial):
-            raise PaintError('resume: give the serial number of the part, and its first coat')
         pose = list(request.part_pose)
         self._node.PARAMETERS['part_pose'].checked('part_pose', pose)
         if pose and not self._node.values['part_parent_frame']:
@@ -262,49 +256,17 @@ class PartChange:
                 'coat on it, or give the serial number of the next part'
             )
         folder = self._folder(following.run)
-        if folder.exists() and not request.resume:
+        if folder.exists():
             raise PaintError(
                 f'{folder} already exists: a part has one run for each coat, and none is '
                 'overwritten; give another serial, or move the folder away'
             )
-        # Runs beside that of the part may be read, too.
-        run = real_path(request.resume)
-        if request.resume and run.parent != folder.parent.resolve():
-            self._node.require_named_folder(request.resume)
         return following
 
-    async def _recorded(self, path: str) -> tuple[list[Trajectory], Part | None]:
-        """What a run holds of the part so far, once all that was received is in its file."""
-        # What a recorder took before is on its disk.
-        await self._settled(1.2)
-        names, frame_id = self._node.gun_names, self._node.frame.frame_id
-        return await self._node.result_of(
-            self._reading.submit(read_recorded_part, real_path(path), names, frame_id)
-        )
-
-    def _resume(
-        self, motions: list[Trajectory], log: list[list[TriggerChange | PoseBatch]]
-    ) -> str:
-        """Paint what a run holds, and what came since if it ends before that."""
-        node = self._node
-        for motion, film, source, later in zip(
-            motions, node.film.guns, node.inputs, log, strict=True
-        ):
-            film.forget_trigger()
-            film.replay(events_of(without_refused_states(motion, film.model)))
-            stamps = motion.stamps_ns
-            source.take_pending()  # a recorder may have taken them before
-            if not source.received_ns or source.received_ns in stamps:
-                source.drop_held(int(stamps[-1]) if len(stamps) else 0)
-            else:
-                film.replay(later)
-        poses = sum(map(len, motions))
-        return f'{poses} poses of its recording are painted'
-
-    async def _settled(self, duration_s: float = 0.03) -> None:
+    async def _settled(self) -> None:
         """Wait for messages that were sent before now."""
         settled: Future[None] = Future()
-        threading.Timer(duration_s, settled.set_result, [None]).start()
+        threading.Timer(0.03, settled.set_result, [None]).start()
         await self._node.result_of(settled)
 
     def begin_again(self) -> None:
@@ -330,21 +292,14 @@ class PartChange:
         newest_ns = max(source.newest_ns for source in self._node.inputs)
         return newest_ns or self._node.get_clock().now().nanoseconds
 
-    def _sentence(self) -> str:
-        part = self.part
-        called = part.serial + (f' ({part.type})' if part.type else '')
-        if part.coat > 1:
-            return f'coat {part.coat} on {called}: on top of the film so far'
-        gap_ms = self._gap_s * 1e3
-        return f'{called} on {part.mesh_file}: bare metal, ready after {gap_ms:.0f} ms'
-
     # --- parts, files and messages
 
     def _prepared(self, version: Version) -> Future[PreparedPart]:
         """The part of this mesh, which is read unless it is kept."""
         part = self._parts.pop(version, None)
         if part is None or (part.done() and part.exception()):
-            part = self._reading.submit(self._prepare, version[0])
+            self._node.require_named_folder(version[0])
+            part = self._reading.submit(self._node.prepare, version[0])
         self._parts[version] = part
         others = [kept for kept in self._parts if kept not in (version, self._version)]
         # A large one takes some 100 MB.
@@ -352,23 +307,13 @@ class PartChange:
             del self._parts[kept]
         return part
 
-    def _prepare(self, mesh_file: str) -> PreparedPart:
-        """Read the mesh and compile, in a thread of its own."""
-        node = self._node
-        node.require_named_folder(mesh_file)
-        surface = read_part(node.values, mesh_file)
-        points = surface.points()
-        film = unpainted_films(surface, points, node.models, node.values)
-        warm_up(surface, film)
-        return PreparedPart(surface, points, film, zones_on(node.values, mesh_file, surface))
-
     def _folder(self, run: str) -> Path:
         return Path(self._node.values['output_directory']).expanduser() / run
 
     def _film_writer(self) -> Callable[[], list[Path]]:
         part, node = self.part, self._node
         if not part.serial:
-            return film_writer(node, self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
+            return node.film_writer(self._folder(''), time.strftime('film_%Y%m%d_%H%M%S'))
         described = {
             **{name: getattr(part, name) for name in ('type', 'serial', 'coat', 'run')},
             'since': self._since.isoformat(timespec='milliseconds'),
@@ -376,7 +321,7 @@ class PartChange:
             'part_pose': list(node.values['part_pose'] or []),
             'gap_s': self._gap_s,
         }
-        return film_writer(node, self._folder(part.run), 'film', described)
+        return node.film_writer(self._folder(part.run), 'film', described)
 
     def _save_films(self) -> list[Path]:
         """Save the films that are not on disk, the oldest first, in the thread for that."""

@@ -22,7 +22,7 @@ class Repainting:
     """
 
     def __init__(
-        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool = True
+        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool
     ) -> None:
         self._logs = [gun.log for gun in current.guns]
         self._make = make

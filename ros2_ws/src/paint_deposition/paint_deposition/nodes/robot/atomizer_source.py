@@ -1,6 +1,7 @@
 """Node `atomizer_source`: poses and states of the gun from the topics of a robot driver."""
 
 import math
+import time
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
@@ -9,7 +10,7 @@ from typing import Any
 
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState
-from rclpy.qos import DurabilityPolicy, QoSProfile
+from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
@@ -21,8 +22,8 @@ from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.nodes.robot.robot_poses import (
     QUEUE_DEPTH,
+    SILENT_S,
     JointPoses,
-    PublishedPoses,
     TfPoses,
 )
 from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
@@ -44,55 +45,6 @@ TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
 
-SOURCE = fixed_while_running(
-    'the subscriptions are made with it when the node starts; restart the node',
-    urdf_file=NodeParameter(
-        '',
-        'The robot, URDF, whose joint states give the poses; empty: tf gives them, or without '
-        'base_link the robot publishes them itself [path]',
-    ),
-    tip_link=NodeParameter(
-        '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
-    ),
-    base_link=NodeParameter('', 'Link or frame of the poses; empty: the root of urdf_file [name]'),
-    joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
-    joint_prefix=NodeParameter(
-        '',
-        "What the joints' names have before those of urdf_file, or lack; empty: nothing [name]",
-    ),
-    angle_unit=NodeParameter(
-        '',
-        'Unit of joints that turn; empty: rad, unless they turn too far [name]',
-        choices=('', 'rad', 'deg'),
-    ),
-    tcp_offset=NodeParameter(
-        [],
-        'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link is '
-        'the TCP [m, -]',
-        constraints=f'{POSE_FORMAT}, or none',
-        allows=lambda value: not value or is_pose(value),
-        element=float,
-    ),
-    trigger=NodeParameter(
-        '',
-        f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
-    ),
-    flow=NodeParameter('', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'),
-    brush=NodeParameter(
-        '', f'Signal of the number of the brush: {SIGNAL}; empty: the only one [topic]'
-    ),
-    speed=NodeParameter(
-        '', f'Signal of the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
-    ),
-    speed_scale=NodeParameter(
-        1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
-    ),
-    calibrated_flow=NodeParameter(
-        1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
-    ),
-)
-
-
 class AtomizerSource(PaintNode):
     """Publishes `atomizer/pose` from a robot's joints or tf, and `atomizer/state` from signals.
 
@@ -101,7 +53,58 @@ class AtomizerSource(PaintNode):
     message, or at the time it was sent if there is none.
     """
 
-    PARAMETERS = SOURCE
+    PARAMETERS = fixed_while_running(
+        'the subscriptions are made with it when the node starts; restart the node',
+        urdf_file=NodeParameter(
+            '',
+            'The robot, URDF, whose joint states give the poses; empty: tf gives them, or without '
+            'base_link the robot publishes them itself [path]',
+        ),
+        tip_link=NodeParameter(
+            '', 'Link or frame that carries the bell; empty: tool0, else the last link [name]'
+        ),
+        base_link=NodeParameter(
+            '', 'Link or frame of the poses; empty: the root of urdf_file [name]'
+        ),
+        joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
+        joint_prefix=NodeParameter(
+            '',
+            "What the joints' names have before those of urdf_file, or lack; empty: nothing "
+            '[name]',
+        ),
+        angle_unit=NodeParameter(
+            '',
+            'Unit of joints that turn; empty: rad, unless they turn too far [name]',
+            choices=('', 'rad', 'deg'),
+        ),
+        tcp_offset=NodeParameter(
+            [],
+            'Pose of the TCP, z toward the part, in tip_link, x y z qx qy qz qw; empty: tip_link '
+            'is the TCP [m, -]',
+            constraints=f'{POSE_FORMAT}, or none',
+            allows=lambda value: not value or is_pose(value),
+            element=float,
+        ),
+        trigger=NodeParameter(
+            '',
+            f'Signal that opens the gun: {SIGNAL}; empty: no atomizer/state is published [topic]',
+        ),
+        flow=NodeParameter(
+            '', f'Signal of the flow: {SIGNAL}; empty: the calibrated flow [topic]'
+        ),
+        brush=NodeParameter(
+            '', f'Signal of the number of the brush: {SIGNAL}; empty: the only one [topic]'
+        ),
+        speed=NodeParameter(
+            '', f'Signal of the programmed speed of the TCP: {SIGNAL}; empty: nothing [topic]'
+        ),
+        speed_scale=NodeParameter(
+            1.0, 'm/s for one unit of that signal; 0.001 for mm/s [m/s]', (1e-9, 1e9)
+        ),
+        calibrated_flow=NodeParameter(
+            1.0, 'Value of that signal at the calibrated flow [its unit]', (1e-9, 1e9)
+        ),
+    )
 
     def __init__(self, **kwargs: Any):
         super().__init__('atomizer_source', **kwargs)
@@ -115,7 +118,8 @@ class AtomizerSource(PaintNode):
         self._values: dict[str, float] = {}
         self._published = ''
         self.poses_published = 0
-        self._clock_offset_s = 0.0
+        # Of the robot's poses: their frame, when the last came, and how late they are sent.
+        self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
         self._motion = self._create_motion()
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
@@ -151,28 +155,36 @@ class AtomizerSource(PaintNode):
 
     # --- poses
 
-    def _create_motion(self) -> JointPoses | TfPoses | PublishedPoses:
+    def _create_motion(self) -> JointPoses | TfPoses | None:
+        """What computes the poses; None beside a robot that publishes them itself."""
         values = self.values
         if self._robot is None and not values['base_link']:
-            return PublishedPoses(self, POSES, self._compare_clocks)
+            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+            return None
         depth = QoSProfile(depth=POSE_DEPTH)
         self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
         if self._robot is None:
             tip = values['tip_link'] or DEFAULT_TIP
-            return TfPoses(self, values['base_link'], tip, self._publish_pose)
-        joints = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
-        self._missing[values['joint_topic']] = joints.take
-        return joints
+            motion: JointPoses | TfPoses = TfPoses(
+                self, values['base_link'], tip, self._publish_pose
+            )
+        else:
+            motion = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
+            self._missing[values['joint_topic']] = motion.take
+        self._base = motion.base
+        return motion
 
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
-            self._compare_clocks(stamp, sent_ns)
-        pose = pose_message(self._motion.base, stamp, (tip @ self._tcp).values)
+            self._clock_offset_s = (sent_ns - stamp) * 1e-9
+        pose = pose_message(self._base, stamp, (tip @ self._tcp).values)
         self._pose_publisher.publish(pose)
         self.poses_published += 1
 
-    def _compare_clocks(self, stamp: int, sent_ns: int) -> None:
-        self._clock_offset_s = (sent_ns - stamp) * 1e-9
+    def _watch_pose(self, pose: PoseStamped, info: Mapping[str, Any]) -> None:
+        self._base, self._pose_s = pose.header.frame_id, time.monotonic()
+        if info['source_timestamp']:
+            self._clock_offset_s = (info['source_timestamp'] - stamp_ns(pose.header)) * 1e-9
 
     # --- signals
 
@@ -237,14 +249,19 @@ class AtomizerSource(PaintNode):
         )
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
-            state.header = header(self._motion.base, stamp)
+            state.header = header(self._base, stamp)
             self._state_publisher.publish(state)
 
     # --- diagnostics
 
     def _robot_status(self) -> Status:
+        if self._motion is None:
+            if time.monotonic() - self._pose_s > SILENT_S:
+                remedy = 'if none are to come, give urdf_file or base_link'
+                return Status(WARN, f'no poses on {POSES}; {remedy}')
+            return Status(OK, 'the robot publishes its poses')
         found = self._motion.status()
-        poses = f"of '{self._motion.tip}' in '{self._motion.base}'"
+        poses = f"of '{self._motion.tip}' in '{self._base}'"
         values = {'poses': poses, 'published': self.poses_published, **found.values}
         return Status(found.level, found.message, values)
 

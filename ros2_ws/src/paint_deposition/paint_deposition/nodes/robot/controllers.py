@@ -1,8 +1,12 @@
 """Nodes `rws_source` and `opcua_source`: the gun's signals, of ABB or by OPC UA."""
 
 import asyncio
+import math
 import os
-from collections.abc import Callable, Iterator, Mapping
+import threading
+import time
+from collections import deque
+from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from datetime import timezone
 from types import SimpleNamespace
@@ -11,25 +15,153 @@ from urllib import request
 from urllib.parse import urlencode, urlsplit
 from xml.etree import ElementTree
 
+import numpy as np
+from paint_msgs.msg import AtomizerState
+
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.robot.signal_source import SIGNALS, SignalSource
+from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
+from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
+from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2
 PATH = '/rw/iosystem/signals/'
+# What a state takes from signals: the field, and its unit.
+FIELDS = {
+    'flow': ('flow_cm3_per_min', 'cm3/min'), 'bell_speed': ('bell_speed_rpm', '1/min'),
+    'shaping_air': ('shaping_air_l_per_min', 'l/min'), 'voltage': ('voltage_kv', 'kV'),
+}  # fmt: skip
 
-POLL_S = 0.2
-
-
-RWS = fixed_while_running(
-    'the signals are subscribed to with it; restart the node',
-    url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
-    user=NodeParameter(
-        'Default User', 'User of the controller; its password is in RWS_PASSWORD [name]'
+SIGNALS = {
+    'trigger': NodeParameter('', 'Signal that opens the gun [name]'),
+    'trigger_level': NodeParameter(0.0, 'The gun is on above this value of it [its unit]'),
+    **{
+        name: NodeParameter('', f'Signal of {name}, in {unit}; empty: unknown [name]')
+        for name, (_, unit) in FIELDS.items()
+    },
+    'calibrated_flow': NodeParameter(
+        0.0, 'Flow at which the model was calibrated; 0: flow counts as it [cm3/min]',
+        (0.0, math.inf),
     ),
-    **SIGNALS,
-)
+    'delay_s': NodeParameter(
+        0.0, 'How late a signal is that has no time of its own, taken from its stamp [s]',
+        (0.0, 10.0),
+    ),
+}  # fmt: skip
+
+
+class SignalSource(PaintNode):
+    """Publishes `atomizer/state` from signals that a thread of the subclass follows.
+
+    The state is published, latched, when it changes and once all named signals have arrived.
+    Passwords come from the environment: parameters are read, and recorded, by others.
+    """
+
+    PASSWORD: str  # the variable of the environment
+
+    def __init__(self, name: str, **kwargs: Any):
+        super().__init__(name, **kwargs)
+        self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
+        named = ('trigger', *FIELDS)
+        self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
+        self._received: dict[str, float] = {}
+        self._published = ''
+        self._newest_ns = 0
+        # Of the connection, and of each signal.
+        self._problem, self._problems = 'not connected yet', dict.fromkeys(self.signals, '')
+        # Signals of which nothing came since the connection was made.
+        self._silent: set[str] = set()
+        self._lock = threading.Lock()
+        self._lags_s: deque[float] = deque(maxlen=50)
+        self.report({'signals': self.status})
+        self.start_thread(self._keep_following)
+
+    def _validate(self, values: Mapping[str, Any]) -> None:
+        if urlsplit(values['url']).username is not None:
+            raise PaintError(
+                f'{self.get_name()}: url holds a login, which all nodes of the cell could read; '
+                f'give user, and its password in the environment as {self.PASSWORD}'
+            )
+        if not values['trigger']:
+            raise PaintError(f'{self.get_name()}: trigger is empty: name the signal of the gun')
+        named = [values[kind] for kind in ('trigger', *FIELDS) if values[kind]]
+        if len(set(named)) < len(named):
+            raise PaintError(f'{self.get_name()}: a signal is named twice: {" ".join(named)}')
+
+    def follow(self) -> None:
+        """Connect and ``take`` the signals until ``stopped``; errors are told, then retried."""
+        raise NotImplementedError
+
+    def _keep_following(self) -> None:
+        while not self.stopped.is_set():
+            self._silent = {*self.signals}
+            try:
+                self.follow()
+            except Exception as error:  # whatever a network and its libraries bring
+                text = ' '.join(str(error).split()) or type(error).__name__
+                self._problem = f'{self.values["url"]}: {text}'
+            self.stopped.wait(1.0)
+
+    def take(self, signal: str, value: float, own_ns: int | None = None) -> None:
+        """Take the value of a signal that arrives now; ``own_ns`` is the server's time for it."""
+        kind, at_ns, arrived_ns = self.signals[signal], own_ns, time.time_ns()
+        if not math.isfinite(value):
+            self.refuse(signal, f'is {value}')
+            return
+        with self._lock:
+            self._problem = self._problems[signal] = ''
+            # The first value may have been there for long.
+            if own_ns is not None and signal not in self._silent:
+                lag_s = 1e-9 * (arrived_ns - own_ns)
+                self._lags_s.append(lag_s)
+                if abs(lag_s) > MAX_CLOCK_OFFSET_S:
+                    late = f'{signal} arrives {lag_s:.3g} s after its own time: set the clocks'
+                    self._problems[signal], at_ns = late, None
+            self._silent.discard(signal)
+            if at_ns is None:
+                at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
+            self._newest_ns = max(self._newest_ns, at_ns)
+            self._received[kind] = value
+            if not {*self.signals.values()} - self._received.keys():
+                self._publish(self._newest_ns)
+
+    def refuse(self, signal: str, reason: str) -> None:
+        """Say why what came of a signal is no value."""
+        with self._lock:
+            self._problems[signal] = f'{signal} {reason}; the gun stays as it was'
+
+    def _publish(self, at_ns: int) -> None:
+        values, known = self.values, self._received
+        spraying = known['trigger'] > values['trigger_level']
+        full, flow = values['calibrated_flow'], known.get('flow', math.nan)
+        relative = flow / full if full > 0.0 and 'flow' in known else 1.0
+        points = {field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()}
+        state = AtomizerState(spraying=spraying, flow=relative, **points)
+        if str(state) != self._published:  # NaN does not equal itself
+            self._published = str(state)
+            state.header = header('', at_ns)
+            self._publisher.publish(state)
+
+    def status(self) -> Status:
+        with self._lock:
+            received = {
+                f'{kind}, {signal}': self._received.get(kind, 'not received')
+                for signal, kind in self.signals.items()
+            }
+            lag = f'{1e3 * np.median(self._lags_s):.1f}' if self._lags_s else 'no time is sent'
+            problems = [each for each in (self._problem, *self._problems.values()) if each]
+        values = received | {
+            'from the time of the server to arrival [ms]': lag,
+            'delay taken out [ms]': f'{1e3 * self.values["delay_s"]:.1f}',
+        }
+        if problems:
+            return Status(ERROR, '; '.join(problems), values)
+        missing = [name for name, value in received.items() if value == 'not received']
+        if missing:
+            return Status(WARN, f'not received: {"; ".join(missing)}', values)
+        return Status(OK, 'following the signals', values)
 
 
 class RwsSource(SignalSource):
@@ -38,13 +170,20 @@ class RwsSource(SignalSource):
     Events have no time of their own: `delay_s` is taken from their arrival.
     """
 
-    PARAMETERS = RWS
+    PARAMETERS = fixed_while_running(
+        'the signals are subscribed to with it; restart the node',
+        url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
+        user=NodeParameter(
+            'Default User', 'User of the controller; its password is in RWS_PASSWORD [name]'
+        ),
+        **SIGNALS,
+    )
     PASSWORD = 'RWS_PASSWORD'
 
     def __init__(self, **kwargs: Any):
         super().__init__('rws_source', **kwargs)
 
-    def follow(self, stopped: Callable[[], bool]) -> None:
+    def follow(self) -> None:
         """Subscribe to all signals in one group, and take its events."""
         try:
             from websockets.sync.client import connect
@@ -67,12 +206,13 @@ class RwsSource(SignalSource):
                 told = quoted(events)
                 raise PaintError(f'events are said to be at {told}, which is another host')
             kept = '; '.join(f'{cookie.name}={cookie.value}' for cookie in cookies.cookiejar)
-            more = {'Cookie': kept}
             protocols: Any = ['robapi2_subscription']
-            with connect(events, subprotocols=protocols, additional_headers=more) as socket:
-                self.connected()
+            with connect(
+                events, subprotocols=protocols, additional_headers={'Cookie': kept}
+            ) as socket:
+                self._problem = ''  # all signals are subscribed to
                 self._take_all(first)
-                while not stopped():
+                while not self.stopped.is_set():
                     with suppress(TimeoutError):
                         self._take_all(socket.recv(POLL_S))
         finally:
@@ -101,29 +241,6 @@ def signal_values(event: str | bytes) -> Iterator[tuple[str, float]]:
             yield path, float(value)
 
 
-OPCUA = fixed_while_running(
-    'the signals are subscribed to with it; restart the node',
-    url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
-    period_s=NodeParameter(
-        0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
-    ),
-    user=NodeParameter(
-        '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
-    ),
-    security_policy=NodeParameter(
-        'None',
-        'How messages are signed and encrypted',
-        choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
-    ),
-    certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
-    private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),
-    server_certificate_file=NodeParameter(
-        '', 'Certificate that the server must have; empty: the one that it sends [path]'
-    ),
-    **SIGNALS,
-)
-
-
 class OpcuaSource(SignalSource):
     """Follows variables of a server, such as one of OPC 40702, by their node ids or browse paths.
 
@@ -131,7 +248,27 @@ class OpcuaSource(SignalSource):
     that sends none.
     """
 
-    PARAMETERS = OPCUA
+    PARAMETERS = fixed_while_running(
+        'the signals are subscribed to with it; restart the node',
+        url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
+        period_s=NodeParameter(
+            0.02, 'How often the server samples and sends what has changed [s]', (1e-3, 10.0)
+        ),
+        user=NodeParameter(
+            '', 'User of the server, whose password is in OPCUA_PASSWORD; empty: anonymous [name]'
+        ),
+        security_policy=NodeParameter(
+            'None',
+            'How messages are signed and encrypted',
+            choices=('None', 'Basic256Sha256', 'Aes128Sha256RsaOaep', 'Aes256Sha256RsaPss'),
+        ),
+        certificate_file=NodeParameter('', 'Certificate of this client, DER or PEM [path]'),
+        private_key_file=NodeParameter('', 'Private key of this client, DER or PEM [path]'),
+        server_certificate_file=NodeParameter(
+            '', 'Certificate that the server must have; empty: the one that it sends [path]'
+        ),
+        **SIGNALS,
+    )
     PASSWORD = 'OPCUA_PASSWORD'
 
     def __init__(self, **kwargs: Any):
@@ -146,11 +283,11 @@ class OpcuaSource(SignalSource):
                 'together: give all of them, or none'
             )
 
-    def follow(self, stopped: Callable[[], bool]) -> None:
+    def follow(self) -> None:
         """Subscribe to all variables, and take their values."""
-        asyncio.run(self._follow(stopped))
+        asyncio.run(self._follow())
 
-    async def _follow(self, stopped: Callable[[], bool]) -> None:
+    async def _follow(self) -> None:
         try:
             from asyncua.client.client import Client
         except ImportError:
@@ -173,16 +310,17 @@ class OpcuaSource(SignalSource):
                     node = await client.nodes.objects.get_child(signal.split('/'))
                 found[node.nodeid] = signal
 
-            def notify(node: Any, value: Any, data: Any) -> None:
-                self._take_value(found[node.nodeid], value, data.monitored_item.Value)
-
-            handler = SimpleNamespace(datachange_notification=notify)
+            handler = SimpleNamespace(
+                datachange_notification=lambda node, value, data: self._take_value(
+                    found[node.nodeid], value, data.monitored_item.Value
+                )
+            )
             period_ms = 1e3 * self.values['period_s']
             subscription = await client.create_subscription(period_ms, handler)
             nodes = [client.get_node(each) for each in found]
             await subscription.subscribe_data_change(nodes, sampling_interval=period_ms)
-            self.connected()
-            while not stopped():
+            self._problem = ''  # all signals are subscribed to
+            while not self.stopped.is_set():
                 await asyncio.sleep(POLL_S)
                 await client.check_connection()
 

@@ -3,7 +3,6 @@
 import socket
 import time
 from collections import deque
-from dataclasses import dataclass
 from functools import cache
 from typing import Any
 
@@ -67,18 +66,9 @@ def egm_message(name: str = 'Robot') -> Any:
     return message_factory.GetMessageClass(pool.FindMessageTypeByName(f'egm_read.{name}'))
 
 
-@dataclass(frozen=True)
-class EgmSample:
-    """A measured position: stamp [ns], TCP in the correction frame, and the joints.
-
-    ``pose`` is x y z [m] qx qy qz qw, None if none was sent; ``joints_rad`` are the robot's,
-    ``external`` as sent, deg or mm.
-    """
-
-    stamp_ns: int
-    pose: tuple[float, ...] | None
-    joints_rad: np.ndarray
-    external: np.ndarray
+# Stamp [ns]; TCP in the correction frame x y z [m] qx qy qz qw, None if none was sent; the robot's
+# joints [rad]; external axes as sent [deg, mm].
+Position = tuple[int, tuple[float, ...] | None, np.ndarray, np.ndarray]
 
 
 class EgmStream:
@@ -108,7 +98,7 @@ class EgmStream:
         self._newest: int | None = None
         self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
 
-    def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> EgmSample | None:
+    def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> Position | None:
         """The position in a packet; None for one that is not the robot's, invalid, repeated or
         out of order.
         """
@@ -149,10 +139,9 @@ class EgmStream:
         if measured.cartesian.HasField('orient'):
             p, q = measured.cartesian.pos, measured.cartesian.orient
             pose = (1e-3 * p.x, 1e-3 * p.y, 1e-3 * p.z, q.u1, q.u2, q.u3, q.u0)
-        return EgmSample(
-            sent_ns + fastest_ns - self.lag_ns, pose, np.radians(measured.joints.joints),
-            np.array(measured.externalJoints.joints),
-        )  # fmt: skip
+        joints, external = measured.joints.joints, measured.externalJoints.joints
+        stamp_ns = sent_ns + fastest_ns - self.lag_ns
+        return stamp_ns, pose, np.radians(joints), np.array(external)
 
     def _is_next(self, number: int) -> bool:
         """Whether a packet is newer than those before; counts what is missing between."""
@@ -180,36 +169,6 @@ def _is_whole(robot: Any) -> bool:
     return (has_place or len(joints) > 0) and bool(np.isfinite(numbers).all())
 
 
-EGM = fixed_while_running(
-    'the stream is read with it; restart the node',
-    address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
-    robot_address=NodeParameter(
-        '', 'Address of the robot; empty: of the first that sends positions [IP]'
-    ),
-    port=NodeParameter(6510, "UDP port of the robot's UDPUC device [-]", (1, 65535)),
-    frame_id=NodeParameter(
-        'base_link', 'Name of the correction frame that EGMActPose or EGMStreamStart has [name]'
-    ),
-    joint_names=NodeParameter(
-        [f'joint_{k}' for k in range(1, 7)], "Names of the robot's joints [names]", element=str
-    ),
-    external_joints=NodeParameter(
-        [], "Names of the external axes, in the controller's order; empty: left out [names]",
-        element=str,
-    ),
-    external_scales=NodeParameter(
-        [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
-        constraints='numbers above 0, one for each external axis',
-        allows=lambda value: all(scale > 0.0 for scale in value or ()),
-        element=float,
-    ),
-    lag_s=NodeParameter(
-        0.015, 'Age of a position when it is sent, taken from its stamp; 0.010 to 0.025 [s]',
-        (0.0, 1.0),
-    ),
-)  # fmt: skip
-
-
 class EgmSource(PaintNode):
     """Publishes `atomizer/pose` and `joint_states` from the UDP packets of a robot.
 
@@ -218,7 +177,35 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
-    PARAMETERS = EGM
+    PARAMETERS = fixed_while_running(
+        'the stream is read with it; restart the node',
+        address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
+        robot_address=NodeParameter(
+            '', 'Address of the robot; empty: of the first that sends positions [IP]'
+        ),
+        port=NodeParameter(6510, "UDP port of the robot's UDPUC device [-]", (1, 65535)),
+        frame_id=NodeParameter(
+            'base_link',
+            'Name of the correction frame that EGMActPose or EGMStreamStart has [name]',
+        ),
+        joint_names=NodeParameter(
+            [f'joint_{k}' for k in range(1, 7)], "Names of the robot's joints [names]", element=str
+        ),
+        external_joints=NodeParameter(
+            [], "Names of the external axes, in the controller's order; empty: left out [names]",
+            element=str,
+        ),
+        external_scales=NodeParameter(
+            [], 'rad or m for one unit of each external axis, 0.001 for a rail in mm [rad, m]',
+            constraints='numbers above 0, one for each external axis',
+            allows=lambda value: all(scale > 0.0 for scale in value or ()),
+            element=float,
+        ),
+        lag_s=NodeParameter(
+            0.015, 'Age of a position when it is sent, taken from its stamp; 0.010 to 0.025 [s]',
+            (0.0, 1.0),
+        ),
+    )  # fmt: skip
 
     def __init__(self, **kwargs: Any):
         super().__init__('egm_source', **kwargs)
@@ -271,20 +258,23 @@ class EgmSource(PaintNode):
             arrived_ns = time.time_ns()
             if self.values['robot_address'] not in ('', sender):
                 self.stream.invalid += 1
-            elif sample := self.stream.take(packet, arrived_ns, sender):
+            elif position := self.stream.take(packet, arrived_ns, sender):
                 self._heard_s = time.monotonic()
-                self._publish(sample)
+                self._publish(*position)
 
-    def _publish(self, sample: EgmSample) -> None:
-        frame_id, stamp = self.values['frame_id'], sample.stamp_ns
-        if sample.pose is not None:
-            self._poses.publish(pose_message(frame_id, stamp, sample.pose))
+    def _publish(
+        self, stamp: int, pose: tuple[float, ...] | None, joints: np.ndarray, axes: np.ndarray
+    ) -> None:
+        frame_id = self.values['frame_id']
+        if pose is not None:
+            self._poses.publish(pose_message(frame_id, stamp, pose))
         names, external = self.values['joint_names'], self.values['external_joints']
-        if len(sample.joints_rad) >= len(names) and len(sample.external) >= len(external):
-            scaled = sample.external[: len(external)] * self.values['external_scales']
-            positions = [*sample.joints_rad[: len(names)].tolist(), *scaled.tolist()]
-            at, joints = header(frame_id, stamp), [*names, *external]
-            self._joints.publish(JointState(header=at, name=joints, position=positions))
+        if len(joints) >= len(names) and len(axes) >= len(external):
+            scaled = axes[: len(external)] * self.values['external_scales']
+            positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
+            at = header(frame_id, stamp)
+            message = JointState(header=at, name=[*names, *external], position=positions)
+            self._joints.publish(message)
 
     def status(self) -> Status:
         stream, values = self.stream, self.values

@@ -6,8 +6,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
-from geometry_msgs.msg import PoseStamped
-from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError, RecordingError, did_you_mean
@@ -61,34 +60,6 @@ class JointPoses:
         if time.monotonic() - self._received_s > SILENT_S:
             return Status(WARN, f'no joint states on {self._topic}', values)
         return Status(OK, 'following the robot', values)
-
-
-class PublishedPoses:
-    """Watches the poses that the robot publishes itself on `topic`; `base` is their frame.
-
-    `take_stamp` is called with the stamp of each pose and the time at which it was sent [ns].
-    """
-
-    tip = 'the TCP'
-
-    def __init__(
-        self, node: PaintNode, topic: str, take_stamp: Callable[[int, int], None]
-    ) -> None:
-        self.base, self._topic, self._take_stamp = '', topic, take_stamp
-        self._received_s = time.monotonic()
-        node.create_subscription(PoseStamped, topic, self._take, qos_profile_sensor_data)
-
-    def _take(self, pose: PoseStamped, info: Mapping[str, Any]) -> None:
-        self.base, self._received_s = pose.header.frame_id, time.monotonic()
-        if info['source_timestamp']:
-            self._take_stamp(stamp_ns(pose.header), info['source_timestamp'])
-
-    def status(self) -> Status:
-        """Whether the robot publishes its poses."""
-        if time.monotonic() - self._received_s > SILENT_S:
-            remedy = 'if none are to come, give urdf_file or base_link'
-            return Status(WARN, f'no poses on {self._topic}; {remedy}')
-        return Status(OK, 'the robot publishes its poses')
 
 
 class TfPoses:

@@ -19,8 +19,6 @@ from paint_deposition.files.recordings.headers import nanoseconds
 
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
-# Of one topic, those that have left included.
-MOST_PUBLISHERS = 1000
 # Three points and colours whose bytes occur nowhere else in a Marker.
 SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
 SAMPLE_COLOURS = np.array(
@@ -59,32 +57,6 @@ def header_stamp_ns(cdr: bytes) -> int:
     """``stamp_ns`` of a serialised message that begins with a header."""
     little_endian = cdr[1] & 1
     return nanoseconds(*struct.unpack_from('<iI' if little_endian else '>iI', cdr, STAMP_OFFSET))
-
-
-class SequenceNumbers:
-    """The numbers that publishers give their messages, and how many did not arrive.
-
-    ``lost`` are those missing after the first of each publisher.
-    """
-
-    def __init__(self) -> None:
-        self.lost = 0
-        # The publisher heard last is last.
-        self._newest: dict[bytes, int] = {}
-
-    def take(self, publisher: bytes, number: int) -> bool:
-        """Take the number of a message; whether it is the first of its publisher."""
-        before = self._newest.pop(publisher, None)
-        self._newest[publisher] = number if before is None else max(number, before)
-        if len(self._newest) > MOST_PUBLISHERS:
-            del self._newest[next(iter(self._newest))]
-        if before is not None:
-            self.lost += max(number - before - 1, 0)
-        return before is None
-
-    def forget(self) -> None:
-        """What comes next is the first of its publisher."""
-        self._newest.clear()
 
 
 class ColouredMesh:

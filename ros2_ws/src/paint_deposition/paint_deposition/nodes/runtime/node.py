@@ -11,6 +11,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
@@ -23,11 +24,7 @@ from rclpy.timer import Timer
 from std_srvs.srv import Trigger
 
 from paint_deposition.errors import PaintError, quoted
-from paint_deposition.nodes.runtime.parameters import (
-    NodeParameter,
-    ParameterTable,
-    declare_parameters,
-)
+from paint_deposition.nodes.runtime.parameters import ParameterTable, declare_parameters
 
 OK = DiagnosticStatus.OK
 WARN = DiagnosticStatus.WARN
@@ -71,7 +68,9 @@ class PaintNode(Node):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         try:
             self.values = declare_parameters(self, self.PARAMETERS)
-            self._input_folders = self._named_folders()
+            named = {name: v for name, v in self.values.items() if name != 'output_directory'}
+            files = [Path(file).resolve() for file in self._files_of(named)]
+            self._input_folders = [file if file.is_dir() else file.parent for file in files]
             self._validate(self.values)
             self._start()
         except PaintError:
@@ -179,29 +178,19 @@ class PaintNode(Node):
 
         Otherwise whoever can reach the node could read the files of this machine.
         """
-        path = real_path(file)
+        # Unlike the methods of a path, these mind no unknown user and no loop of links.
+        path = Path(os.path.realpath(os.path.expanduser(file)))
         if os.path.exists(path) and not any(map(path.is_relative_to, self._input_folders)):
             raise PaintError(
                 f'{quoted(file)} is in no folder that {self.get_name()} was given at its start; '
                 'restart it with that folder in input_folders'
             )
 
-    def _named_folders(self) -> list[Path]:
-        """The folders of the files that the parameters name, and those of `input_folders`."""
-        inputs = {name: v for name, v in self.values.items() if name != 'output_directory'}
-        files = map(Path.resolve, map(Path, self._files_of(inputs)))
-        return [path if path.is_dir() else path.parent for path in files]
-
     def _files_of(self, values: Mapping[str, Any]) -> list[str]:
         """The paths that parameters hold."""
-        paths = (
-            value
-            for name, value in values.items()
-            if name in self.PARAMETERS and self.PARAMETERS[name].description.endswith('[path]')
-        )
-        return [
-            file for held in paths for file in ([held] if isinstance(held, str) else held) if file
-        ]
+        rows = self.PARAMETERS
+        held = [values[name] for name in values.keys() & rows.keys() if rows[name].is_path]
+        return [file for each in held for file in np.atleast_1d(each).tolist() if file]
 
     # --- diagnostics
 
@@ -242,7 +231,12 @@ class PaintNode(Node):
         """Refuse to change fixed parameters with the reason, which rclpy leaves out."""
         for name in (change.name for change in parameter_list):
             row = self.PARAMETERS.get(name)
-            if row and row.fixed_because and self._is_fixed(name, row):
+            if not row or not row.fixed_because:
+                continue
+            is_fixed = self.configured
+            if row.is_read_only:  # it can be set until its declaration is complete
+                is_fixed = self.describe_parameter(name).read_only
+            if is_fixed:
                 reason = f'{name} cannot change while the node {row.fixed_while}: '
                 return SetParametersResult(successful=False, reason=reason + row.fixed_because)
         return super().set_parameters_atomically(parameter_list)
@@ -251,15 +245,11 @@ class PaintNode(Node):
         """Set each parameter on its own."""
         return [self.set_parameters_atomically([parameter]) for parameter in parameter_list]
 
-    def _is_fixed(self, name: str, row: NodeParameter) -> bool:
-        if row.is_read_only:
-            # A parameter can be set until its declaration is complete.
-            return self.describe_parameter(name).read_only
-        return self.configured
-
     def _on_set_parameters(self, changes: list[Parameter]) -> SetParametersResult:
         new = {change.name: change.value for change in changes}
         try:
+            for name in new.keys() & self.PARAMETERS.keys():
+                self.PARAMETERS[name].checked(name, new[name])
             for file in self._files_of(new):
                 self.require_named_folder(file)
             self._validate(self.values | new)
@@ -274,11 +264,3 @@ class PaintNode(Node):
         self.values |= {change.name: change.value for change in changes}
         if self.configured:
             self._on_change({change.name for change in changes})
-
-
-def real_path(file: str) -> Path:
-    """Where a file is that a peer named, whatever the name.
-
-    Unlike the methods of a path, these functions mind no unknown user and no loop of links.
-    """
-    return Path(os.path.realpath(os.path.expanduser(file)))

@@ -14,12 +14,12 @@ from rcl_interfaces.msg import (
     FloatingPointRange,
     IntegerRange,
     ParameterDescriptor,
-    SetParametersResult,
 )
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError, did_you_mean, quoted
+from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 
 # How bounds are said.
 BOUNDS = {
@@ -67,6 +67,11 @@ class NodeParameter:
         return bool(self.fixed_because) and self.fixed_while == RUNS
 
     @property
+    def is_path(self) -> bool:
+        """Whether it names a file or a folder, or several."""
+        return self.description.endswith('[path]')
+
+    @property
     def ros_type(self) -> Parameter.Type:
         value = [self.element()] if self.element else self.default
         return Parameter.Type.from_parameter_value(value)
@@ -100,7 +105,7 @@ class NodeParameter:
             low, high = self.bounds
             limits |= {'ge': low} | ({'le': high} if math.isfinite(high) else {})
         kind = Literal[self.choices] if self.choices else Annotated[kind, Field(**limits)]
-        if self.description.endswith('[path]'):
+        if self.is_path:
             # No shell expands a leading ~ in parameter files or after :=.
             kind = Annotated[kind, AfterValidator(os.path.expanduser)]
         return TypeAdapter(list[kind] if self.element else kind)
@@ -160,13 +165,31 @@ def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter
     return NodeParameter(default, description, (0.0, 10_000.0))
 
 
-def require_colours(values: Mapping[str, Any]) -> None:
-    """Raise PaintError where the ends of the colours are in the wrong order."""
+def display_parameters() -> dict[str, NodeParameter]:
+    """The rows that say how a film is shown, and what film is wanted."""
+    return {
+        'color_min_um': thickness_parameter(
+            'Film at the lower end of the colours; both ends 0: automatic [µm]'
+        ),
+        'color_max_um': thickness_parameter(
+            'Film at the upper end of the colours; both ends 0: automatic [µm]'
+        ),
+        'painted_above_um': thickness_parameter(
+            'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
+        ),
+        'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
+        'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
+    }
+
+
+def require_display(values: Mapping[str, Any]) -> None:
+    """Raise PaintError where the ends of the colours, or target and tolerance, contradict."""
     low, high = values['color_min_um'], values['color_max_um']
     if (low, high) != (0.0, 0.0) and low >= high:
         raise PaintError(
             f'color_min_um {low:g} is not below color_max_um {high:g}; both 0 is automatic'
         )
+    require_band(values['target_um'], values['target_tolerance_um'])
 
 
 def direction_parameter(description: str) -> NodeParameter:
@@ -251,7 +274,6 @@ def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
     node.add_pre_set_parameters_callback(
         lambda changes: [_typed(table.get(change.name), change) for change in changes]
     )
-    node.add_on_set_parameters_callback(lambda changes: _check_changes(table, changes))
     for name, row in table.items():
         try:
             value = row.checked(name, overrides.get(name, row.default))
@@ -276,16 +298,6 @@ def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
             value = row.checked(change.name, change.value)
             return Parameter(change.name, row.ros_type, value)
     return change
-
-
-def _check_changes(table: ParameterTable, changes: list[Parameter]) -> SetParametersResult:
-    try:
-        for change in changes:
-            if change.name in table:
-                table[change.name].checked(change.name, change.value)
-    except PaintError as error:
-        return SetParametersResult(successful=False, reason=str(error))
-    return SetParametersResult(successful=True)
 
 
 def require_file_name(what: str, name: str) -> None:

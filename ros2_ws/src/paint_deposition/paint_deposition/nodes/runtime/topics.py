@@ -11,8 +11,6 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from rclpy.subscription import Subscription
 from rclpy.topic_endpoint_info import TopicEndpointInfo
 
-from paint_deposition.nodes.runtime.messages import SequenceNumbers
-
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
 PART_TOPIC = 'part'
@@ -29,6 +27,8 @@ PROGRESS = QoSProfile(depth=100)
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
 # More than a publisher keeps for late subscribers, or sends while a subscription is new.
 REMEMBERED_MESSAGES = 2000
+# Of one topic, those that have left included.
+MOST_PUBLISHERS = 1000
 # Both ends of a new subscription know of each other after less; meanwhile others count, too.
 OVERLAP_S = 1.0
 Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
@@ -71,6 +71,9 @@ class AdaptiveSubscription:
         raw: whether messages are taken serialised.
         polled: whether `take` is called by `take_pending` alone, which matches the quality of
             service as well; else by the executor, and `match_qos` is called now and then.
+
+    Attributes:
+        lost: messages missing after the first of each publisher, by the numbers they have.
     """
 
     def __init__(
@@ -88,7 +91,9 @@ class AdaptiveSubscription:
         self._node, self._message, self._topic, self._take = node, message, topic, take
         self._depth, self._latched, self._raw, self._polled = depth, latched, raw, polled
         self._group = PolledCallbackGroup() if polled else None
-        self._numbers = SequenceNumbers()
+        self.lost = 0
+        # Of each publisher its newest number; the one heard last is last.
+        self._newest: dict[bytes, int] = {}
         # Times and publishers of messages that may come again, the newest last.
         self._taken: dict[tuple[int, bytes], None] = {}
         # The subscriptions, and when each was made and was last wanted.
@@ -97,11 +102,6 @@ class AdaptiveSubscription:
         self._wanted_s: dict[Quality, float] = {}
         self._offered: dict[bytes, Quality] = {}
         self.match_qos()
-
-    @property
-    def lost(self) -> int:
-        """Messages missing after the first of each publisher."""
-        return self._numbers.lost
 
     def take_pending(self) -> None:
         """Take all messages in the queues."""
@@ -134,14 +134,19 @@ class AdaptiveSubscription:
         self._wanted_s |= dict.fromkeys(wanted, self._matched_s)
         for quality in [*self._subscriptions]:
             if self._matched_s - self._wanted_s[quality] > OVERLAP_S:
-                self._unsubscribe(quality)
+                self._end(quality)
 
-    def destroy(self) -> None:
-        """Take what is in the queues, and unsubscribe."""
+    def unsubscribe(self) -> None:
+        """Take what is in the queues, and unsubscribe until the quality of service is matched.
+
+        What is sent meanwhile is not lost, and what is latched comes again.
+        """
         for quality in [*self._subscriptions]:
-            self._unsubscribe(quality)
+            self._end(quality)
+        self._newest.clear()
+        self._taken.clear()
 
-    def _unsubscribe(self, quality: Quality) -> None:
+    def _end(self, quality: Quality) -> None:
         self._drain(quality)
         self._node.destroy_subscription(self._subscriptions.pop(quality))
 
@@ -159,8 +164,7 @@ class AdaptiveSubscription:
         is_newer = self._made_s[heard_by] < own_s and now_s - own_s < OVERLAP_S
         if offered != heard_by and not is_newer:
             return
-        # Some middleware does not number messages.
-        self._numbers.take(publisher, info.get('publication_sequence_number') or 0)
+        self._count_lost(publisher, info.get('publication_sequence_number') or 0)
         # Publisher and time identify a message.
         identity = info['source_timestamp'], publisher
         if identity in self._taken:
@@ -170,6 +174,14 @@ class AdaptiveSubscription:
             if len(self._taken) > REMEMBERED_MESSAGES:
                 del self._taken[next(iter(self._taken))]
         self._take(message, info)
+
+    def _count_lost(self, publisher: bytes, number: int) -> None:
+        """Count what is missing before a message; the number is 0 if the middleware has none."""
+        before = self._newest.pop(publisher, number)
+        self._newest[publisher] = max(number, before)
+        self.lost += max(number - before - 1, 0)
+        if len(self._newest) > MOST_PUBLISHERS:
+            del self._newest[next(iter(self._newest))]
 
 
 def _strictest_first(quality: Quality) -> tuple[bool, bool]:

@@ -1,19 +1,26 @@
 """Flow control of a replay: who has taken what, and who is not waited for."""
 
-from paint_deposition.nodes.bags.pace import (
-    LOST_TIMEOUT_S,
-    NO_REPORT_TIMEOUT_S,
-    PoseWindow,
-)
+import threading
+
+import pytest
+from geometry_msgs.msg import PoseStamped
+
+from paint_deposition.nodes.bags.pace import LOST_TIMEOUT_S, NO_REPORT_TIMEOUT_S, FlowControl
 
 
-def published(window: PoseWindow, stamps, now_s: float = 0.0) -> None:
+@pytest.fixture
+def window(cell):
+    """The control of a publisher of poses."""
+    publisher = cell.create_publisher(PoseStamped, 'atomizer/pose', 10)
+    return FlowControl(cell, publisher, 200, threading.Event())
+
+
+def published(window: FlowControl, stamps, now_s: float = 0.0) -> None:
     for stamp in stamps:
         window.add_sent(stamp, now_s)
 
 
-def test_lost_poses_are_not_waited_for_while_reports_arrive():
-    window = PoseWindow()
+def test_lost_poses_are_not_waited_for_while_reports_arrive(window):
     window.set_subscribers(['simulator'], 0.0)
     published(window, range(10))
     now_s = 0.0
@@ -26,9 +33,8 @@ def test_lost_poses_are_not_waited_for_while_reports_arrive():
     assert window.subscribers['simulator'].lost == 3
 
 
-def test_a_subscriber_that_never_reports_is_not_waited_for():
+def test_a_subscriber_that_never_reports_is_not_waited_for(window):
     """The others are waited for as before."""
-    window = PoseWindow()
     window.set_subscribers(['mute', 'simulator'], 0.0)
     published(window, range(10))
     window.report('simulator', 7, 0.0)
@@ -41,8 +47,7 @@ def test_a_subscriber_that_never_reports_is_not_waited_for():
     assert window.lag(40.0) == {'mute': 3}
 
 
-def test_only_present_subscribers_are_waited_for():
-    window = PoseWindow()
+def test_only_present_subscribers_are_waited_for(window):
     window.set_subscribers(['doomed', 'survivor'], 0.0)
     published(window, range(10))
     window.report('survivor', 9, 0.0)
