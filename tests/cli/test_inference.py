@@ -15,7 +15,7 @@ import yaml
 import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.cli.results import MARKER
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.verdict import percent

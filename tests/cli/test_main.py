@@ -32,7 +32,7 @@ def test_help_comes_at_once():
         'import sys\n'
         'from paint_deposition.cli.main import COMMANDS, run\n'
         'codes = [run(["--help"]), run(["--version"]), run(["simulate", "--help"])]\n'
-        'slow = {"numpy", "numba", "scipy", "pydantic", "matplotlib", "rosbags", "rclpy"}\n'
+        'slow = {"numpy", "numba", "scipy", "matplotlib", "rosbags", "rclpy"}\n'
         'print("loaded", sorted(slow & set(sys.modules)), codes)\n'
     )
     done = subprocess.run(

@@ -11,7 +11,7 @@ import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint
 from files.recorded import Messages, pose_entries, write_bag
-from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.errors import RecordingError

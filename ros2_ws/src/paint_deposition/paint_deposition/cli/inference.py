@@ -11,8 +11,8 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import model_words
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.models import model_words
+from paint_deposition.cli.results import Progress, Results, print_all
 from paint_deposition.errors import PaintError
 
 RESULTS = options.results_options('the results')
@@ -33,7 +33,7 @@ def _run(
     campaign: Path,
     model_file: Path | None,
     part_pose: list[float] | None,
-    results: options.Results,
+    results: Results,
     zones_file: Path | None = None,
     begins_with: Iterable[str] = ('model', 'posterior'),
     fitted: str = FITTED,
@@ -51,7 +51,7 @@ def _run(
     from paint_deposition.files.model_file import read_model_file
 
     def remark(kind: str, experiment: str, line: str) -> None:
-        options.print_all(kind, [f'{experiment}: {line}'])
+        print_all(kind, [f'{experiment}: {line}'])
 
     with Progress(command) as show:
         data = pd.read_campaign(campaign, show, part_pose, remark, zones_file)
@@ -63,17 +63,18 @@ def _run(
         show('writing')
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
         results.write(result, **more)
-    options.print_all('note', data.understood)
-    if isinstance(result, pd.SideBySide):
-        options.print_all('warning', next(iter(result.by_name.values())).warnings)
-    else:
-        options.print_all('warning', result.warnings)
-        for name, found in result.geometry.items():
-            options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
+    # Of several models the parts, and so how the gun ran over them, are the same.
+    first = next(iter(result.by_name.values())) if isinstance(result, pd.SideBySide) else result
+    warnings, geometry = [*first.warnings], []
+    if first is result:
+        geometry = [f'{name}: {found.sentence}' for name, found in first.geometry.items()]
+        for name, found in first.geometry.items():
+            warnings += (f'{name}: {line}' for line in found.warnings)
     model_line = f'{fitted or FITTED} a 50 mm bell'
     if start is not None:
         model_line = f'{fitted} {model_words(chosen, start)}'.strip()
-    results.print(lines(result), words or model_line)
+    said = [*lines(result), *geometry]
+    results.print(said, words or model_line, data.understood, warnings)
 
 
 @click.command('calibrate')
@@ -94,7 +95,6 @@ def calibrate_command(seed: int, **given: Any) -> None:
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
-    yield from options.geometry_lines(result)
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
@@ -138,24 +138,18 @@ def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     Writes comparison.json, residuals.csv, comparison.png and report.html. With several models
     there is a table of residuals for each.
     """
-    if len(model_files) > 1:
-        models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
-        words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
-        given |= {'model_file': None, 'begins_with': [], 'words': words}
-        _run('compare', verb, _side_by_side_lines, **given)
-    else:
+    if len(model_files) < 2:
         given |= {'model_file': next(iter(model_files), None), 'begins_with': ['model']}
         _run('compare', pd.compare, _comparison_lines, fitted='', **given)
-
-
-def _names(files: tuple[Path, ...]) -> list[str]:
-    """What models are called: their files without the suffix, or the paths if two are alike."""
-    names = [file.stem for file in files]
-    names = names if len(set(names)) == len(names) else [str(file) for file in files]
-    for name in names:
-        if names.count(name) > 1:
-            raise click.UsageError(f'--model {name} is given twice; give each model once')
-    return names
+        return
+    names = [file.stem for file in model_files]
+    names = names if len(set(names)) == len(names) else [*map(str, model_files)]
+    if twice := next((name for name in names if names.count(name) > 1), ''):
+        raise click.UsageError(f'--model {twice} is given twice; give each model once')
+    models = dict(zip(names, map(pd.read_model, model_files), strict=True))
+    words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
+    given |= {'model_file': None, 'begins_with': [], 'words': words}
+    _run('compare', verb, _side_by_side_lines, **given)
 
 
 def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
@@ -170,7 +164,6 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
 
 
 def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
-    yield from options.geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -184,8 +177,7 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
         yield f'misfit: {region.experiment}: {region.description}'
     if not comparison.regions:
         yield 'no region of significant misfit'
-    for note in comparison.study.notes:
-        yield f'note: {note}'
+    yield from (f'note: {note}' for note in comparison.study.notes)
 
 
 @click.command('diagnose')
@@ -208,7 +200,6 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     from paint_deposition.effects.catalogue import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
-
     _run('diagnose', partial(pd.diagnose, own_effects=own, seed=seed), _diagnosis_lines, **given)
 
 
@@ -271,9 +262,9 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.writers.models import effect_entry, write_effect_file
+    from paint_deposition.report.writers.inference import effect_entry, write_effect_file
 
-    law = next(iter(diagnosis.model.effects[::-1]), None)
+    law = diagnosis.model.effects[-1]
     forms = forms_of(law)
     if not forms or not isinstance(law, LearnedCurve):
         raise PaintError(
@@ -285,8 +276,6 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
-    from paint_deposition.effects.learned.curves import LearnedCurve
-    from paint_deposition.effects.learned.law import LearnedLaw
     from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
@@ -296,12 +285,8 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
-        law = diagnosis.model.effect(effects.best)
-        if isinstance(law, LearnedLaw):
-            shape = ', '.join(' '.join(row).rstrip() for row in words.learned_words(law))
-            yield f'    {words.effect_name(law.id)}: {shape}'
-            if isinstance(law, LearnedCurve) and law.sd:
-                yield f'    {words.form_words(law)}'
+        for line in words.law_lines(diagnosis.model.effect(effects.best)):
+            yield f'    {line}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
@@ -314,9 +299,7 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     yield from (f'worse than before: {one}' for one in diagnosis.worse)
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'
-    for amount in diagnosis.random_effects:
-        if amount.is_notable:
-            yield f'{amount}'
+    yield from (f'{amount}' for amount in diagnosis.random_effects if amount.is_notable)
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
@@ -326,4 +309,3 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in (*diagnosis.study.notes, *diagnosis.discrepancy_note):
         yield f'note: {note}'
-    yield from options.geometry_lines(diagnosis)

@@ -39,10 +39,10 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import (
     write_improvement_picture,
+    write_measuring_picture,
     write_places,
     write_uniformity,
 )

@@ -7,7 +7,7 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from paint_deposition.cli.options_of import options_of
+from paint_deposition.cli.options import options_of
 from paint_deposition.errors import PlanError
 from paint_deposition.request import Request, given, takes
 

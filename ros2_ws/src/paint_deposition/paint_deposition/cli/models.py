@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import paint_deposition as pd
-from paint_deposition.cli.options import print_all
+from paint_deposition.cli.results import print_all
 from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
+    from paint_deposition.inference.posterior import Posterior
 
 
 @dataclass(frozen=True)
@@ -29,6 +30,11 @@ class ChosenModel:
         """The model of the file, else that of a 50 mm bell."""
         model = self.file.model if self.file else pd.DepositionModel()
         return model.with_brush(self.brush) if self.brush else model
+
+    @property
+    def posterior(self) -> Posterior | None:
+        """What the file says is known of the model."""
+        return self.file.posterior if self.file else None
 
 
 def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> ChosenModel:
