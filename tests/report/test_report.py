@@ -361,10 +361,9 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
     assert 'Added as asked' in page.text
     assert 'no known effect' not in page.text
     (law,) = law_rows(ReportData.of(done))
-    assert (
-        f"readings' range, {law['ends']}. At 95 % it is known best, to {law['best']}" in page.text
-    )
-    assert re.fullmatch(r'± [\d.]+ at [\d.]+', law['best'])
+    told = f"neutral outside the readings' range, {law['ends']}. At 95 % it is known best, to "
+    assert f'{told}{law["best"]}, and least, to {law["least"]}.' in page.text
+    assert re.fullmatch(r'± [\d.]+ µm at [\d.]+', law['best'])
     before, after = (f'{step.holdout_rmse_um:.2f} µm' for step in done.history)
     assert f'left out of the fit: {before} → {after}; beyond gauge and texture: ' in page.text
     assert page.open == page.clashes == []

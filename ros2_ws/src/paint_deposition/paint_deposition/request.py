@@ -79,7 +79,8 @@ class PartMesh(BaseModel):
         None, 'The one body to take of a mesh file with several; default: all as one part.'
     )
     down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = given(
-        None, 'Gravity in the mesh frame, three numbers; default: -z, or -y if drawn flat at z = 0.',
+        None, 'Gravity in the mesh frame, three numbers; default: -z, or -y if drawn flat at '
+        'z = 0.',
         metavar='X Y Z',
     )  # fmt: skip
 

@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -128,25 +130,15 @@ def _write_results(
 
 def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
     """A heading and a row a reading; those that were left out are without a prediction."""
-    yield (
-        'experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
-        'residual_um', 'sigma_um', 'used', 'layer',
-    )  # fmt: skip
-    found = comparison.readings
-    fitted = zip(found.predicted_um, found.residual_um, found.sigma_um, strict=True)
-    for experiment in comparison.study.campaign.experiments:
-        readings = experiment.taken
-        for k, used in enumerate(experiment.used):
-            yield [
-                experiment.name,
-                str(readings.point[k]),
-                str(readings.group[k]),
-                *(f'{value:.5f}' for value in readings.positions_m[k]),
-                f'{readings.thickness_um[k]:.3f}',
-                *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
-                str(int(used)),
-                str(readings.layer[k]),
-            ]
+    columns = comparison.columns()
+    yield [*columns]
+    for row in zip(*columns.values(), strict=True):
+        told = dict(zip(columns, row, strict=True))
+        for name in ('x_m', 'y_m', 'z_m'):
+            told[name] = f'{told[name]:.5f}'
+        for name in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
+            told[name] = '' if np.isnan(told[name]) else f'{told[name]:.3f}'
+        yield [*map(str, (told | {'used': int(told['used'])}).values())]
 
 
 def file_name(name: str) -> str:
