@@ -7,12 +7,10 @@ import re
 import shlex
 import shutil
 import subprocess
-from functools import partial
 
 import pytest
 import yaml
 
-import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.cli.results import MARKER
@@ -119,20 +117,6 @@ def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
     steps = ('paint simulate ', 'paint diagnose ', 'paint compare ', 'paint improve ')
     places = [printed.index(f'$ {step}') for step in steps]
     assert places == sorted(places)
-
-
-@pytest.mark.slow
-def test_a_demo_that_is_cut_off_says_so_on_its_page(tmp_path, monkeypatch, undrawn):
-    def cut_off(*given: object, **named: object) -> None:
-        raise KeyboardInterrupt
-
-    coarse = partial(pd.read_mesh, max_edge_length_m=0.1)
-    monkeypatch.setattr(pd, 'read_mesh', lambda path, **_: coarse(path), raising=False)
-    monkeypatch.setattr(pd, 'diagnose', cut_off, raising=False)
-    assert paint('demo', '-o', tmp_path, '--no-open').returncode == 130
-    page = (tmp_path / 'demo.html').read_text()
-    assert 'Cut off here, while: Diagnosing its readings.' in page
-    assert 'http-equiv="refresh"' not in page
 
 
 @pytest.mark.slow

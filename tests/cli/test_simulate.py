@@ -170,7 +170,7 @@ def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
         ('--tolerance-um', '3', ['--target-um']),
         ('--tolerance-um', ('60', '--target-um', '45'), ['bare metal would be within it']),
-        ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
+        ('--down', ('0', '0', '0'), ['down', 'give the direction of gravity']),
         ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],
 )

@@ -112,7 +112,7 @@ class RobotArm(BaseModel):
     """The robot and the ends of its chain."""
 
     urdf: Text | None = given(
-        None, 'File of the robot, whose joints are in a bag, a table or RAPID, or who is to drive.'
+        None, 'URDF of the robot whose joints the file has, or that is to drive the motion.'
     )
     tip_link: Text | None = given(
         None, 'Link of the URDF that is the TCP; default: tool0, else its last link.',
@@ -150,8 +150,8 @@ class MotionOptions(RobotArm, extra='forbid'):
     )
     procedure: Text | None = given(None, 'Where a RAPID program starts; default: main.')
     tf: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = given(
-        None, 'Frames between which the transforms of a bag give the poses: TARGET, that of the '
-        'poses, and SOURCE, that of the TCP.', metavar='TARGET SOURCE',
+        None, 'The motion as transforms of the bag: frame SOURCE, that of the TCP, in frame '
+        'TARGET.', metavar='TARGET SOURCE',
     )  # fmt: skip
     joint_prefix: Text | None = given(
         None, "What the joints' names have before those of the URDF, or lack: irb_."
@@ -173,7 +173,8 @@ class MotionOptions(RobotArm, extra='forbid'):
     frame_id: Text | None = given(None, "Name of the part's frame; default: part.")
     strict: bool = given(False, 'Refuse a recording with a pose or state that would be left out.')
     part_pose: Annotated[list[Number], Field(min_length=7, max_length=7)] | None = given(
-        None, 'Where the part stands in the frame of the poses [m, unit quaternion].',
+        None, 'Where the part stands in the frame of the poses: x y z [m] and the unit quaternion '
+        'qx qy qz qw.',
         metavar='X Y Z QX QY QZ QW',
     )  # fmt: skip
 

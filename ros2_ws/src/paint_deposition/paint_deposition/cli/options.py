@@ -252,7 +252,7 @@ def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> RobotCel
         return None
     if part_pose is None:
         raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
-    from paint_deposition.api.robot import read_robot
+    from paint_deposition.api.planning import read_robot
 
     return read_robot(part_pose=part_pose, **robot)
 

@@ -13,6 +13,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.models import chosen_model, model_for
 from paint_deposition.cli.options import Part, options_of
 from paint_deposition.cli.results import Progress, Results, inputs, print_all
+from paint_deposition.errors import RecordingError
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 from paint_deposition.request import MotionOptions
 
@@ -62,7 +63,7 @@ def place_command(
     """
     import numpy as np
 
-    from paint_deposition.api.robot import place
+    from paint_deposition.api.planning import place
 
     cell = options.robot_cell(robot, part_pose)
     if cell is None or part_pose is None:
@@ -102,11 +103,16 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
 
     From three or more named points that the robot touched.
     """
-    from paint_deposition.api.robot import locate_by_points
     from paint_deposition.files.atomic import json_text
+    from paint_deposition.files.gauge_readings import read_points
     from paint_deposition.files.provenance import origin
+    from paint_deposition.motion.part_frame import locate
 
-    place = locate_by_points(touched, points, pose_unit)
+    given = read_points(touched, pose_unit), read_points(points, pose_unit)
+    try:
+        place = locate(*given)
+    except RecordingError as error:
+        raise RecordingError(f'{touched} and {points}: {error}') from None
     print_all('warning', place.warnings)
     if as_json:
         files = {'touched': touched, 'points': points}
