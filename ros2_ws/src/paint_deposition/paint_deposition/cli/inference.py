@@ -12,10 +12,10 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import model_words
-from paint_deposition.cli.results import Progress, Results, print_all
+from paint_deposition.cli.results import Progress, Results, print_all, results_options
 from paint_deposition.errors import PaintError
 
-RESULTS = options.results_options('the results')
+RESULTS = results_options('the results')
 MODEL = options.model_option(
     "Model to start from; default: the campaign's, else that of a 50 mm bell."
 )
@@ -83,7 +83,7 @@ def _run(
 @options.seed_option('the starts of the fit')
 @options.PART_POSE
 @options.ALLOW_EFFECTS
-@options.results_options('model.yaml, calibration.json and pictures')
+@results_options('model.yaml, calibration.json and pictures')
 def calibrate_command(seed: int, **given: Any) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
 from annotated_types import Ge, Gt, Le, Lt, MaxLen
@@ -17,7 +17,6 @@ from pydantic import BaseModel
 from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
-from paint_deposition.cli.results import Results
 from paint_deposition.errors import PaintError
 from paint_deposition.request import (
     DrivingRobot,
@@ -27,9 +26,6 @@ from paint_deposition.request import (
     PartMesh,
     Request,
 )
-
-if TYPE_CHECKING:
-    from paint_deposition.planning.driving import RobotCell
 
 Decorator = Callable[[Callable], Callable]
 
@@ -246,17 +242,6 @@ band_options = options_of(FilmBand, 'band')
 robot_options = options_of(DrivingRobot, 'robot')
 
 
-def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> RobotCell | None:
-    """The robot of ``robot_options`` with the part; None where none is given."""
-    if robot['urdf'] is None:
-        return None
-    if part_pose is None:
-        raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
-    from paint_deposition.api.planning import read_robot
-
-    return read_robot(part_pose=part_pose, **robot)
-
-
 def model_option(text: str = 'Deposition model, YAML; default: a 50 mm bell.') -> Decorator:
     """The model that a command begins with."""
     return click.option('--model', 'model_file', type=FILE, help=text)
@@ -312,20 +297,3 @@ def part_options(
         ),
     ]  # fmt: skip
     return option_group(options if zones else options[:-1], 'part', Part)
-
-
-def results_options(what: str, default: str | None = None) -> Decorator:
-    """A command takes ``Results``; their folder is to be named where there is no default."""
-    text = (
-        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
-        'into it are removed; other files in it are kept as they are. Nothing is changed before '
-        'all results are complete.'
-    )
-    options = (
-        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
-                     help=text),
-        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
-                     show_default=True, help='Format of the pictures.'),
-        JSON,
-    )  # fmt: skip
-    return option_group(options, 'results', Results)

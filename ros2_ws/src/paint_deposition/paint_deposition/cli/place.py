@@ -10,9 +10,9 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.models import chosen_model, model_for
+from paint_deposition.cli.models import chosen_model, model_for, robot_cell
 from paint_deposition.cli.options import Part, options_of
-from paint_deposition.cli.results import Progress, Results, inputs, print_all
+from paint_deposition.cli.results import Progress, Results, inputs, print_all, results_options
 from paint_deposition.errors import RecordingError
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 from paint_deposition.request import MotionOptions
@@ -46,7 +46,7 @@ def _span(axis: str) -> Any:
     help='Between places [m].',
 )  # fmt: skip
 @click.option('--free-roll', is_flag=True, help='The tool may be turned about its own axis.')
-@options.results_options('place.json, places.csv and the map')
+@results_options('place.json, places.csv and the map')
 def place_command(
     trajectory: Path,
     part_pose: list[float] | None,
@@ -65,7 +65,7 @@ def place_command(
 
     from paint_deposition.api.planning import place
 
-    cell = options.robot_cell(robot, part_pose)
+    cell = robot_cell(robot, part_pose)
     if cell is None or part_pose is None:
         raise click.UsageError('give the robot as --urdf, and --part-pose')
     spans = [
@@ -140,7 +140,7 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
 @options.motion_options
 @options.MAX_POSE_GAP
 @options.ALLOW_EFFECTS
-@options.results_options('points.csv, poses.csv, points.png and measure.json')
+@results_options('points.csv, poses.csv, points.png and measure.json')
 def measure_command(
     request: MeasureRequest,
     passes: FilmBuild,

@@ -10,9 +10,9 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.models import chosen_model, model_for
+from paint_deposition.cli.models import chosen_model, model_for, robot_cell
 from paint_deposition.cli.options import Part, options_of
-from paint_deposition.cli.results import Progress, Results, inputs, zone_lines
+from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
 from paint_deposition.planning.requests import (
     GunEnvelope,
     ImproveRequest,
@@ -26,9 +26,7 @@ from paint_deposition.request import MotionOptions
 @options.model_option()
 @options.BRUSH
 @options_of(IndexRequest)
-@options.results_options(
-    'recommendation.json and uniformity.png; default: the working directory', '.'
-)
+@results_options('recommendation.json and uniformity.png; default: the working directory', '.')
 def recommend_command(
     request: IndexRequest, model_file: Path | None, brush: int, results: Results
 ) -> None:
@@ -74,7 +72,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
 @options.PAINT_MOVES
-@options.results_options('the bag, passes.csv, passes.mod, plan.json and the film')
+@results_options('the bag, passes.csv, passes.mod, plan.json and the film')
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
@@ -93,7 +91,7 @@ def plan_command(
 
     With --part-pose the files have their poses in the frame of the robot, base_link by default.
     """
-    chosen, cell = chosen_model(model_file, brush=brush), options.robot_cell(robot, part_pose)
+    chosen, cell = chosen_model(model_file, brush=brush), robot_cell(robot, part_pose)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as show:
         show('reading the mesh')
@@ -166,9 +164,7 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
 @options.PAINT_MOVES
 @options.JOINT_ACCELERATION
 @options.ALLOW_EFFECTS
-@options.results_options(
-    'the bag, passes.csv, passes.mod, improvement.json, the picture and the film'
-)
+@results_options('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
 def improve_command(
     request: ImproveRequest,
     part: Part,
@@ -194,7 +190,7 @@ def improve_command(
         chosen, part_pose = model_for(model_file, trajectory), motion['part_pose']
         robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
         limits = {'joint_acceleration': joint_acceleration}
-        cell = options.robot_cell(robot | limits, part_pose) if part_pose else None
+        cell = robot_cell(robot | limits, part_pose) if part_pose else None
         known = motion if holds_joints(trajectory) else motion | dict.fromkeys(robot)
         recorded = pd.read_recording(trajectory, **known)
         show('refining the mesh')

@@ -18,6 +18,7 @@ from filelock import FileLock
 from tqdm import tqdm
 
 import paint_deposition as pd
+from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
 
@@ -122,6 +123,23 @@ class Results:
             click.echo(figures.read_text(encoding='utf-8'), nl=False)
         else:
             click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in self.files)]))
+
+
+def results_options(what: str, default: str | None = None) -> Decorator:
+    """A command takes ``Results``; their folder is to be named where there is no default."""
+    text = (
+        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
+        'into it are removed; other files in it are kept as they are. Nothing is changed before '
+        'all results are complete.'
+    )
+    each = (
+        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
+                     help=text),
+        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
+                     show_default=True, help='Format of the pictures.'),
+        JSON,
+    )  # fmt: skip
+    return option_group(each, 'results', Results)
 
 
 def zone_lines(

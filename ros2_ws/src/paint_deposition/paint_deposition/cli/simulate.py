@@ -12,7 +12,7 @@ import click
 import paint_deposition as pd
 from paint_deposition.cli import options
 from paint_deposition.cli.models import models_for
-from paint_deposition.cli.results import Progress, Results, inputs, zone_lines
+from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
 from paint_deposition.request import FilmBand
 
 if TYPE_CHECKING:
@@ -59,7 +59,7 @@ MOST_WARNINGS = 5
 @options.MAX_POSE_GAP
 @options.band_options
 @options.ALLOW_EFFECTS
-@options.results_options('film.ply, film.csv, stats.json and film.png')
+@results_options('film.ply, film.csv, stats.json and film.png')
 def simulate_command(
     part: options.Part,
     trajectories: tuple[Path, ...],
@@ -168,7 +168,7 @@ def _film_line(what: str, s: FilmStatistics) -> str:
     help='Processes on this machine, of one thread each; default: one a core.',
 )  # fmt: skip
 @options.ALLOW_EFFECTS
-@options.results_options('cases.parquet, sweep.json and sweep.png')
+@results_options('cases.parquet, sweep.json and sweep.png')
 def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: int | None) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
