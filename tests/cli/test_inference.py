@@ -313,25 +313,3 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
 def test_bad_input_is_one_line_and_writes_nothing(arguments, words, tmp_path):
     assert_refused(paint(*arguments, '-o', tmp_path / 'out', cwd=tmp_path), *words)
     assert not (tmp_path / 'out').exists()
-
-
-def test_zeros_where_film_is_expected_are_named_until_they_are_said_to_be_missing(
-    door_alone, tmp_path
-):
-    """Twelve readings of 0, as a gauge writes them where it did not measure."""
-    folder = shutil.copytree(door_alone.parent, tmp_path / 'door_of_zeros')
-    head, *rows = (folder / 'door.csv').read_text().splitlines()
-    rows = [re.sub(r'[^,]+(,P\d+)', r'0\1', row) if k < 12 else row for k, row in enumerate(rows)]
-    (folder / 'door.csv').write_text('\n'.join([head, *rows]))
-    content = yaml.safe_load(door_alone.read_text())
-    told = {}
-    for zero in ('', 'missing'):
-        content['experiments'][0] |= {'zero': zero} if zero else {}
-        (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
-        told[zero] = paint('compare', folder / 'campaign.yaml', '-o', tmp_path / f'out {zero}')
-        assert told[zero].returncode == 0, told[zero].stderr
-    warning = f'warning: door: 12 of {len(rows)} readings are 0 where the model expects '
-    assert warning in told[''].stderr
-    assert 'say zero: missing in the campaign' in told[''].stderr
-    assert 'readings are 0' not in told['missing'].stderr
-    assert '12 rows without a reading' in told['missing'].stderr

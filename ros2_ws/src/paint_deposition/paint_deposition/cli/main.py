@@ -16,8 +16,8 @@ from paint_deposition.errors import PaintError, did_you_mean
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 # Of each command: the module with its function, COMMAND_command; what the list of commands says;
-# an example, as it runs in the folder of the samples. Modules are only loaded when their command is
-# used, so that help comes at once.
+# an example, as it runs in the folder of the samples. Modules are only loaded when their command
+# is used, so that help comes at once.
 COMMANDS = {
     'demo': ('demo', 'A first film, and what readings make of it, on one page.',
         '-o my_demo'),

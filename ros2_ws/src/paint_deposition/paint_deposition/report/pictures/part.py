@@ -58,16 +58,12 @@ class View:
         right = np.cross(up, toward)
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
 
-    def from_the_right(self) -> 'View':
-        """View of the part from the right of this picture."""
-        return View(
-            -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
-        )
-
-    def from_above(self) -> 'View':
-        """View of the part from the top of this picture, its front below."""
-        return View(
-            self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
+    def others(self) -> tuple['View', 'View']:
+        """Views from the right of this picture, and from its top with the front below."""
+        (right, up), away = self.labels, _name(self.toward, 'away')
+        return (
+            View(-self.toward, self.up, self.right, (away, up)),
+            View(self.right, -self.toward, self.up, (right, away)),
         )
 
     def flat(self, points_m: np.ndarray) -> np.ndarray:
