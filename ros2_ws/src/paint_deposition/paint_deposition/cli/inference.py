@@ -23,7 +23,6 @@ SEED = options.seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
     'always the same'
 )
-FITTED = 'fitted to the campaign, from'
 
 
 def _run(
@@ -36,25 +35,24 @@ def _run(
     results: Results,
     zones_file: Path | None = None,
     begins_with: Iterable[str] = ('model', 'posterior'),
-    fitted: str = FITTED,
+    fitted: bool = True,
     words: str = '',
 ) -> None:
     """Read a campaign and a model, compute, write, and say what came out.
 
     Args:
-        command: its name.
         verb: what computes the result, which ``lines`` puts into words.
         begins_with: what of the model's file the verb takes.
-        fitted: what happens to the model, for the line on it; words: that line, if it is another.
+        fitted: whether it fits the model; words: the line on the model, if it is another.
     """
     from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
-    def remark(kind: str, experiment: str, line: str) -> None:
-        print_all(kind, [f'{experiment}: {line}'])
-
     with Progress(command) as show:
-        data = pd.read_campaign(campaign, show, part_pose, remark, zones_file)
+        data = pd.read_campaign(
+            campaign, show, part_pose,
+            lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,
+        )  # fmt: skip
         chosen = Path(model_file or data.model_file or '')
         load = load_effect_file if model_file else load_unnamed_effect_file
         start = read_model_file(chosen, load) if chosen.name else None
@@ -65,16 +63,13 @@ def _run(
         results.write(result, **more)
     # Of several models the parts, and so how the gun ran over them, are the same.
     first = next(iter(result.by_name.values())) if isinstance(result, pd.SideBySide) else result
-    warnings, geometry = [*first.warnings], []
-    if first is result:
-        geometry = [f'{name}: {found.sentence}' for name, found in first.geometry.items()]
-        for name, found in first.geometry.items():
-            warnings += (f'{name}: {line}' for line in found.warnings)
-    model_line = f'{fitted or FITTED} a 50 mm bell'
-    if start is not None:
-        model_line = f'{fitted} {model_words(chosen, start)}'.strip()
-    said = [*lines(result), *geometry]
-    results.print(said, words or model_line, data.understood, warnings)
+    warnings, said = [*first.warnings], [*lines(result)]
+    for name, found in first.geometry.items() if first is result else ():
+        said.append(f'{name}: {found.sentence}')
+        warnings += (f'{name}: {line}' for line in found.warnings)
+    source = model_words(chosen, start) if start else 'a 50 mm bell'
+    begin = 'fitted to the campaign, from ' if fitted or start is None else ''
+    results.print(said, words or begin + source, data.understood, warnings)
 
 
 @click.command('calibrate')
@@ -90,8 +85,8 @@ def calibrate_command(seed: int, **given: Any) -> None:
     Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
     effects of the model to start from are fitted as well; its projection is kept.
     """
-    verb = partial(pd.calibrate, seed=seed)
-    _run('calibrate', verb, _calibration_lines, begins_with=['model'], **given)
+    given |= {'begins_with': ['model']}
+    _run('calibrate', partial(pd.calibrate, seed=seed), _calibration_lines, **given)
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
@@ -140,7 +135,7 @@ def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     """
     if len(model_files) < 2:
         given |= {'model_file': next(iter(model_files), None), 'begins_with': ['model']}
-        _run('compare', pd.compare, _comparison_lines, fitted='', **given)
+        _run('compare', pd.compare, _comparison_lines, fitted=False, **given)
         return
     names = [file.stem for file in model_files]
     names = names if len(set(names)) == len(names) else [*map(str, model_files)]

@@ -32,9 +32,7 @@ CLEAR = 'rgba(0,0,0,0)'
 PALE_ACCENT, PALE_BEFORE = 'rgba(0,112,140,0.18)', 'rgba(154,165,177,0.25)'
 FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
 AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
-CURVE_POINTS = 201
-# Conditions that differ by less than this share say nothing of the model.
-LEAST_DIFFERENCE, MOST_COVARIATES = 0.01, 8
+CURVE_POINTS, MOST_COVARIATES = 201, 8
 
 
 def figures_of(data: ReportData) -> list[dict[str, Any]]:
@@ -121,12 +119,9 @@ def parity_figure(data: ReportData) -> dict[str, Any] | None:
     shared = {'range': [0, top], 'constrain': 'domain'}
     x = _axis('measured [µm]', **shared)
     y = _axis('predicted [µm]', scaleanchor='x', **shared)
-    legend = [('95 % gauge and texture', BEFORE, 'band'), *_legend(data)]
+    legend = [('95 % gauge and texture', BEFORE, 'band')]
+    legend += [(name, colour, 'dot') for name, colour in _of_each_model(data)]
     return _figure('parity', [_chart('', traces, x, y, 400)], legend)
-
-
-def _legend(data: ReportData) -> list[tuple[str, str, str]]:
-    return [(name, colour, 'dot') for name, colour in _of_each_model(data)]
 
 
 def _of_each_model(data: ReportData, *values: Iterable[np.ndarray]) -> Iterator[tuple]:
@@ -138,7 +133,8 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     """Residual against what differs from point to point, the most telling first."""
     values = {c.name: c.values for c in data.study.covariates(data.models[0])}
     values['spray_pass'] = values['spray_pass'] + 1.0  # as on the part
-    differing = {n for n, v in values.items() if np.ptp(v) > LEAST_DIFFERENCE * np.abs(v).max()}
+    # Conditions that differ by less say nothing of the model.
+    differing = {n for n, v in values.items() if np.ptp(v) > 0.01 * np.abs(v).max()}
     dependences = [d for d in data.comparisons[0].dependences if d.covariate in differing]
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
     later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
@@ -161,7 +157,8 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
         x = _axis(covariate_label(name), nticks=5)
         y = _axis('residual [µm]', range=[-reach, reach], zeroline=True)
         charts.append(_chart(f'{text}, {p_words(dependence.p_value)}', traces, x, y, 220))
-    return _figure('covariates', charts, _legend(data))
+    legend = [(name, colour, 'dot') for name, colour in _of_each_model(data)]
+    return _figure('covariates', charts, legend)
 
 
 def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
@@ -241,8 +238,9 @@ def profile_figure(data: ReportData) -> dict[str, Any] | None:
         _line(radius_m, profile.found, ACCENT, 2.5),
     ]
     x = _axis('distance from the axis on the model plane [m]')
-    legend = [('eq. (1)', MUTED, 'line'), ('readings', ACCENT, 'bold')]
-    legend.append(('95 % band', ACCENT, 'band'))
+    legend = [
+        ('eq. (1)', MUTED, 'line'), ('readings', ACCENT, 'bold'), ('95 % band', ACCENT, 'band'),
+    ]  # fmt: skip
     y = _axis('flux over the peak of eq. (1)')
     return _figure('profile', [_chart('mean over the angle', traces, x, y, 300)], legend)
 
