@@ -40,10 +40,8 @@ def _run(
 ) -> None:
     """Read a campaign and a model, compute, write, and say what came out.
 
-    Args:
-        verb: what computes the result, which ``lines`` puts into words.
-        begins_with: what of the model's file the verb takes.
-        fitted: whether it fits the model; words: the line on the model, if it is another.
+    The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
+    into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
     from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
@@ -153,8 +151,8 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
     yield f'{"RMSE [µm]":{width}}  {"all":>10}' + ''.join(f'  {part:>10}' for part in parts)
     for name, comparison in beside.by_name.items():
         errors = [m.residuals.rmse_um for m in comparison.misfits if m.kind == 'experiment']
-        cells = [comparison.points.rmse_um, *errors]
-        yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in cells)
+        errors.insert(0, comparison.points.rmse_um)
+        yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in errors)
     yield f'smallest error: {beside.best}'
 
 
@@ -168,10 +166,8 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
     yield from (zone.sentence for zone in comparison.zones)
     noise = comparison.study.noise
     yield f'gauge noise {noise.typical_um:.2f} µm ({noise.source})'
-    for region in comparison.regions:
-        yield f'misfit: {region.experiment}: {region.description}'
-    if not comparison.regions:
-        yield 'no region of significant misfit'
+    regions = [f'misfit: {one.experiment}: {one.description}' for one in comparison.regions]
+    yield from regions or ['no region of significant misfit']
     yield from (f'note: {note}' for note in comparison.study.notes)
 
 
@@ -259,8 +255,7 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
     from paint_deposition.report.writers.inference import effect_entry, write_effect_file
 
-    law = diagnosis.model.effects[-1]
-    forms = forms_of(law)
+    law, forms = diagnosis.model.effects[-1], forms_of(diagnosis.model.effects[-1])
     if not forms or not isinstance(law, LearnedCurve):
         raise PaintError(
             f'--as-effect {effect_file}: no closed form of few parameters fits the law within '
@@ -298,8 +293,8 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
-        todo = f'spray {spray.what}, and measure {spray.readings} points'
-        yield f'next: {todo}: {words.separation_words(spray)}'
+        todo = f'next: spray {spray.what}, and measure {spray.readings} points'
+        yield f'{todo}: {words.separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in (*diagnosis.study.notes, *diagnosis.discrepancy_note):

@@ -1,6 +1,6 @@
 """Charts of the report page: parity, covariates, and the learned laws."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -70,7 +70,6 @@ def _chart(
         'margin': {'l': 48, 'r': 12, 't': 8, 'b': 44},
         'showlegend': False,
         'modebar': {'bgcolor': CLEAR, 'color': BEFORE, 'activecolor': ACCENT},
-        'hoverlabel': {'font': {'family': FONT, 'size': 12}},
         'xaxis': x, 'yaxis': y, 'height': height,
     }  # fmt: skip
     return {'title': title, 'data': traces, 'layout': layout | more}
@@ -217,10 +216,10 @@ def map_figure(data: ReportData) -> dict[str, Any] | None:
         title += ' on ' + (joined([e.name for e in parts]) or 'a part that was not measured here')
         x = np.linspace(grid.low_m[0], grid.high_m[0], grid.columns)
         y = np.linspace(grid.low_m[1], grid.high_m[1], grid.rows)
-        places = [places_m(part.measured_points) for part in parts]
-        dots = [_dots(at[:, 0], at[:, 1], INK, 3, hoverinfo='skip') for at in places]
-        labels = ('right of the centre [m]', 'above it [m]')
-        found.append(_heat_map(title, labels, x, y, values, _around(values, neutral), dots))
+        read_m = [places_m(part.measured_points) for part in parts]
+        dots = [_dots(at[:, 0], at[:, 1], INK, 3, hoverinfo='skip') for at in read_m]
+        places = {'right of the centre [m]': x, 'above it [m]': y}
+        found.append(_heat_map(title, places, values, _around(values, neutral), dots))
     return _figure('maps', found)
 
 
@@ -253,7 +252,8 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
     patterns, brushes = data.model.patterns, data.model.brushes
     # As far out as the pattern matters: where it is above 2 % of its peak.
     reach = max(planar.radius_of_flux_m(0.02) for planar in patterns)
-    along, labels = np.linspace(-reach, reach, 81), ('tool x [m]', 'tool y [m]')
+    along = np.linspace(-reach, reach, 81)
+    places = {'tool x [m]': along, 'tool y [m]': along}
     x, y = np.meshgrid(along, along)
     factor = np.maximum(1.0 + law.h(x, y), LEAST_FACTOR)
     of = [f' of brush {brush.number}' for brush in brushes] if len(brushes) > 1 else ['']
@@ -263,7 +263,7 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
         colours = VIRIDIS, 0.0, float(max(flux.max(), (flux * factor).max()))
         for title, values in (('of eq. (1)', flux), ('as learned', flux * factor)):
             title = f'pattern {title}{whose} [µm/s]'
-            found.append(_heat_map(title, labels, along, along, values, colours))
+            found.append(_heat_map(title, places, values, colours))
     peak = float(plain[0].max())
     contours = {
         'type': 'contour', 'x': along, 'y': along, 'z': plain[0], 'showscale': False,
@@ -272,7 +272,7 @@ def footprint_figure(data: ReportData) -> dict[str, Any] | None:
                      'size': 0.4 * peak},
     }  # fmt: skip
     title = f'factor, with contours of eq. (1){of[0]}'
-    found.append(_heat_map(title, labels, along, along, factor, _around(factor, 1.0), [contours]))
+    found.append(_heat_map(title, places, factor, _around(factor, 1.0), [contours]))
     return _figure('footprint', found)
 
 
@@ -284,29 +284,27 @@ def _around(values: np.ndarray, neutral: float) -> tuple[np.ndarray, float, floa
 
 def _heat_map(
     title: str,
-    labels: tuple[str, str],
-    x: np.ndarray,
-    y: np.ndarray,
+    places: Mapping[str, np.ndarray],
     values: np.ndarray,
     colours: tuple[np.ndarray, float, float],
     above: Sequence[dict] = (),
 ) -> dict[str, Any]:
-    """Values (Y, X) at places (X,) and (Y,) with more traces above.
+    """Values (Y, X) at places, (X,) and (Y,) by what they are, with more traces above.
 
     ``colours`` are the table (256, 3) and the values at its ends.
     """
     shared = {'showgrid': False, 'nticks': 6, 'constrain': 'domain'}
-    table, low, high = colours
-    places = np.linspace(0.0, 1.0, len(table)).round(4).tolist()
+    (across, x), (upward, y), (table, low, high) = *places.items(), colours
+    shares = np.linspace(0.0, 1.0, len(table)).round(4).tolist()
     heat = {
         'type': 'heatmap', 'x': x, 'y': y, 'z': values, 'zsmooth': 'best', 'zmin': low,
         'zmax': high, 'hovertemplate': '%{z:.3g} at %{x:.2f}, %{y:.2f} m<extra></extra>',
         'colorscale': [
-            [place, f'rgb({r},{g},{b})'] for place, (r, g, b) in zip(places, table, strict=True)
+            [share, f'rgb({r},{g},{b})'] for share, (r, g, b) in zip(shares, table, strict=True)
         ],
         'colorbar': {'thickness': 10, 'outlinewidth': 0,
                      'tickfont': {'size': 11, 'color': MUTED}},
     }  # fmt: skip
-    across = _axis(labels[0], range=[x[0], x[-1]], **shared)
-    upward = _axis(labels[1], range=[y[0], y[-1]], scaleanchor='x', **shared)
-    return _chart(title, [heat, *above], across, upward, 340)
+    x_axis = _axis(across, range=[x[0], x[-1]], **shared)
+    y_axis = _axis(upward, range=[y[0], y[-1]], scaleanchor='x', **shared)
+    return _chart(title, [heat, *above], x_axis, y_axis, 340)

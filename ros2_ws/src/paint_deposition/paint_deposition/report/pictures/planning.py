@@ -16,11 +16,10 @@ from paint_deposition.planning.improvement import FilmSummary, Improvement, Pass
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.film import draw_tool_path, page_film
 from paint_deposition.report.pictures.part import (
     PALE_HALO,
     PartPicture,
-    draw_tool_path,
     label_points,
 )
 from paint_deposition.report.style import (
