@@ -37,6 +37,9 @@ class FiniteRange(click.FloatRange):
         super().__init__(*ends, **bounds)
         self.name = 'float range' if ends or bounds else 'float'
 
+    def _describe_range(self) -> str:  # of click, whose help says `x<=None` without bounds
+        return super()._describe_range() if self.name == 'float range' else ''
+
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
             number = super().convert(value, param, ctx)
@@ -230,11 +233,6 @@ ALLOW_EFFECTS = click.option(
     '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
     help='Run the Python code of effect files that recordings, results or campaigns name, too.',
 )  # fmt: skip
-PAINT_MOVES = click.option(
-    '--paint-moves', is_flag=True,
-    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
-)  # fmt: skip
-JOINT_ACCELERATION = option_of(DrivingRobot, 'joint_acceleration')
 PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
 MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
 motion_options = options_of(MotionOptions, 'motion', part_pose={'callback': _pose})

@@ -19,7 +19,12 @@ from paint_deposition.planning.requests import (
     IndexRequest,
     PlanRequest,
 )
-from paint_deposition.request import MotionOptions
+from paint_deposition.request import DrivingRobot, MotionOptions
+
+PAINT_MOVES = click.option(
+    '--paint-moves', is_flag=True,
+    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
+)  # fmt: skip
 
 
 @click.command('recommend')
@@ -71,7 +76,7 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     help='Largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
-@options.PAINT_MOVES
+@PAINT_MOVES
 @results_options('the bag, passes.csv, passes.mod, plan.json and the film')
 def plan_command(
     request: PlanRequest,
@@ -161,8 +166,8 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
 @options_of(ImproveRequest)
 @options.seed_option('the models drawn from the posterior of the model file')
 @options.motion_options
-@options.PAINT_MOVES
-@options.JOINT_ACCELERATION
+@PAINT_MOVES
+@options.option_of(DrivingRobot, 'joint_acceleration')
 @options.ALLOW_EFFECTS
 @results_options('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
 def improve_command(
