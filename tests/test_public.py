@@ -5,6 +5,7 @@ import runpy
 import subprocess
 import sys
 from functools import partial
+from xml.etree import ElementTree
 
 import matplotlib
 import numpy as np
@@ -98,6 +99,30 @@ def test_what_is_no_result_is_refused(tmp_path):
         pd.write('film', tmp_path)
 
 
+@pytest.mark.parametrize('which', ['film', 'comparison'])
+def test_a_result_is_a_table(which, request, tmp_path, monkeypatch):
+    """With the columns of its file; in a notebook a short one, as text that cannot run."""
+    result = request.getfixturevalue(which)
+    pd.write(result, tmp_path)
+    name = {'film': 'film.csv', 'comparison': 'residuals.csv'}[which]
+    written = np.genfromtxt(tmp_path / name, delimiter=',', names=True, dtype=None, encoding=None)
+    columns = result.columns()
+    assert tuple(columns) == written.dtype.names
+    for key in ('x_m', 'thickness_um'):
+        assert np.allclose(written[key], columns[key], rtol=1e-4, atol=1e-3), key
+    assert ElementTree.fromstring(result._repr_html_()).find('caption').text == repr(result)
+    monkeypatch.setitem(sys.modules, 'pandas', None)
+    with pytest.raises(pd.PaintError, match=r'needs pandas, .*; run: pip install pandas'):
+        result.to_dataframe()
+
+
+def test_a_table_is_a_data_frame_of_pandas(film):
+    pytest.importorskip('pandas')
+    frame = film.to_dataframe()
+    assert list(frame.columns) == ['x_m', 'y_m', 'z_m', 'thickness_um']
+    assert (frame['thickness_um'].to_numpy() == film.film_um).all()
+
+
 @pytest.mark.slow
 @pytest.mark.timeout(600)
 def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch, undrawn):
@@ -112,6 +137,8 @@ def test_the_example_of_the_page_runs(repository, tmp_path, monkeypatch, undrawn
     names = runpy.run_path(str(example))
     assert isinstance(names['film'], pd.Film)
     assert names['diagnosis'].accepted == ('incidence_attraction',)
+    (row,) = ElementTree.fromstring(names['diagnosis']._repr_html_()).findall('tbody/tr')
+    assert row[0].text == names['diagnosis'].columns()['best'][0] == 'incidence_attraction'
     assert (tmp_path / 'results/diagnosis/report.html').is_file()
     page = (repository / 'docs' / 'python.md').read_text()
     for cell in example.read_text().split('# %%')[1:]:

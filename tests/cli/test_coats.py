@@ -10,7 +10,7 @@ import yaml
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from brushes import NARROW, WIDE
-from cli.command import assert_refused, paint
+from cli.command import paint
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
@@ -103,19 +103,6 @@ def test_each_coat_has_a_column_its_figures_and_its_wet_film(folder, tmp_path):
     emitted = [coat['emitted_volume_cm3'] for coat in figures['coats']]
     share = sum(emitted) / (emitted[0] / 0.5 + emitted[1] / 0.25)
     assert figures['paint']['mean_wet_film_um'] == pytest.approx(figures['mean_um'] / share)
-
-
-@pytest.mark.parametrize(
-    ('words', 'message'),
-    [
-        (['--coat', 'third'], '3 names of coats for 2 motions'),
-        (['--at', 'primer.csv'], "layer 'primer' has no coat of the part; its coats: base, clear"),
-    ],
-)
-def test_coats_that_there_are_not_are_refused(folder, tmp_path, words, message):
-    (tmp_path / 'primer.csv').write_text('x_m,y_m,z_m,thickness_um,layer\n0,0,0,9,primer\n')
-    words = [tmp_path / word if word.endswith('csv') else word for word in words]
-    assert_refused(simulate(folder, *words, '-o', tmp_path / 'out'), message)
 
 
 @pytest.mark.parametrize('wet_on_wet', [False, True])

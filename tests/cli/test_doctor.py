@@ -8,7 +8,7 @@ import pytest
 import rclpy
 
 from cli.command import paint
-from paint_deposition.cli import doctor, options
+from paint_deposition.cli import doctor, results
 
 
 def findings(code: int) -> dict[str, dict]:
@@ -69,7 +69,7 @@ def test_no_other_python_takes_a_module_from_the_current_folder(tmp_path, monkey
     monkeypatch.chdir(tmp_path)
     found = {one.name: one for one in doctor._ros()}
     assert rclpy.get_rmw_implementation_identifier() in found['ROS 2'].found
-    command = options.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
+    command = results.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.stdout == "['a']\n"
     assert "No module named 'mine'" in done.stderr

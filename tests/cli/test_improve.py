@@ -52,21 +52,6 @@ def test_the_film_is_that_of_the_written_files(improved):
         assert np.abs(film - expected).max() < share * expected.max(), name
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures('undrawn')
-def test_a_robot_program_is_improved_in_the_robots_frame(tmp_path):
-    """A module in, a module out, in one frame."""
-    pose = ('--part-pose', 1.8, -0.3, 0.7, 0.0, 0.0, 0.6, 0.8)
-    part = ('--mesh', SAMPLES / 'panel.stl', '--max-edge-length-m', 0.1)
-    done = paint('plan', *part, '--speed', 0.3, *pose, '-o', tmp_path / 'robot')
-    assert done.returncode == 0, done.stderr
-    module = tmp_path / 'robot/passes.mod'
-    done = paint('improve', *part, '--trajectory', module, *pose, '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    text = (tmp_path / 'out/passes.mod').read_text()
-    assert 'PERS wobjdata wobjPart:=[FALSE,TRUE,"",[[1800.000,-300.000,700.000]' in text
-
-
 @pytest.mark.parametrize(
     ('more', 'words'),
     [

@@ -7,15 +7,13 @@ import re
 import shlex
 import shutil
 import subprocess
-from functools import partial
 
 import pytest
 import yaml
 
-import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.cli.results import MARKER
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.verdict import percent
@@ -119,20 +117,6 @@ def test_the_page_of_the_demo_needs_nothing_else_and_opens_once(demo):
     steps = ('paint simulate ', 'paint diagnose ', 'paint compare ', 'paint improve ')
     places = [printed.index(f'$ {step}') for step in steps]
     assert places == sorted(places)
-
-
-@pytest.mark.slow
-def test_a_demo_that_is_cut_off_says_so_on_its_page(tmp_path, monkeypatch, undrawn):
-    def cut_off(*given: object, **named: object) -> None:
-        raise KeyboardInterrupt
-
-    coarse = partial(pd.read_mesh, max_edge_length_m=0.1)
-    monkeypatch.setattr(pd, 'read_mesh', lambda path, **_: coarse(path), raising=False)
-    monkeypatch.setattr(pd, 'diagnose', cut_off, raising=False)
-    assert paint('demo', '-o', tmp_path, '--no-open').returncode == 130
-    page = (tmp_path / 'demo.html').read_text()
-    assert 'Cut off here, while: Diagnosing its readings.' in page
-    assert 'http-equiv="refresh"' not in page
 
 
 @pytest.mark.slow
@@ -329,25 +313,3 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
 def test_bad_input_is_one_line_and_writes_nothing(arguments, words, tmp_path):
     assert_refused(paint(*arguments, '-o', tmp_path / 'out', cwd=tmp_path), *words)
     assert not (tmp_path / 'out').exists()
-
-
-def test_zeros_where_film_is_expected_are_named_until_they_are_said_to_be_missing(
-    door_alone, tmp_path
-):
-    """Twelve readings of 0, as a gauge writes them where it did not measure."""
-    folder = shutil.copytree(door_alone.parent, tmp_path / 'door_of_zeros')
-    head, *rows = (folder / 'door.csv').read_text().splitlines()
-    rows = [re.sub(r'[^,]+(,P\d+)', r'0\1', row) if k < 12 else row for k, row in enumerate(rows)]
-    (folder / 'door.csv').write_text('\n'.join([head, *rows]))
-    content = yaml.safe_load(door_alone.read_text())
-    told = {}
-    for zero in ('', 'missing'):
-        content['experiments'][0] |= {'zero': zero} if zero else {}
-        (folder / 'campaign.yaml').write_text(yaml.safe_dump(content))
-        told[zero] = paint('compare', folder / 'campaign.yaml', '-o', tmp_path / f'out {zero}')
-        assert told[zero].returncode == 0, told[zero].stderr
-    warning = f'warning: door: 12 of {len(rows)} readings are 0 where the model expects '
-    assert warning in told[''].stderr
-    assert 'say zero: missing in the campaign' in told[''].stderr
-    assert 'readings are 0' not in told['missing'].stderr
-    assert '12 rows without a reading' in told['missing'].stderr

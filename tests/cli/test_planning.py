@@ -8,7 +8,7 @@ from PIL import Image
 
 from booth import SAMPLES
 from cli.command import assert_refused, paint
-from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.motion_files import read_recording

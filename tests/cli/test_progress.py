@@ -6,7 +6,7 @@ from contextlib import redirect_stderr
 
 import pytest
 
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.results import Progress
 
 
 class Terminal(io.StringIO):

@@ -8,7 +8,7 @@ import sys
 import pytest
 
 from cli.command import paint
-from paint_deposition.cli.results_folder import MARKER, results_in
+from paint_deposition.cli.results import MARKER, results_in
 from paint_deposition.errors import PaintError
 
 
@@ -109,7 +109,7 @@ def test_a_file_of_the_users_own_is_not_overwritten(tmp_path):
 AT_A_CALL = """
 import os, sys
 from pathlib import Path
-from paint_deposition.cli.results_folder import results_in
+from paint_deposition.cli.results import results_in
 folder, end, call = Path(sys.argv[1]), sys.argv[2], int(sys.argv[3])
 with results_in(folder) as work:
     (work / 'trajectory').mkdir()
@@ -161,7 +161,7 @@ def test_commands_on_one_folder_take_turns(tmp_path):
     code = """
 import sys
 from pathlib import Path
-from paint_deposition.cli.results_folder import results_in
+from paint_deposition.cli.results import results_in
 for _ in range(40):
     with results_in(Path(sys.argv[1])) as work:
         for k in range(5):
@@ -180,7 +180,7 @@ def test_a_signal_ends_a_command_like_an_interrupt_and_nothing_is_left(tmp_path,
 import sys, time
 from pathlib import Path
 from paint_deposition.cli import main
-from paint_deposition.cli.results_folder import results_in
+from paint_deposition.cli.results import results_in
 def work(**given):
     with results_in(Path(sys.argv[1])) as folder:
         (folder / 'half').touch()

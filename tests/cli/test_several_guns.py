@@ -83,18 +83,6 @@ def test_the_film_is_the_sum_of_the_guns(surface):
     assert [gun.name for gun in both.guns] == ['gun 1', 'gun 2']
 
 
-def test_paint_that_sags_sags_from_the_whole_film(surface):
-    """What acts on the finished film acts on the sum, and not on each gun's share."""
-    sagging = DepositionModel().with_effect(Sag.typical())
-    motions = [UPPER, UPPER]
-    both = pd.simulate(surface, motions, sagging)
-    twice = PlanarPattern(K1_cm3_per_s=2.0 * PlanarPattern().K1_cm3_per_s)
-    doubled = pd.simulate(surface, UPPER, sagging.model_copy(update={'planar': twice}))
-    assert both.film_um == pytest.approx(doubled.film_um, rel=1e-5, abs=1e-4)
-    with pytest.raises(ModelError, match=r'gun 1 and gun 2 differ in what .* \(sag\)'):
-        pd.simulate(surface, motions, [sagging, DepositionModel()])
-
-
 def test_one_bag_with_both_guns(bags, tmp_path):
     guns = '--atomizer', 'robot_1', '--atomizer', '/robot_2'
     done = paint(

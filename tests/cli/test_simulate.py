@@ -1,20 +1,17 @@
 """`paint simulate` over real files, as a user runs it."""
 
 import json
-from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
 import paint_deposition as pd
-from booth import LOOKING_ALONG_Y, SAMPLES
+from booth import SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint
-from files.recorded import Messages, pose_entries, write_bag
-from paint_deposition.cli.results_folder import MARKER
+from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.errors import RecordingError
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -141,22 +138,6 @@ def refused(tmp_path, *arguments):
     return done
 
 
-def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
-    entries = pose_entries(level_pass())
-    messages = Messages()
-    for row in (10, 60, 110):
-        topic, stamp, _ = entries[row]
-        nowhere = messages.pose(stamp + 1_000_000, [np.nan, 0, 0], LOOKING_ALONG_Y, '')
-        entries.insert(row + 1, (topic, stamp + 1_000_000, nowhere))
-    surface = pd.read_mesh(panel, max_edge_length_m=0.1)
-    film = pd.simulate(surface, pd.read_recording(write_bag(tmp_path / 'some', entries)))
-    assert film.counts.not_finite == 3
-    assert np.array_equal(film.film_um, pd.simulate(surface, level_pass()).film_um)
-    positions = np.full_like(level_pass().positions_m, np.nan)
-    with pytest.raises(RecordingError, match='150 not finite'):
-        pd.simulate(surface, replace(level_pass(), positions_m=positions))
-
-
 @pytest.mark.parametrize(
     ('option', 'value', 'words'),
     [
@@ -170,7 +151,7 @@ def test_bad_poses_are_dropped_and_counted(panel, tmp_path):
         ('--max-edge-length-m', '1e-6', ['max_edge_length_m', 'give an edge length of at least']),
         ('--tolerance-um', '3', ['--target-um']),
         ('--tolerance-um', ('60', '--target-um', '45'), ['bare metal would be within it']),
-        ('--down', ('0', '0', '0'), ['--down', 'give a direction']),
+        ('--down', ('0', '0', '0'), ['down', 'give the direction of gravity']),
         ('--target-um', 'nan', ['--target-um', 'nan is not finite']),
     ],
 )

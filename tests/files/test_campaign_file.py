@@ -91,8 +91,11 @@ def test_a_trigger_that_is_not_named_is_noted(campaign):
         ({'measurement': 'door.csv'}, "unknown key 'measurement'; did you mean 'measurements'"),
         ({'mesh_scale': 0}, 'mesh_scale is 0; expected a number above 0: metres per unit'),
         ({'max_pose_gap_s': 'long'}, "max_pose_gap_s is 'long'; expected a number above 0"),
-        ({'down': 'z'}, r"down is 'z'; expected \[x, y, z\]"),
-        ({'down': [0, 0, float('nan')]}, r'down.2 is nan; expected \[x, y, z\]'),
+        ({'down': 'z'}, r"down is 'z'; expected gravity in the mesh frame, three"),
+        (
+            {'down': [0, 0, float('nan')]},
+            r'down.2 is nan; expected gravity in the mesh frame, three',
+        ),
         ({'columns': {'thick': 'DFT'}}, "columns.thick is 'thick'; expected the heading.* x, y"),
         ({'columns': {'x': ['a', 'b']}}, 'x has one column; only thickness may have a list'),
         ({'columns': {'layers': 'a'}}, "give 'layers' the columns by the names of the layers"),

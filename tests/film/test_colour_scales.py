@@ -45,6 +45,20 @@ def test_automatic_ends_are_round_figures(value, rounded):
     assert film_scale(np.array([0.0, value])).high == pytest.approx(rounded)
 
 
+@pytest.mark.parametrize(
+    ('film', 'ends'),
+    [
+        ((16.7, 50.9), (15, 55)),
+        ((17.7, 21.9), (17, 22)),
+        ((5, 100), (0, 100)),
+        ((20, 20), (20, 20.05)),
+    ],
+)
+def test_a_film_that_is_thick_everywhere_has_the_colours_for_itself(film, ends):
+    scale = film_scale(np.array(film, dtype=float))
+    assert (scale.low, scale.high) == pytest.approx(ends)
+
+
 def test_residual_scale_is_even_about_zero():
     scale = residual_scale(np.array([-7.0, 3.0]))
     assert (scale.low, scale.high) == (-8.0, 8.0)

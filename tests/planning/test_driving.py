@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 import paint_deposition as pd
 import robot_arm
 from cli.command import paint
-from paint_deposition.api.robot import place, read_robot
+from paint_deposition.api.planning import place, read_robot
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern

@@ -14,7 +14,7 @@ from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.report import report_html
+from paint_deposition.report.page import report_html
 from small_campaign import small_campaign
 
 HOSTILE = '</script><script>alert(1)</script><img src=x onerror="alert(2)">\'"'

@@ -12,13 +12,13 @@ from paint_deposition.effects.learned.law import WAVES, LearnedFootprint, Learne
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, FootprintProfile
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.learned import (
+from paint_deposition.report.charts import (
     footprint_figure,
     learned_figure,
     map_figure,
     profile_figure,
 )
+from paint_deposition.report.data import ReportData
 from small_campaign import small_campaign
 
 KNOTS = 24

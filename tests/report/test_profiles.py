@@ -9,7 +9,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.pictures.comparison import comparison_figure
+from paint_deposition.report.pictures.readings import comparison_figure
 from small_campaign import small_campaign
 
 

@@ -25,9 +25,8 @@ from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.verdict import EffectClass, Interval
 from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.report import write_report
-from paint_deposition.report.page.tables import point_rows
-from paint_deposition.report.words import learned_range
+from paint_deposition.report.page import write_report
+from paint_deposition.report.tables import law_rows, point_rows
 from small_campaign import small_campaign
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures('undrawn')]
@@ -359,10 +358,12 @@ def test_a_law_learned_as_asked_is_no_verdict(tmp_path, diagnosis):
     done = refit(campaign, DepositionModel(), learned_law('height_fraction'))
     write_report(tmp_path / 'report.html', ReportData.of(done))
     page = page_of(tmp_path / 'report.html')
-    law = done.model.effect('learned:height_fraction')
     assert 'Added as asked' in page.text
     assert 'no known effect' not in page.text
-    assert learned_range(law) in page.text
+    (law,) = law_rows(ReportData.of(done))
+    told = f"neutral outside the readings' range, {law['ends']}. At 95 % it is known best, to "
+    assert f'{told}{law["best"]}, and least, to {law["least"]}.' in page.text
+    assert re.fullmatch(r'± [\d.]+ µm at [\d.]+', law['best'])
     before, after = (f'{step.holdout_rmse_um:.2f} µm' for step in done.history)
     assert f'left out of the fit: {before} → {after}; beyond gauge and texture: ' in page.text
     assert page.open == page.clashes == []

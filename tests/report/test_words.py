@@ -10,11 +10,9 @@ from paint_deposition.report.words import (
     effect_name,
     in_unit,
     is_learned,
-    learned_range,
     learned_words,
     number,
     parameter_words,
-    step_words,
 )
 
 
@@ -57,7 +55,6 @@ def test_learned_laws_are_told_by_what_they_depend_on():
     name = 'learned law over the time since the motion began'
     assert effect_name('learned:time_s') == name
     assert effect_name('edge_build and learned:time_s') == f'edge build and {name}'
-    assert step_words({'added': 'learned:time_s'}) == f'+ {name}'
     assert is_learned('learned:time_s')
     assert not is_learned('edge_build')
 
@@ -79,23 +76,3 @@ def test_a_learned_law_is_told_by_its_curve_and_its_range():
     # Mean and first harmonic add up on the heavier side.
     ring = LEARNED['footprint'](reach_m=0.3, learned=(0.0,) * 5 + (0.1, 0.2, 0.0, 0.0, 0.0))
     assert learned_words(ring)[0] == ('factor', '0.9 to 1.3', '')
-
-
-NO_FORM = ' No closed form of few parameters fits within its band.'
-
-
-def test_a_learned_law_says_where_it_is_neutral():
-    passes = LEARNED['spray_pass'](low=0.0, high=5.0)
-    assert learned_range(passes) == (
-        "Learned law over the number of the pass: neutral outside the readings' range, 1 to 6."
-    )
-    known = passes.model_copy(update={'learned': (0.1, 0.2, 0.3), 'sd': (0.05, 0.01, 0.02)})
-    assert learned_range(known) == (
-        learned_range(passes)
-        + ' At 95 % it is known best, to ± 0.02 at 3.5, and least, to ± 0.098 at 1.'
-        + NO_FORM
-    )
-    fog = LEARNED['height_fraction'](kind='addition', sd=(0.5, 1.0))
-    assert learned_range(fog).endswith('to ± 0.98 µm at 0, and least, to ± 2 µm at 1.' + NO_FORM)
-    assert 'on any other part' in learned_range(LEARNED['place']())
-    assert '300 mm from the axis' in learned_range(LEARNED['footprint'](reach_m=0.3))

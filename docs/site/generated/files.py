@@ -97,6 +97,8 @@ def _listed(keys: Iterable[str]) -> str:
 def _bounds(said: dict[str, Any]) -> str:
     """The range of a number, whether or not it may be left out."""
     for kind in (said, *said.get('anyOf', ())):
+        if 'enum' in kind:
+            return ', '.join(kind['enum'])
         low, above = kind.get('minimum'), kind.get('exclusiveMinimum')
         high = kind.get('maximum')
         if above is not None:

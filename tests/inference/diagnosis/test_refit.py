@@ -14,7 +14,7 @@ from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.report.writers.models import write_fitted
+from paint_deposition.report.writers.inference import write_fitted
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow

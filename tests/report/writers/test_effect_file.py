@@ -11,7 +11,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.kernel.laws import Ray
-from paint_deposition.report.writers.models import effect_entry, write_effect_file
+from paint_deposition.report.writers.inference import effect_entry, write_effect_file
 from small_campaign import small_campaign
 
 KNOTS, SD = 12, 0.02

@@ -12,7 +12,7 @@ from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.model.eq2_projection import Projection
-from paint_deposition.report.writers.models import write_fitted
+from paint_deposition.report.writers.inference import write_fitted
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow

@@ -1,6 +1,5 @@
 """The public names: what a script or a notebook needs, and where each is defined."""
 
-from paint_deposition.api.improvement import improve as improve
 from paint_deposition.api.inference import (
     calibrate as calibrate,
 )
@@ -16,6 +15,9 @@ from paint_deposition.api.inference import (
 )
 from paint_deposition.api.inference import (
     refit as refit,
+)
+from paint_deposition.api.planning import (
+    improve as improve,
 )
 from paint_deposition.api.planning import (
     plan as plan,

@@ -1,22 +1,25 @@
 """What commands, nodes, scripts and files say, checked once: models with all defaults and limits.
 
-A request is one such model. The options of a command (``cli/options_of.py``), the signature of its
-verb and the schema of what is written of it follow from it.
+Each thing that can be asked for is described here or in a request of its own room, and only there.
+The options of a command (``cli/options.py``), the signature of its verb, the keys of files and
+their tables in the documentation follow from it.
 """
 
 import inspect
 from collections.abc import Callable, Mapping
 from dataclasses import asdict
-from typing import Any, ClassVar, TypeVar, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args, get_origin
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 from pydantic.fields import FieldInfo
 
 from paint_deposition.errors import PaintError, PlanError, did_you_mean, quoted
 
 Verb = TypeVar('Verb', bound=Callable)
 Made = TypeVar('Made', bound=BaseModel)
+Text = Annotated[str, Field(min_length=1)]
+Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
 
 
 class Request(BaseModel):
@@ -52,7 +55,8 @@ def given(
     Args:
         default: its value where none is given; None: it may be left out.
         text: what it is, with its unit; the help of its option.
-        option: of the command; default: the name of the field.
+        option: of the command, several names with blanks between them; default: the name of the
+            field.
         above, below: bounds that are not included; least, most: bounds that are.
         metavar: what stands for the value in the help.
     """
@@ -60,6 +64,118 @@ def given(
     return Field(
         default, description=text, gt=above, lt=below, ge=least, le=most,
         json_schema_extra={name: value for name, value in extra.items() if value},
+    )  # fmt: skip
+
+
+class PartMesh(BaseModel):
+    """How the mesh of a part is read."""
+
+    mesh_scale: Number = given(
+        1.0,
+        'Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP name their '
+        'unit: leave it out there.', above=0.0,
+    )  # fmt: skip
+    body: Text | None = given(
+        None, 'The one body to take of a mesh file with several; default: all as one part.'
+    )
+    down: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = given(
+        None, 'Gravity in the mesh frame, three numbers; default: -z, or -y if drawn flat at '
+        'z = 0.',
+        metavar='X Y Z',
+    )  # fmt: skip
+
+
+class OnePart(PartMesh):
+    """How the mesh of a part is read, and the motion over it."""
+
+    max_pose_gap_s: Number = given(
+        0.25, 'A longer interval between poses is a gap, in which the gun is off [s].', above=0.0
+    )
+
+
+class FilmBand(Request):
+    """The film that is wanted on a part."""
+
+    target_um: float = given(0.0, 'Target film [µm].', least=0.0)
+    tolerance_um: float = given(
+        0.0, 'Accepted difference from the target, either way [µm].', least=0.0
+    )
+
+    @model_validator(mode='after')
+    def _has_target(self) -> 'FilmBand':
+        if self.tolerance_um and not self.target_um:
+            raise PlanError('tolerance_um has no target_um; give both')
+        return self
+
+
+class RobotArm(BaseModel):
+    """The robot and the ends of its chain."""
+
+    urdf: Text | None = given(
+        None, 'URDF of the robot whose joints the file has, or that is to drive the motion.'
+    )
+    tip_link: Text | None = given(
+        None, 'Link of the URDF that is the TCP; default: tool0, else its last link.',
+        '--tip --tip-link',
+    )  # fmt: skip
+    base_link: Text | None = given(
+        None, 'Link of the URDF for the frame of the poses; default: its root.',
+        '--base --base-link',
+    )  # fmt: skip
+
+
+class DrivingRobot(RobotArm):
+    """A robot that is to drive a motion."""
+
+    joint_acceleration: float | None = given(
+        None, 'Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: '
+        'full speed in a quarter of a second.', above=0.0,
+    )  # fmt: skip
+
+
+class MotionOptions(RobotArm, extra='forbid'):
+    """What to read of a motion file, and where the part stands; None: not given."""
+
+    pose_topic: Text | None = given(
+        None, 'Topic of the poses in a bag; default: its only PoseStamped topic. Of an array: '
+        '/poses[2]. With a URDF: joint states, several with blanks between them.',
+    )  # fmt: skip
+    state_topic: Text | None = given(
+        None, 'Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
+        'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: it '
+        'sprays whenever poses flow.', '--state-topic --trigger',
+    )  # fmt: skip
+    gun_signal: Text | None = given(
+        None, 'Digital output that opens the gun, for a RAPID module that sets several.'
+    )
+    procedure: Text | None = given(None, 'Where a RAPID program starts; default: main.')
+    tf: Annotated[list[Text], Field(min_length=2, max_length=2)] | None = given(
+        None, 'The motion as transforms of the bag: frame SOURCE, that of the TCP, in frame '
+        'TARGET.', metavar='TARGET SOURCE',
+    )  # fmt: skip
+    joint_prefix: Text | None = given(
+        None, "What the joints' names have before those of the URDF, or lack: irb_."
+    )
+    pose_unit: Literal['m', 'mm', 'cm'] | None = given(
+        None, 'Unit of positions and rails; default: that of the headings, else m.'
+    )
+    rotation: Text | None = given(
+        None, 'Three numbers of an orientation in a table: rotvec, or Euler angles as ZYX (axes '
+        'of the tool), xyz (fixed axes), kuka, abb, fanuc, rpy, staubli, kawasaki.',
+        metavar='CONVENTION',
+    )  # fmt: skip
+    angle_unit: Literal['deg', 'rad'] | None = given(
+        None, 'Unit of joints and angles; default: that of the headings, else rad.'
+    )
+    tool_axis: Literal['x', 'y', 'z', '-x', '-y', '-z'] | None = given(
+        None, 'Axis of the recorded tool along which it sprays, x for a KUKA; default: z.'
+    )
+    frame_id: Text | None = given(None, "Name of the part's frame; default: part.")
+    strict: bool = given(False, 'Refuse a recording with a pose or state that would be left out.')
+    part_pose: Annotated[list[Number], Field(min_length=7, max_length=7)] | None = given(
+        None, 'Where the part stands in the frame of the poses: x y z [m] and the unit quaternion '
+        'qx qy qz qw.',
+        metavar='X Y Z QX QY QZ QW',
     )  # fmt: skip
 
 
@@ -124,12 +240,11 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
         return f'{place}unknown key {quoted(key)}; {remedy}{more}'
     if first['type'] == 'missing':
         return f'{place[:-2]} has no {key!r}; give {_expected(field)}{more}'
-    if where:
-        return f'{place}{key} is {quoted(value)}; expected {_expected(field)}{more}'
-    # What a file takes stands in the descriptions of its keys, what a request takes does not.
-    shown = f'{value:g}' if isinstance(value, float) else quoted(value)
-    choice = f'{first["ctx"]["expected"]}: ' if first['type'] == 'literal_error' else ''
-    return f'{key} is {shown}; expected {choice}{_expected(field, (float, int))}{more}'
+    shown = f'{value:g}' if isinstance(value, float) and not where else quoted(value)
+    one_of = first['type'] == 'literal_error' and get_origin(field.annotation) is not dict
+    choice = f'{first["ctx"]["expected"]}: ' if one_of else ''
+    numbers = (float,) if where else (float, int)
+    return f'{place}{key} is {shown}; expected {choice}{_expected(field, numbers)}{more}'
 
 
 def _field(model: type[BaseModel] | None, place: tuple[int | str, ...]) -> FieldInfo | None:
@@ -150,16 +265,19 @@ def _takes_a(field: FieldInfo, kinds: tuple[type, ...]) -> bool:
 
 def _expected(field: FieldInfo, numbers: tuple[type, ...] = (float,)) -> str:
     """What a field takes: for these kinds of numbers the range, and what it means."""
+    # The description within a sentence.
+    text = str(field.description).rstrip('.')
+    means = text if text[:2].isupper() else text[:1].lower() + text[1:]
     if field.annotation is bool:
-        return f'true or false: {field.description}'
+        return f'true or false: {means}'
     if not _takes_a(field, numbers):
-        return str(field.description)
+        return means
     limits: dict[str, float] = {}
     for bound in field.metadata:
         if isinstance(bound, Ge | Gt | Le | Lt):
             limits |= asdict(bound)
     if 'ge' in limits and 'le' in limits:
-        return f'a number {limits["ge"]:g} to {limits["le"]:g}: {field.description}'
+        return f'a number {limits["ge"]:g} to {limits["le"]:g}: {means}'
     words = {'gt': 'above', 'ge': 'of at least', 'lt': 'below', 'le': 'up to'}
     bounds = ' and '.join(f'{words[k]} {limits[k]:g}' for k in words if k in limits)
-    return f'a number {bounds}: {field.description}'.replace('number :', 'number:')
+    return f'a number {bounds}: {means}'.replace('number :', 'number:')

@@ -1,22 +1,53 @@
-"""Where passes should lie: the index on a plane, and passes on a part."""
+"""Where passes should lie, how fast they are driven, and where part and robot stand for it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PlanError, RecordingError
+from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.fitting.posterior import draw_models
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, at_part, is_frame, is_pose
+from paint_deposition.motion.programmed import timed
+from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driving import RobotCell
+from paint_deposition.planning.improvement import DEFAULT_TOLERANCE, FilmSummary, Improvement
+from paint_deposition.planning.part_place import PartPlaces, part_places
 from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
+from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
+from paint_deposition.planning.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.planning.recommendation import recommend as recommended
-from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
+from paint_deposition.planning.requests import (
+    GunEnvelope,
+    ImproveRequest,
+    IndexRequest,
+    PlanRequest,
+)
+from paint_deposition.planning.retiming import retime_for_evenness
+from paint_deposition.planning.surface_map import painted_side, pass_axes
 from paint_deposition.request import takes
+
+Progress = Callable[[str, float], None]
+# The film counts where the programme lays more than this share of its greatest film.
+COUNTED_ABOVE = 0.1
+# A gun whose mean direction is shorter paints more sides than one.
+ONE_SIDE = 0.9
+DRAWS = 8
 
 
 @takes(IndexRequest)
@@ -43,7 +74,7 @@ def plan(
     envelope: GunEnvelope | None = None,
     robot: RobotCell | None = None,
     zones: Zones | None = None,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = lambda what, share: None,
     **wanted: Any,
 ) -> Plan:
     """Lay passes over a part and compute the film to expect.
@@ -63,8 +94,7 @@ def plan(
 
     Raises:
         PlanError: the request has no answer, or the gun touches the part; says why and what comes
-            closest.
-        PaintError: a zone has no vertex of the part.
+            closest. PaintError: a zone has no vertex of the part.
     """
     request, on_part = _with_zones(surface, zones, wanted)
     unoptimised = planned(
@@ -84,7 +114,7 @@ def plan_faces(
     envelope: GunEnvelope | None = None,
     robot: RobotCell | None = None,
     zones: Zones | None = None,
-    progress: Callable[[str, float], None] = lambda what, share: None,
+    progress: Progress = lambda what, share: None,
     **wanted: Any,
 ) -> PartPlan:
     """Lay passes over a part that has several sides, each of them sprayed by itself.
@@ -114,3 +144,136 @@ def _with_zones(
     if zones is None:
         return PlanRequest(**wanted), None
     return PlanRequest(**(wanted | {'optimise': True})), zones.on(surface)
+
+
+@takes(ImproveRequest)
+def improve(
+    surface: Surface,
+    trajectory: Trajectory,
+    model: DepositionModel | None = None,
+    *,
+    posterior: Posterior | None = None,
+    rivals: Sequence[DepositionModel] = (),
+    target_region: np.ndarray | None = None,
+    zones: Zones | None = None,
+    robot: RobotCell | None = None,
+    seed: int = 0,
+    progress: Progress = lambda what, share: None,
+    **wanted: Any,
+) -> Improvement:
+    """Keep the path of a programme and change its speeds, flows and triggers.
+
+    Args:
+        surface: the part; it is turned round, with a note, if the gun looks at its back.
+        trajectory: the programme, in the frame of the mesh.
+        model: what the gun sprays; default: a 50 mm bell.
+        posterior: what is known of the model; the film is made even over draws from it.
+        rivals: other models that explain the readings as well; each counts as much as the model.
+        target_region: (V,) bool, vertices whose film counts; default: the side that the gun
+            faces, where the programme lays more than a tenth of its greatest film.
+        zones: regions with targets of their own, from ``read_zones``: the film over its own target
+            is made even. Elsewhere it counts only where ``target_um`` is given.
+        robot: that is to drive it, from ``read_robot``: its joints limit the speeds.
+        seed: of the draws.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+        wanted: the fields of ``planning.requests.ImproveRequest``.
+
+    Raises:
+        RecordingError: the motion cannot be used. PlanError: the limits leave no motion.
+        PaintError: a zone has no vertex of the part.
+    """
+    model = model or DepositionModel()
+    request = ImproveRequest(**wanted)
+    seen = look_at(surface, trajectory, model)
+    surface, original = seen.surface, Programme.of(trajectory)
+    if not request.spray_turns:
+        original = closed_beside(original, surface)
+    begin = None
+    point_zones = zones.on(surface) if zones else None
+    if robot:
+        allowed, begin = robot.allowed_speeds(trajectory)
+        original = replace(original, allowed=allowed)
+    progress('the film as it is', 0.0)
+    film_um, paint = simulated(surface, model, trajectory)
+    if film_um.max() < NO_PAINT_UM:
+        raise RecordingError(f'{trajectory.source}: no paint lands on the part')
+    if target_region is None:
+        target_region = film_um > COUNTED_ABOVE * film_um.max()
+        towards = -seen.path.rotation[seen.path.flow > 0.0][:, :, 2].mean(axis=0)
+        if np.linalg.norm(towards) >= ONE_SIDE:
+            target_region &= painted_side(surface, pass_axes(surface, outward=towards))
+    sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
+    if sought.target_um is None:
+        mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])
+        sought = replace(sought, target_um=mean_um)
+    models = [model, *rivals]
+    if posterior is not None:
+        models += draw_models(model, posterior, DRAWS, seed)
+    retiming = retime_for_evenness(surface, sought, original, models, request, progress)
+    programme, drive = retiming.programme, None
+    if robot:
+        drive = robot.drive(programme.trajectory(), free_roll=False, begin=begin)
+        programme = Programme.of(drive.trajectory)
+    moves = moves_of(programme, request)
+    progress('the film as it will be', 0.0)
+    improved = programme.trajectory()
+    new_um, new_paint = simulated(surface, model, improved)
+    program_um, _ = simulated(surface, model, timed(moves, gun_known=True))
+    tolerance = request.tolerance or DEFAULT_TOLERANCE
+    band = surface, sought, retiming.target_um, tolerance
+    before = FilmSummary.of(film_um, *band, paint.emitted_cm3, trajectory)
+    after = FilmSummary.of(new_um, *band, new_paint.emitted_cm3, improved)
+    return Improvement(
+        surface, sought, model, request, trajectory, improved, moves, retiming, before,
+        after, float(np.abs(program_um - new_um).max() / new_um.max()),
+        (*seen.trajectory.warnings, *seen.geometry.warnings), drive,
+    )  # fmt: skip
+
+
+def read_robot(
+    urdf: str | Path,
+    part_pose: Sequence[float],
+    tip_link: str | None = None,
+    base_link: str | None = None,
+    joint_acceleration: float | None = None,
+) -> RobotCell:
+    """Read the robot that is to drive a plan.
+
+    Args:
+        urdf: its description; every joint has a greatest speed.
+        part_pose: where the part stands in its base: x y z [m] and a quaternion qx qy qz qw.
+        tip_link, base_link: of the TCP and of the poses; default: tool0 or the last link, and the
+            root.
+        joint_acceleration: of every joint [rad/s2 or m/s2]; default: each reaches its full speed
+            in a quarter of a second.
+
+    Raises:
+        PaintError: the file cannot be read, or a joint has no greatest speed.
+    """
+    if not is_pose(part_pose):
+        raise PlanError(f'part_pose is {list(part_pose)}; give {POSE_FORMAT}')
+    robot = Robot.read(Path(urdf), tip_link, base_link)
+    return RobotCell(robot.arm, Rigid.of(part_pose), joint_acceleration)
+
+
+def place(
+    trajectory: Trajectory,
+    cell: RobotCell,
+    x_m: Sequence[float] | np.ndarray,
+    y_m: Sequence[float] | np.ndarray,
+    free_roll: bool = False,
+    progress: Progress = lambda what, share: None,
+) -> PartPlaces:
+    """Look where a part may stand so that the robot drives a motion over it.
+
+    Args:
+        trajectory: the motion, in the frame of the part, ``part`` or without a name, or in that of
+            the robot's base with the part at ``cell.part``.
+        cell: the robot, with height and turn of the part.
+        x_m, y_m: places of the part to try in the robot's base [m].
+        free_roll: the tool may be turned about its own axis, as where the pattern is round.
+        progress: called with what is being done and the share of it that is done, 0 to 1.
+    """
+    if not is_frame(trajectory.frame_id, 'part'):
+        trajectory = at_part(trajectory, cell.part.values, 'part')
+    return part_places(trajectory, cell, np.array(x_m), np.array(y_m), free_roll, progress)

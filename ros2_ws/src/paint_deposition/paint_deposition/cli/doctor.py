@@ -17,7 +17,8 @@ from textwrap import TextWrapper
 import click
 
 import paint_deposition as pd
-from paint_deposition.cli import options
+from paint_deposition.cli.options import JSON
+from paint_deposition.cli.results import python
 
 # Mean film on the painted share of the sample panel [µm], and how far rounding may move it.
 KNOWN_FILM_UM = 19.2131
@@ -39,7 +40,7 @@ class Finding:
 
 
 @click.command('doctor')
-@options.JSON
+@JSON
 def doctor_command(as_json: bool) -> None:
     """Say what is installed, and whether it computes what it should.
 
@@ -104,7 +105,7 @@ def _libraries() -> Iterator[Finding]:
 
 
 def _ros() -> Iterator[Finding]:
-    asked = subprocess.run(options.python(ASK_ROS), capture_output=True, text=True, timeout=60)
+    asked = subprocess.run(python(ASK_ROS), capture_output=True, text=True, timeout=60)
     if asked.returncode:
         said = asked.stderr.strip().splitlines() or [f'ended with exit code {asked.returncode}']
         yield Finding('ROS 2', said[-1], None, ROS_REMEDY)

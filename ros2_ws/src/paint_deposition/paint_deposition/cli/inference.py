@@ -11,11 +11,11 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import model_words
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.models import model_words
+from paint_deposition.cli.results import Progress, Results, print_all, results_options
 from paint_deposition.errors import PaintError
 
-RESULTS = options.results_options('the results')
+RESULTS = results_options('the results')
 MODEL = options.model_option(
     "Model to start from; default: the campaign's, else that of a 50 mm bell."
 )
@@ -23,7 +23,6 @@ SEED = options.seed_option(
     'the starts of the fits and of the simulated deviations behind the p-value; other draws are '
     'always the same'
 )
-FITTED = 'fitted to the campaign, from'
 
 
 def _run(
@@ -33,28 +32,25 @@ def _run(
     campaign: Path,
     model_file: Path | None,
     part_pose: list[float] | None,
-    results: options.Results,
+    results: Results,
     zones_file: Path | None = None,
     begins_with: Iterable[str] = ('model', 'posterior'),
-    fitted: str = FITTED,
+    fitted: bool = True,
     words: str = '',
 ) -> None:
     """Read a campaign and a model, compute, write, and say what came out.
 
-    Args:
-        command: its name.
-        verb: what computes the result, which ``lines`` puts into words.
-        begins_with: what of the model's file the verb takes.
-        fitted: what happens to the model, for the line on it; words: that line, if it is another.
+    The ``verb`` takes of the model's file what it ``begins_with``, and ``lines`` put its result
+    into words. The line on the model says whether it was ``fitted``, or is ``words``.
     """
     from paint_deposition.effects.catalogue import load_effect_file, load_unnamed_effect_file
     from paint_deposition.files.model_file import read_model_file
 
-    def remark(kind: str, experiment: str, line: str) -> None:
-        options.print_all(kind, [f'{experiment}: {line}'])
-
     with Progress(command) as show:
-        data = pd.read_campaign(campaign, show, part_pose, remark, zones_file)
+        data = pd.read_campaign(
+            campaign, show, part_pose,
+            lambda kind, name, line: print_all(kind, [f'{name}: {line}']), zones_file,
+        )  # fmt: skip
         chosen = Path(model_file or data.model_file or '')
         load = load_effect_file if model_file else load_unnamed_effect_file
         start = read_model_file(chosen, load) if chosen.name else None
@@ -63,17 +59,15 @@ def _run(
         show('writing')
         more = {'start': start} if isinstance(result, pd.Calibration | pd.Diagnosis) else {}
         results.write(result, **more)
-    options.print_all('note', data.understood)
-    if isinstance(result, pd.SideBySide):
-        options.print_all('warning', next(iter(result.by_name.values())).warnings)
-    else:
-        options.print_all('warning', result.warnings)
-        for name, found in result.geometry.items():
-            options.print_all('warning', (f'{name}: {line}' for line in found.warnings))
-    model_line = f'{fitted or FITTED} a 50 mm bell'
-    if start is not None:
-        model_line = f'{fitted} {model_words(chosen, start)}'.strip()
-    results.print(lines(result), words or model_line)
+    # Of several models the parts, and so how the gun ran over them, are the same.
+    first = next(iter(result.by_name.values())) if isinstance(result, pd.SideBySide) else result
+    warnings, said = [*first.warnings], [*lines(result)]
+    for name, found in first.geometry.items() if first is result else ():
+        said.append(f'{name}: {found.sentence}')
+        warnings += (f'{name}: {line}' for line in found.warnings)
+    source = model_words(chosen, start) if start else 'a 50 mm bell'
+    begin = 'fitted to the campaign, from ' if fitted or start is None else ''
+    results.print(said, words or begin + source, data.understood, warnings)
 
 
 @click.command('calibrate')
@@ -82,19 +76,18 @@ def _run(
 @options.seed_option('the starts of the fit')
 @options.PART_POSE
 @options.ALLOW_EFFECTS
-@options.results_options('model.yaml, calibration.json and pictures')
+@results_options('model.yaml, calibration.json and pictures')
 def calibrate_command(seed: int, **given: Any) -> None:
     """Fit the bell's pattern to the gauge readings of CAMPAIGN.
 
     Any number of panels and parts may be in it; a flat panel painted by a few passes is best. The
     effects of the model to start from are fitted as well; its projection is kept.
     """
-    verb = partial(pd.calibrate, seed=seed)
-    _run('calibrate', verb, _calibration_lines, begins_with=['model'], **given)
+    given |= {'begins_with': ['model']}
+    _run('calibrate', partial(pd.calibrate, seed=seed), _calibration_lines, **given)
 
 
 def _calibration_lines(result: pd.Calibration) -> Iterator[str]:
-    yield from options.geometry_lines(result)
     for value in result.parameters:
         mark = '' if value.determined else '   not determined'
         yield f'{value.name:>14} = {value.value:.4g}  ({value.low:.4g} to {value.high:.4g}){mark}'
@@ -138,24 +131,18 @@ def compare_command(model_files: tuple[Path, ...], **given: Any) -> None:
     Writes comparison.json, residuals.csv, comparison.png and report.html. With several models
     there is a table of residuals for each.
     """
-    if len(model_files) > 1:
-        models = dict(zip(_names(model_files), map(pd.read_model, model_files), strict=True))
-        words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
-        given |= {'model_file': None, 'begins_with': [], 'words': words}
-        _run('compare', verb, _side_by_side_lines, **given)
-    else:
+    if len(model_files) < 2:
         given |= {'model_file': next(iter(model_files), None), 'begins_with': ['model']}
-        _run('compare', pd.compare, _comparison_lines, fitted='', **given)
-
-
-def _names(files: tuple[Path, ...]) -> list[str]:
-    """What models are called: their files without the suffix, or the paths if two are alike."""
-    names = [file.stem for file in files]
-    names = names if len(set(names)) == len(names) else [str(file) for file in files]
-    for name in names:
-        if names.count(name) > 1:
-            raise click.UsageError(f'--model {name} is given twice; give each model once')
-    return names
+        _run('compare', pd.compare, _comparison_lines, fitted=False, **given)
+        return
+    names = [file.stem for file in model_files]
+    names = names if len(set(names)) == len(names) else [*map(str, model_files)]
+    if twice := next((name for name in names if names.count(name) > 1), ''):
+        raise click.UsageError(f'--model {twice} is given twice; give each model once')
+    models = dict(zip(names, map(pd.read_model, model_files), strict=True))
+    words, verb = ', '.join(map(str, model_files)), partial(pd.compare_models, models=models)
+    given |= {'model_file': None, 'begins_with': [], 'words': words}
+    _run('compare', verb, _side_by_side_lines, **given)
 
 
 def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
@@ -164,13 +151,12 @@ def _side_by_side_lines(beside: pd.SideBySide) -> Iterator[str]:
     yield f'{"RMSE [µm]":{width}}  {"all":>10}' + ''.join(f'  {part:>10}' for part in parts)
     for name, comparison in beside.by_name.items():
         errors = [m.residuals.rmse_um for m in comparison.misfits if m.kind == 'experiment']
-        cells = [comparison.points.rmse_um, *errors]
-        yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in cells)
+        errors.insert(0, comparison.points.rmse_um)
+        yield f'{name:{width}}' + ''.join(f'  {value:10.2f}' for value in errors)
     yield f'smallest error: {beside.best}'
 
 
 def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
-    yield from options.geometry_lines(comparison)
     for misfit in comparison.misfits:
         found, indent = misfit.residuals, '' if misfit.kind == 'experiment' else '  '
         yield (
@@ -180,12 +166,9 @@ def _comparison_lines(comparison: pd.Comparison) -> Iterator[str]:
     yield from (zone.sentence for zone in comparison.zones)
     noise = comparison.study.noise
     yield f'gauge noise {noise.typical_um:.2f} µm ({noise.source})'
-    for region in comparison.regions:
-        yield f'misfit: {region.experiment}: {region.description}'
-    if not comparison.regions:
-        yield 'no region of significant misfit'
-    for note in comparison.study.notes:
-        yield f'note: {note}'
+    regions = [f'misfit: {one.experiment}: {one.description}' for one in comparison.regions]
+    yield from regions or ['no region of significant misfit']
+    yield from (f'note: {note}' for note in comparison.study.notes)
 
 
 @click.command('diagnose')
@@ -208,7 +191,6 @@ def diagnose_command(effect_files: tuple[Path, ...], seed: int, **given: Any) ->
     from paint_deposition.effects.catalogue import load_effect_file
 
     own = [load_effect_file(file) for file in effect_files]
-
     _run('diagnose', partial(pd.diagnose, own_effects=own, seed=seed), _diagnosis_lines, **given)
 
 
@@ -271,10 +253,9 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
     """Write the law learned last as an effect, and say how to use it."""
     from paint_deposition.effects.learned.curves import LearnedCurve
     from paint_deposition.inference.diagnosis.closed_forms import forms_of
-    from paint_deposition.report.writers.models import effect_entry, write_effect_file
+    from paint_deposition.report.writers.inference import effect_entry, write_effect_file
 
-    law = next(iter(diagnosis.model.effects[::-1]), None)
-    forms = forms_of(law)
+    law, forms = diagnosis.model.effects[-1], forms_of(diagnosis.model.effects[-1])
     if not forms or not isinstance(law, LearnedCurve):
         raise PaintError(
             f'--as-effect {effect_file}: no closed form of few parameters fits the law within '
@@ -285,8 +266,6 @@ def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:
 
 
 def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
-    from paint_deposition.effects.learned.curves import LearnedCurve
-    from paint_deposition.effects.learned.law import LearnedLaw
     from paint_deposition.report import words
 
     yield f'{diagnosis.verdict.replace("_", " ")}: {diagnosis.reason}'
@@ -296,12 +275,8 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         label = 'added ' if effects.best in diagnosis.accepted else ''
         others = f' (or {", ".join(effects.members[1:])})' if len(effects.members) > 1 else ''
         yield f'  {label}{effects.best}: {words.probability_words(effects)}{others}'
-        law = diagnosis.model.effect(effects.best)
-        if isinstance(law, LearnedLaw):
-            shape = ', '.join(' '.join(row).rstrip() for row in words.learned_words(law))
-            yield f'    {words.effect_name(law.id)}: {shape}'
-            if isinstance(law, LearnedCurve) and law.sd:
-                yield f'    {words.form_words(law)}'
+        for line in words.law_lines(diagnosis.model.effect(effects.best)):
+            yield f'    {line}'
         for name, value in effects.parameters.items():
             yield f'    {name} = {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
     before, after = diagnosis.history[0], diagnosis.history[-1]
@@ -314,16 +289,13 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     yield from (f'worse than before: {one}' for one in diagnosis.worse)
     if diagnosis.pattern_shift:
         yield f'pattern moved {diagnosis.pattern_shift}'
-    for amount in diagnosis.random_effects:
-        if amount.is_notable:
-            yield f'{amount}'
+    yield from (f'{amount}' for amount in diagnosis.random_effects if amount.is_notable)
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
     for spray in diagnosis.proposals[1][:2]:
-        todo = f'spray {spray.what}, and measure {spray.readings} points'
-        yield f'next: {todo}: {words.separation_words(spray)}'
+        todo = f'next: spray {spray.what}, and measure {spray.readings} points'
+        yield f'{todo}: {words.separation_words(spray)}'
     if diagnosis.not_testable:
         yield f'not testable with these readings: {", ".join(diagnosis.not_testable)}'
     for note in (*diagnosis.study.notes, *diagnosis.discrepancy_note):
         yield f'note: {note}'
-    yield from options.geometry_lines(diagnosis)

@@ -15,50 +15,47 @@ from paint_deposition.errors import PaintError, did_you_mean
 # be set before NumPy is loaded.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-# Command, the module with its function, COMMAND_command, and what the list of commands says.
-# Modules are only loaded when their command is used, so that help comes at once.
+# Of each command: the module with its function, COMMAND_command; what the list of commands says;
+# an example, as it runs in the folder of the samples. Modules are only loaded when their command
+# is used, so that help comes at once.
 COMMANDS = {
-    'demo': ('demo', 'A first film, and what readings make of it, on one page.'),
-    'simulate': ('simulate', 'Film on a part from a recorded trajectory.'),
-    'calibrate': ('inference', "Fit the bell's pattern to gauge readings."),
-    'recommend': ('planning', 'Recommend the index between passes.'),
-    'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.'),
-    'improve': ('improve', 'Make the film of a programme more even: speeds, flows, triggers.'),
-    'measure': ('measure', 'Choose where to put the gauge on a part.'),
-    'compare': ('inference', 'Compare the model with gauge readings.'),
-    'diagnose': ('inference', 'Find which effect the model lacks; add it.'),
-    'refit': ('inference', 'Add an effect of your choice and refit.'),
-    'sweep': ('simulate', 'Compute many variations of one job, on all cores or a cluster.'),
-    'place': ('place', 'Find where the part may stand for the robot to drive all passes.'),
-    'locate': ('place', 'Find the pose of the part from touched points.'),
-    'watch': ('watch', 'Show a run, results or a live cell on a page in 3D.'),
-    'view': ('watch', 'Open a recorded run in Rerun, where that is installed.'),
-    'inspect': ('recordings', 'Show what a recording holds, or how the gun ran over a part.'),
-    'recover': ('recordings', 'Recover an unfinished run as a complete bag.'),
-    'doctor': ('doctor', 'Say what is installed, and test it.'),
-}
-
-# An example of each command, for its help: as it runs in the folder of the samples.
-EXAMPLES = {
-    'simulate': '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film',
-    'calibrate': 'panel_study/campaign.yaml -o bell',
-    'recommend': '--model bell/model.yaml --target-um 20 -o index',
-    'plan': '--mesh door.stl --model bell/model.yaml --target-um 20 -o passes',
-    'improve': '--mesh door.stl --trajectory passes/trajectory --model found/model.yaml -o better',
-    'measure': '--mesh door.stl --trajectory door_horizontal --points 40 -o points',
-    'compare': 'measured_door/campaign.yaml --model bell/model.yaml -o compared',
-    'diagnose': 'measured_door/campaign.yaml --model bell/model.yaml -o found',
-    'refit': 'measured_door/campaign.yaml --add incidence_attraction -o refitted',
-    'sweep': 'my_sweep.yaml -o swept',
-    'locate': '--touched my_touched.csv --points my_points.csv',
-    'inspect': 'door_horizontal --mesh door.stl --out door.png',
-    'recover': 'my_broken_run -o recovered',
-    'place': '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map',
-    'watch': 'door_horizontal --mesh door.stl --trigger /atomizer/state',
-    'view': 'door_horizontal',
-    'demo': '-o my_demo',
-    'doctor': '--json',
-}
+    'demo': ('demo', 'A first film, and what readings make of it, on one page.',
+        '-o my_demo'),
+    'simulate': ('simulate', 'Film on a part from a recorded trajectory.',
+        '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film'),
+    'calibrate': ('inference', "Fit the bell's pattern to gauge readings.",
+        'panel_study/campaign.yaml -o bell'),
+    'recommend': ('planning', 'Recommend the index between passes.',
+        '--model bell/model.yaml --target-um 20 -o index'),
+    'plan': ('planning', 'Lay passes over a part; write bag, CSV and RAPID module.',
+        '--mesh door.stl --model bell/model.yaml --target-um 20 -o passes'),
+    'improve': ('planning', 'Make the film of a programme more even: speeds, flows, triggers.',
+        '--mesh door.stl --trajectory passes/trajectory --model found/model.yaml -o better'),
+    'measure': ('place', 'Choose where to put the gauge on a part.',
+        '--mesh door.stl --trajectory door_horizontal --points 40 -o points'),
+    'compare': ('inference', 'Compare the model with gauge readings.',
+        'measured_door/campaign.yaml --model bell/model.yaml -o compared'),
+    'diagnose': ('inference', 'Find which effect the model lacks; add it.',
+        'measured_door/campaign.yaml --model bell/model.yaml -o found'),
+    'refit': ('inference', 'Add an effect of your choice and refit.',
+        'measured_door/campaign.yaml --add incidence_attraction -o refitted'),
+    'sweep': ('simulate', 'Compute many variations of one job, on all cores or a cluster.',
+        'my_sweep.yaml -o swept'),
+    'place': ('place', 'Find where the part may stand for the robot to drive all passes.',
+        '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map'),
+    'locate': ('place', 'Find the pose of the part from touched points.',
+        '--touched my_touched.csv --points my_points.csv'),
+    'watch': ('runs', 'Show a run, results or a live cell on a page in 3D.',
+        'door_horizontal --mesh door.stl --trigger /atomizer/state'),
+    'view': ('runs', 'Open a recorded run in Rerun, where that is installed.',
+        'door_horizontal'),
+    'inspect': ('inspect', 'Show what a recording holds, or how the gun ran over a part.',
+        'door_horizontal --mesh door.stl --out door.png'),
+    'recover': ('runs', 'Recover an unfinished run as a complete bag.',
+        'my_broken_run -o recovered'),
+    'doctor': ('doctor', 'Say what is installed, and test it.',
+        '--json'),
+}  # fmt: skip
 
 
 class Commands(click.Group):
@@ -73,14 +70,14 @@ class Commands(click.Group):
             raise click.UsageError(f'no command is called {name!r}; {remedy}')
         module = importlib.import_module(f'paint_deposition.cli.{COMMANDS[name][0]}')
         command: click.Command = getattr(module, f'{name}_command')
-        command.epilog = f'\b\nExample:\n  paint {name} {EXAMPLES[name]}'
+        command.epilog = f'\b\nExample:\n  paint {name} {COMMANDS[name][2]}'
         return command
 
     def shell_complete(self, context: click.Context, incomplete: str) -> list[CompletionItem]:
         """Commands without loading their modules, all of which together take a second."""
         commands = [
             CompletionItem(name, help=summary)
-            for name, (_, summary) in COMMANDS.items()
+            for name, (_, summary, _) in COMMANDS.items()
             if name.startswith(incomplete)
         ]
         return commands + click.Command.shell_complete(self, context, incomplete)
@@ -96,7 +93,7 @@ class Commands(click.Group):
 
     def format_commands(self, context: click.Context, formatter: click.HelpFormatter) -> None:
         with formatter.section('Commands'):
-            formatter.write_dl([(name, summary) for name, (_, summary) in COMMANDS.items()])
+            formatter.write_dl([(name, summary) for name, (_, summary, _) in COMMANDS.items()])
 
 
 def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:

@@ -1,25 +1,33 @@
-"""What several commands take and say alike: numbers, options, inputs and results."""
+"""Options of commands: those of a request from its model, and those that commands share."""
 
 from __future__ import annotations
 
 import math
-import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import re
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import NoneType
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
+from annotated_types import Ge, Gt, Le, Lt, MaxLen
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
-from paint_deposition.cli.results_folder import results_in
+from paint_deposition.errors import PaintError
+from paint_deposition.request import (
+    DrivingRobot,
+    FilmBand,
+    MotionOptions,
+    OnePart,
+    PartMesh,
+    Request,
+)
 
-if TYPE_CHECKING:
-    import numpy as np
-
-    from paint_deposition.film.statistics import FilmStatistics
-    from paint_deposition.part.zones import Zones
+Decorator = Callable[[Callable], Callable]
 
 
 class FiniteRange(click.FloatRange):
@@ -28,6 +36,9 @@ class FiniteRange(click.FloatRange):
     def __init__(self, *ends: Any, **bounds: Any) -> None:
         super().__init__(*ends, **bounds)
         self.name = 'float range' if ends or bounds else 'float'
+
+    def _describe_range(self) -> str:  # of click, whose help says `x<=None` without bounds
+        return super()._describe_range() if self.name == 'float range' else ''
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         try:
@@ -53,76 +64,140 @@ class File(click.Path):
         return super().convert(value, param, ctx)
 
 
-NUMBER = FiniteRange()
-POSITIVE = FiniteRange(min=0.0, min_open=True)
-NOT_NEGATIVE = FiniteRange(min=0.0)
+NUMBER, POSITIVE, NOT_NEGATIVE = FiniteRange(), FiniteRange(0.0, min_open=True), FiniteRange(0.0)
 FILE = File(path_type=Path)
 FOLDER = click.Path(path_type=Path, file_okay=False)
-JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
-CAMPAIGN = click.argument('campaign', type=FILE)
 
 
-POINTS = click.option(
-    '--points', 'points_file', type=FILE,
-    help='Measuring points, label and x, y, z, of readings that name their point only.',
-)  # fmt: skip
+def options_of(
+    kind: type[BaseModel], into: str = 'request', **settings: dict[str, Any]
+) -> Decorator:
+    """Give a command an option for each field of a model; it takes them as one argument.
+
+    The argument is the request, or of a model that is none the values by name, which whoever reads
+    the motion or the mesh checks.
+
+    Args:
+        kind: the model. Fields may be numbers, words, choices, flags, paths, and tuples or lists
+            of a fixed length; one whose default is None may be left out.
+        into: name of the argument of the command.
+        settings: of click, by field, for what the model does not say.
+    """
+    fields = kind.model_fields
+    options = [option_of(kind, name, **settings.get(name, {})) for name in fields]
+    # Of names with a unit only: others are also words of a sentence.
+    called = {name: _names(name, field)[0] for name, field in fields.items() if '_' in name}
+
+    def made(**values: Any) -> Any:
+        if not issubclass(kind, Request):
+            return values
+        own = {name: value for name, value in values.items() if value is not None}
+        return kind(**{n: math.radians(v) if _is_angle(n) else v for n, v in own.items()})
+
+    def naming_options(command: Callable) -> Callable:
+        @wraps(command)
+        def with_names(**values: Any) -> Any:
+            try:
+                return command(**values)
+            except PaintError as error:
+                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
+                raise type(error)(said) from None
+
+        return with_names
+
+    return lambda command: naming_options(option_group(options, into, made)(command))
 
 
-ZONES = click.option(
-    '--zones', 'zones_file', type=FILE,
-    help='Regions of the part with a target and a tolerance of their own, YAML; elsewhere '
-    '--target-um holds.',
-)  # fmt: skip
+def option_group(
+    options: Sequence[Decorator], into: str, kind: Callable[..., Any] = dict
+) -> Decorator:
+    """Give a command these options; it takes what was given as one argument, of a kind."""
+
+    def with_options(function: Callable) -> Callable:
+        return reduce(lambda taken, option: option(taken), reversed(options), function)
+
+    def with_group(command: Callable) -> Callable:
+        @wraps(command)
+        def with_one(**given: Any) -> Any:
+            return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+
+        return with_options(with_one)
+
+    names = [option.name for option in click.command('any')(with_options(lambda: None)).params]
+    return with_group
 
 
-def zones_of(zones_file: Path | None, part: Mapping[str, Any]) -> Zones | None:
-    """The zones of a part, which is given as for ``part_options``."""
-    if zones_file is None:
-        return None
-    return pd.read_zones(zones_file, part['path'], part['scale'], part['body'])
+def option_of(kind: type[BaseModel], name: str, **settings: Any) -> Decorator:
+    """The option of one field of a model: name, type, bounds, default and help.
+
+    A field in radians is an option in degrees. ``settings`` are further ones of click.
+    """
+    field = kind.model_fields[name]
+    known = field.get_default(call_default_factory=True)
+    shown: Callable[[Any], Any] = math.degrees if _is_angle(name) else lambda value: value
+    annotation, metadata = _bare(field.annotation, field.metadata)
+    default = None if known is None else shown(known)
+    found: dict[str, Any] = {'help': field.description, 'default': default}
+    if annotation is bool:
+        found['is_flag'] = True
+    else:
+        found |= _type(annotation, metadata, shown) | {'show_default': known is not None}
+    if 'metavar' in _extra(field):
+        found['metavar'] = _extra(field)['metavar']
+    return click.option(*_names(name, field), name, **found | settings)
 
 
-def zone_lines(
-    now: Mapping[str, FilmStatistics], before: Mapping[str, FilmStatistics] | None = None
-) -> Iterator[str]:
-    """The film on each zone by its name, and what it was before."""
-    for name, zone in now.items():
-        was = before and before[name]
-        bare = f', {100 * (1.0 - zone.coverage):.1f} % of it bare' if zone.coverage < 1.0 else ''
-        yield (
-            f'{name}, {zone.target_um:g} ± {zone.target_tolerance_um:g} µm: '
-            f'{f"{was.mean_um:.1f} → " if was else ""}{zone.mean_um:.1f} µm mean, '
-            f'{zone.min_um:.1f} to {zone.max_um:.1f} µm, '
-            f'{f"{100 * was.within_target:.1f} → " if was else ""}'
-            f'{100 * zone.within_target:.1f} % within{bare}'
-        )
+def _is_angle(name: str) -> bool:
+    return name.endswith('_rad')
 
 
-def model_option(text: str) -> Callable:
-    """The model that a command begins with."""
-    return click.option('--model', 'model_file', type=FILE, help=text)
+def _extra(field: FieldInfo) -> dict[str, Any]:
+    return field.json_schema_extra if isinstance(field.json_schema_extra, dict) else {}
 
 
-MODEL = model_option('Deposition model, YAML; default: a 50 mm bell.')
-BRUSH = click.option(
-    '--brush', default=0, type=click.IntRange(min=0), show_default='the only one',
-    help='Number of the brush to work with, of a model with several.',
-)  # fmt: skip
+def _names(name: str, field: FieldInfo) -> list[str]:
+    """What the option of a field is called."""
+    usual = f'--{name.removesuffix("_rad")}-deg' if _is_angle(name) else f'--{name}'
+    return str(_extra(field).get('option', usual.replace('_', '-'))).split()
 
 
-def seed_option(of: str) -> Callable:
-    """The seed of what a command draws at random."""
-    return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
+def _bare(annotation: Any, metadata: list[Any]) -> tuple[Any, list[Any]]:
+    """A type without None and annotations, and what these say."""
+    while True:
+        others = [kind for kind in get_args(annotation) if kind is not NoneType]
+        if get_origin(annotation) is Annotated:
+            annotation, metadata = others[0], [*metadata, *others[1:]]
+        elif len(others) < len(get_args(annotation)):
+            (annotation,) = others
+        else:
+            flat = (getattr(one, 'metadata', [one]) for one in metadata)
+            return annotation, [one for ones in flat for one in ones]
 
 
-def _vector(ctx: click.Context, param: click.Parameter, given: tuple | None) -> np.ndarray | None:
-    if given is None:
-        return None
-    import numpy as np
-
-    if not any(given):
-        raise click.BadParameter('0 0 0 has no direction; give a direction, as 0 0 -1', ctx, param)
-    return np.array(given)
+def _type(
+    annotation: Any, metadata: list[Any], shown: Callable[[Any], Any] = lambda bound: bound
+) -> dict[str, Any]:
+    """Settings of click for a type; ``shown`` brings bounds to the option's unit."""
+    origin, within = get_origin(annotation), get_args(annotation)
+    if origin is Literal:
+        return {'type': click.Choice(list(within))}
+    if origin in (tuple, list):
+        longest = next((one.max_length for one in metadata if isinstance(one, MaxLen)), None)
+        inner, about = _bare(within[0], [])
+        return _type(inner, about) | {'nargs': longest if origin is list else len(within)}
+    if annotation is Path:
+        return {'type': FILE}
+    if annotation not in (float, int):
+        return {'type': annotation}
+    ends = {Gt: ('min', 'gt'), Ge: ('min', 'ge'), Lt: ('max', 'lt'), Le: ('max', 'le')}
+    bounds: dict[str, Any] = {}
+    for one in metadata:
+        if type(one) in ends:
+            end, key = ends[type(one)]
+            bounds |= {end: shown(getattr(one, key)), f'{end}_open': key in ('gt', 'lt')}
+    if annotation is int:
+        return {'type': click.IntRange(**bounds) if bounds else int}
+    return {'type': FiniteRange(**bounds)}
 
 
 def _pose(ctx: click.Context, param: click.Parameter, given: tuple | None) -> list[float] | None:
@@ -144,213 +219,79 @@ def _allow_effects(ctx: click.Context, param: click.Parameter, given: bool) -> N
         ctx.call_on_close(lambda: effects_allowed.reset(token))
 
 
+JSON = click.option('--json', 'as_json', is_flag=True, help='Print the figures as JSON.')
+CAMPAIGN = click.argument('campaign', type=FILE)
+POINTS = click.option(
+    '--points', 'points_file', type=FILE,
+    help='Measuring points, label and x, y, z, of readings that name their point only.',
+)  # fmt: skip
+BRUSH = click.option(
+    '--brush', default=0, type=click.IntRange(min=0), show_default='the only one',
+    help='Number of the brush to work with, of a model with several.',
+)  # fmt: skip
 ALLOW_EFFECTS = click.option(
     '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
     help='Run the Python code of effect files that recordings, results or campaigns name, too.',
 )  # fmt: skip
-MAX_POSE_GAP = click.option(
-    '--max-pose-gap-s', default=0.25, show_default=True, type=POSITIVE,
-    help='A longer interval between poses is a gap, in which the gun is off.',
-)  # fmt: skip
+PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
+MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
+motion_options = options_of(MotionOptions, 'motion', part_pose={'callback': _pose})
+band_options = options_of(FilmBand, 'band')
+robot_options = options_of(DrivingRobot, 'robot')
 
 
-PART_POSE = click.option(
-    '--part-pose', nargs=7, type=NUMBER, metavar='X Y Z QX QY QZ QW', callback=_pose,
-    help='Where the part stands in the frame of the poses [m, unit quaternion].',
-)  # fmt: skip
-PAINT_MOVES = click.option(
-    '--paint-moves', is_flag=True,
-    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
-)  # fmt: skip
-# How the motion is read and brought to the part: the fields of MotionSource.
-MOTION = (
-    click.option('--pose-topic',
-                 help='Poses in the bag; default: its only PoseStamped topic. Of an array: '
-                 '/poses[2]. With --urdf: joint states, several with blanks between them.'),
-    click.option(
-        '--state-topic', '--trigger', 'state_topic',
-        help='Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
-        'message, as /io.states[3] or "/io.level > 12", or the column of a table; default: it '
-        'sprays whenever poses flow.',
-    ),
-    click.option(
-        '--gun-signal',
-        help='Digital output that opens the gun, for a RAPID module that sets several.',
-    ),
-    click.option('--procedure', help='Where a RAPID program starts; default: main.'),
-    click.option(
-        '--tf', nargs=2, metavar='TARGET SOURCE',
-        callback=lambda ctx, param, given: None if given is None else list(given),
-        help='Take the poses from the transforms of the bag: frame SOURCE, the TCP, in TARGET.',
-    ),
-    click.option(
-        '--urdf', type=click.Path(),
-        help='Take the poses from this robot and its joints in a bag, a table or RAPID.',
-    ),
-    click.option('--tip', '--tip-link', 'tip_link',
-                 help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
-    click.option('--base', '--base-link', 'base_link',
-                 help='Link of the URDF for the frame of the poses; default: its root.'),
-    click.option('--joint-prefix',
-                 help="What the joints' names have before those of the URDF, or lack: irb_."),
-    click.option('--pose-unit', type=click.Choice(['m', 'mm', 'cm']),
-                 help='Unit of positions and rails; default: that of the headings, else m.'),
-    click.option(
-        '--rotation', metavar='CONVENTION',
-        help='Three numbers of an orientation in a table: rotvec, or Euler angles as ZYX (axes of '
-        'the tool), xyz (fixed axes), kuka, abb, fanuc, rpy, staubli, kawasaki.',
-    ),
-    click.option('--angle-unit', type=click.Choice(['deg', 'rad']),
-                 help='Unit of joints and angles; default: that of the headings, else rad.'),
-    click.option('--tool-axis', type=click.Choice(['x', 'y', 'z', '-x', '-y', '-z']),
-                 help='Axis of the recorded tool along which it sprays, x for a KUKA; default: z'),
-    click.option('--frame-id', help="Name of the part's frame; default: part."),
-    click.option('--strict', is_flag=True,
-                 help='Refuse a recording with a pose or state that would be left out.'),
-    PART_POSE,
-)  # fmt: skip
+def model_option(text: str = 'Deposition model, YAML; default: a 50 mm bell.') -> Decorator:
+    """The model that a command begins with."""
+    return click.option('--model', 'model_file', type=FILE, help=text)
 
 
-def option_group(
-    options: Sequence[Callable], into: str, kind: Callable[..., Any] = dict
-) -> Callable[[Callable], Callable]:
-    """Give a command these options; it takes what was given as one argument, of a kind."""
-
-    def with_options(function: Callable) -> Callable:
-        return reduce(lambda taken, option: option(taken), reversed(options), function)
-
-    def with_group(command: Callable) -> Callable:
-        @wraps(command)
-        def with_one(**given: Any) -> Any:
-            return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
-
-        return with_options(with_one)
-
-    names = [option.name for option in click.command('any')(with_options(lambda: None)).params]
-    return with_group
+def seed_option(of: str) -> Decorator:
+    """The seed of what a command draws at random."""
+    return click.option('--seed', default=0, show_default=True, help=f'Random seed of {of}.')
 
 
-motion_options = option_group(MOTION, 'motion')
-JOINT_ACCELERATION = click.option(
-    '--joint-acceleration', type=POSITIVE,
-    help='Of every joint of a robot that is to drive the motion [rad/s2 or m/s2]; default: full '
-    'speed in a quarter of a second.',
-)  # fmt: skip
-# The robot that is to drive a plan: what `read_robot` takes beside the pose of the part.
-robot_options = option_group(
-    (
-        click.option(
-            '--urdf', type=FILE,
-            help='Robot that is to drive it; --part-pose says where the part stands in its base.',
-        ),
-        click.option('--tip', '--tip-link', 'tip_link',
-                     help='Link of the URDF that is the TCP; default: tool0, else its last link.'),
-        click.option('--base', '--base-link', 'base_link',
-                     help='Link of the URDF for the frame of the poses; default: its root.'),
-        JOINT_ACCELERATION,
-    ),
-    'robot',
-)  # fmt: skip
+@dataclass(frozen=True)
+class Part:
+    """The part of a command, and how its files are read."""
+
+    mesh: Path | None
+    max_edge_length_m: float
+    mesh_scale: float
+    body: str | None
+    down: tuple[float, float, float] | None
+    zones_file: Path | None = None
+
+    def surface(self, mesh: Path | None = None) -> pd.Surface:
+        """The refined mesh, or that of another file."""
+        import numpy as np
+
+        down = None if self.down is None else np.array(self.down)
+        file = mesh or self.mesh or Path()
+        return pd.read_mesh(file, self.mesh_scale, self.max_edge_length_m, down, self.body)
+
+    def zones(self) -> pd.Zones | None:
+        """Its regions with targets of their own, if there are any."""
+        if self.zones_file is None:
+            return None
+        return pd.read_zones(self.zones_file, self.mesh or '', self.mesh_scale, self.body)
 
 
-def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> Any:
-    """The robot of ``robot_options`` with the part; None where none is given."""
-    if robot['urdf'] is None:
-        return None
-    if part_pose is None:
-        raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
-    from paint_deposition.api.robot import read_robot
-
-    return read_robot(part_pose=part_pose, **robot)
-
-
-def part_options(max_edge_length_m: float, required: bool = True) -> Callable:
-    """The part and how its mesh is read: a command takes ``read_mesh``'s arguments as ``part``."""
-    options = (
-        click.option('--mesh', 'path', required=required, type=FILE,
+def part_options(
+    max_edge_length_m: float, required: bool = True, zones: bool = False
+) -> Decorator:
+    """A command takes the ``Part``."""
+    options: list[Decorator] = [
+        click.option('--mesh', required=required, type=FILE,
                      help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'),
-        click.option(
-            '--mesh-scale', 'scale', default=1.0, show_default=True, type=POSITIVE,
-            help='Metres per unit of the mesh file; 0.001 for millimetres. glTF, 3MF and STEP '
-            'name their unit: leave it out there.',
-        ),
-        click.option(
-            '--body',
-            help='The one body to take of a mesh file with several; default: all as one part.',
-        ),
+        *(option_of(PartMesh, name) for name in PartMesh.model_fields),
         click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
             help='Longest edge of the refined mesh: larger triangles are split.',
         ),
         click.option(
-            '--down', nargs=3, type=NUMBER, metavar='X Y Z', callback=_vector,
-            help='Gravity in the mesh frame; default: -z, or -y if drawn flat at z = 0.',
+            '--zones', 'zones_file', type=FILE,
+            help='Regions of the part with a target and a tolerance of their own, YAML; '
+            'elsewhere --target-um holds.',
         ),
-    )  # fmt: skip
-    return option_group(options, 'part')
-
-
-def python(code: str, *words: str) -> list[str]:
-    """The command of another Python that runs code and takes no module from this folder."""
-    head = 'import sys; sys.path[:] = filter(None, sys.path); '
-    return [sys.executable, '-c', head + code, *words]
-
-
-def print_all(label: str, lines: Iterable[str]) -> None:
-    """Print each line behind its label on stderr: notes, warnings."""
-    for line in lines:
-        click.echo(f'{label}: {line}', err=True)
-
-
-def geometry_lines(result: pd.Comparison | pd.Diagnosis | pd.Calibration) -> Iterator[str]:
-    """How the gun ran over each part of a campaign."""
-    return (f'{name}: {found.sentence}' for name, found in result.geometry.items())
-
-
-@dataclass
-class Results:
-    """Where a command writes its results, and how it shows them."""
-
-    output: Path
-    pictures: str
-    as_json: bool
-    files: Sequence[Path] = ()
-
-    def write(self, result: Any, **more: Any) -> None:
-        """Write a result to the folder, all or nothing."""
-        with results_in(self.output) as folder:
-            files = pd.write(result, folder, pictures=self.pictures, **more)
-        self.files = [self.output / file.name for file in files]
-
-    def print(self, lines: Iterable[str], model: str = '') -> None:
-        """Print the file of figures as written, or else the model, these lines and the files."""
-        head = [f'model: {model}'] if model else []
-        if self.as_json:
-            figures = next(file for file in self.files if file.suffix == '.json')
-            click.echo(figures.read_text(encoding='utf-8'), nl=False)
-        else:
-            click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in self.files)]))
-
-
-def results_options(what: str, default: str | None = None) -> Callable[[Callable], Callable]:
-    """A command takes ``Results``; their folder is to be named where there is no default."""
-    text = (
-        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
-        'into it are removed; other files in it are kept as they are. Nothing is changed before '
-        'all results are complete.'
-    )
-    options = (
-        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
-                     help=text),
-        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
-                     show_default=True, help='Format of the pictures.'),
-        JSON,
-    )  # fmt: skip
-    return option_group(options, 'results', Results)
-
-
-def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
-    """Paint sprayed, transfer efficiency and wet film, where the model's brushes say enough."""
-    from paint_deposition.film.paint_used import paint_sentence
-
-    return (line for line in [paint_sentence(result)] if line)
+    ]  # fmt: skip
+    return option_group(options if zones else options[:-1], 'part', Part)

@@ -1,4 +1,4 @@
-"""The commands `place` and `locate`: where a part may stand for a robot, and where it stands."""
+"""Commands that tell where: `place` and `locate` the part before a robot, `measure` the gauge."""
 
 from __future__ import annotations
 
@@ -10,10 +10,18 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.models import chosen_model, model_for, robot_cell
+from paint_deposition.cli.options import Part, options_of
+from paint_deposition.cli.results import Progress, Results, inputs, print_all, results_options
+from paint_deposition.errors import RecordingError
+from paint_deposition.planning.requests import FilmBuild, MeasureRequest
+from paint_deposition.request import MotionOptions
 
 if TYPE_CHECKING:
     from paint_deposition.planning.part_place import PartPlaces
+
+# Below this probability an effect is named as one that the part hardly shows.
+HARDLY = 0.15
 
 
 def _span(axis: str) -> Any:
@@ -38,7 +46,7 @@ def _span(axis: str) -> Any:
     help='Between places [m].',
 )  # fmt: skip
 @click.option('--free-roll', is_flag=True, help='The tool may be turned about its own axis.')
-@options.results_options('place.json, places.csv and the map')
+@results_options('place.json, places.csv and the map')
 def place_command(
     trajectory: Path,
     part_pose: list[float] | None,
@@ -47,7 +55,7 @@ def place_command(
     y_m: tuple[float, float] | None,
     step_m: float,
     free_roll: bool,
-    results: options.Results,
+    results: Results,
 ) -> None:
     """Look where the part may stand so that the robot drives all passes.
 
@@ -55,9 +63,9 @@ def place_command(
     """
     import numpy as np
 
-    from paint_deposition.api.robot import place
+    from paint_deposition.api.planning import place
 
-    cell = options.robot_cell(robot, part_pose)
+    cell = robot_cell(robot, part_pose)
     if cell is None or part_pose is None:
         raise click.UsageError('give the robot as --urdf, and --part-pose')
     spans = [
@@ -69,13 +77,11 @@ def place_command(
         show('reading')
         recorded = pd.read_recording(trajectory)
         found = place(recorded, cell, x, y, free_roll, show)
-        made_from = {'trajectory': str(trajectory), 'urdf': str(robot['urdf'])}
-        results.write(found, made_from=made_from)
-    options.print_all('note', recorded.notes)
-    results.print(_lines(found))
+        results.write(found, made_from=inputs(trajectory=trajectory, urdf=robot['urdf']))
+    results.print(_place_lines(found), notes=recorded.notes)
 
 
-def _lines(found: PartPlaces) -> Iterator[str]:
+def _place_lines(found: PartPlaces) -> Iterator[str]:
     yield found.sentence
     if found.speed.max() > 0.0:
         yield '--part-pose ' + ' '.join(f'{value + 0.0:.6g}' for value in found.part_pose)
@@ -90,22 +96,24 @@ def _lines(found: PartPlaces) -> Iterator[str]:
     '--points', required=True, type=options.FILE,
     help='The same points in the frame of the part, by the same names.',
 )  # fmt: skip
-@click.option(
-    '--pose-unit', type=click.Choice(['m', 'mm', 'cm']),
-    help='Unit of points whose headings have none.',
-)  # fmt: skip
+@options.option_of(MotionOptions, 'pose_unit')
 @options.JSON
 def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: bool) -> None:
     """Find the pose of a part in the frame of the robot, to be given as --part-pose.
 
     From three or more named points that the robot touched.
     """
-    from paint_deposition.api.robot import locate_by_points
     from paint_deposition.files.atomic import json_text
+    from paint_deposition.files.gauge_readings import read_points
     from paint_deposition.files.provenance import origin
+    from paint_deposition.motion.part_frame import locate
 
-    place = locate_by_points(touched, points, pose_unit)
-    options.print_all('warning', place.warnings)
+    given = read_points(touched, pose_unit), read_points(points, pose_unit)
+    try:
+        place = locate(*given)
+    except RecordingError as error:
+        raise RecordingError(f'{touched} and {points}: {error}') from None
+    print_all('warning', place.warnings)
     if as_json:
         files = {'touched': touched, 'points': points}
         click.echo(json_text(place.to_dict() | {'provenance': origin(files=files)}))
@@ -116,3 +124,76 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
     click.echo(f'residual {place.rms_m * 1e3:.2f} mm RMS')
     for name, residual_m in place.residuals_m.items():
         click.echo(f'  {name}: {residual_m * 1e3:.2f} mm')
+
+
+@click.command('measure')
+@options.part_options(0.01)
+@click.option(
+    '--trajectory', type=options.FILE,
+    help='The motion, as `simulate` takes it; default: passes as `plan` would lay them, '
+    'with --target-um or --speed.',
+)  # fmt: skip
+@options.model_option()
+@options.BRUSH
+@options_of(MeasureRequest)
+@options_of(FilmBuild, into='passes')
+@options.motion_options
+@options.MAX_POSE_GAP
+@options.ALLOW_EFFECTS
+@results_options('points.csv, poses.csv, points.png and measure.json')
+def measure_command(
+    request: MeasureRequest,
+    passes: FilmBuild,
+    part: Part,
+    trajectory: Path | None,
+    model_file: Path | None,
+    brush: int,
+    motion: dict[str, Any],
+    max_pose_gap_s: float,
+    results: Results,
+) -> None:
+    """Choose where to put the gauge on a part, so that missing effects are found soonest.
+
+    Fill the column thickness_um of points.csv and give that file as the measurements of a
+    campaign.
+    """
+    if trajectory is None and passes == FilmBuild():
+        raise click.UsageError(
+            'no motion is given; give --trajectory, or --target-um for passes '
+            'as `plan` would lay them'
+        )
+    with Progress('measure') as show:
+        show('reading')
+        surface = part.surface()
+        warnings: tuple[str, ...] = ()
+        if trajectory is None:
+            chosen = chosen_model(model_file, brush=brush)
+            recorded = pd.plan(surface, chosen.model, progress=show, **dict(passes)).trajectory
+        else:
+            chosen = model_for(model_file, trajectory)
+            recorded = pd.read_recording(trajectory, **motion)
+            warnings = recorded.warnings
+        result = pd.choose_readings(
+            surface, recorded, chosen.model, posterior=chosen.posterior,
+            max_pose_gap_s=max_pose_gap_s, progress=show, **dict(request),
+        )  # fmt: skip
+        made_from = inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path)
+        show('writing and drawing')
+        results.write(result, made_from=made_from, part_pose=motion['part_pose'])
+    results.print(_point_lines(result), chosen.words, result.surface.notes, warnings)
+
+
+def _point_lines(result: pd.ChosenReadings) -> Iterator[str]:
+    yield result.sentence
+    power = sorted(result.power.items(), key=lambda pair: -pair[1])
+    for name, chance in power:
+        if chance >= HARDLY:
+            grid = result.grid_power[name]
+            yield f'{name:>22} {100 * chance:3.0f} %   on a grid {100 * grid:3.0f} %'
+    hidden = [name for name, chance in power if chance < HARDLY]
+    if hidden:
+        yield f'unlikely to be detected on this part at their typical size: {", ".join(hidden)}'
+    yield (
+        f'at least {result.apart_m * 1e3:.0f} mm from each other and {result.foot_m * 1e3:.0f} mm '
+        f'off edges; {result.repeats} of them are to be read twice'
+    )

@@ -1,4 +1,4 @@
-"""Commands that lay out passes: `recommend` and `plan`."""
+"""Commands that lay out passes: `recommend`, `plan` and `improve`."""
 
 from __future__ import annotations
 
@@ -10,28 +10,36 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import chosen_model
-from paint_deposition.cli.options_of import options_of
-from paint_deposition.cli.results_folder import Progress
-from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
+from paint_deposition.cli.models import chosen_model, model_for, robot_cell
+from paint_deposition.cli.options import Part, options_of
+from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
+from paint_deposition.planning.requests import (
+    GunEnvelope,
+    ImproveRequest,
+    IndexRequest,
+    PlanRequest,
+)
+from paint_deposition.request import DrivingRobot, MotionOptions
+
+PAINT_MOVES = click.option(
+    '--paint-moves', is_flag=True,
+    help='Spray by PaintL with SetBrush in passes.mod; default: by MoveL, with an output.',
+)  # fmt: skip
 
 
 @click.command('recommend')
-@options.MODEL
+@options.model_option()
 @options.BRUSH
 @options_of(IndexRequest)
-@options.results_options(
-    'recommendation.json and uniformity.png; default: the working directory', '.'
-)
+@results_options('recommendation.json and uniformity.png; default: the working directory', '.')
 def recommend_command(
-    request: IndexRequest, model_file: Path | None, brush: int, results: options.Results
+    request: IndexRequest, model_file: Path | None, brush: int, results: Results
 ) -> None:
     """Recommend the index between passes for an even film, at --speed or for --target-um."""
     chosen = chosen_model(model_file, brush=brush)
     answer = pd.recommend(chosen.model, **dict(request))
-    made_from = {'model_file': str(model_file or '')}
-    results.write(answer, model=chosen.model, made_from=made_from)
-    results.print(_recommendation_lines(answer), model=chosen.words)
+    results.write(answer, model=chosen.model, made_from=inputs(model_file=model_file))
+    results.print(_recommendation_lines(answer), chosen.words)
 
 
 def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
@@ -51,16 +59,13 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
 
 
 @click.command('plan')
-@options.part_options(0.02)
-@options.MODEL
+@options.part_options(0.02, zones=True)
+@options.model_option()
 @options.BRUSH
 @options_of(PlanRequest)
-@options.ZONES
 @options.PART_POSE
 @options.robot_options
-@click.option(
-    '--frame-id', help='Frame of the poses; default: part, or base_link with --part-pose.'
-)
+@options.option_of(MotionOptions, 'frame_id')
 @click.option(
     '--faces', type=click.Choice(['one', 'auto']), default='one', show_default=True,
     help='auto: split the part into faces that can be sprayed from one side each, as a hood '
@@ -71,14 +76,13 @@ def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
     help='Largest angle between a normal of a face and their mean.',
 )  # fmt: skip
 @options_of(GunEnvelope, into='envelope')
-@options.PAINT_MOVES
-@options.results_options('the bag, passes.csv, passes.mod, plan.json and the film')
+@PAINT_MOVES
+@results_options('the bag, passes.csv, passes.mod, plan.json and the film')
 def plan_command(
     request: PlanRequest,
     envelope: GunEnvelope,
-    part: dict[str, Any],
+    part: Part,
     robot: dict[str, Any],
-    zones_file: Path | None,
     model_file: Path | None,
     brush: int,
     part_pose: list[float] | None,
@@ -86,69 +90,150 @@ def plan_command(
     faces: str,
     face_angle_deg: float,
     paint_moves: bool,
-    results: options.Results,
+    results: Results,
 ) -> None:
-    """Lay passes over a part: where they lie, how the gun moves, and the film to expect."""
-    chosen, wanted = chosen_model(model_file, brush=brush), dict(request)
-    model = chosen.model
-    cell = options.robot_cell(robot, part_pose)
+    """Lay passes over a part: where they lie, how the gun moves, and the film to expect.
+
+    With --part-pose the files have their poses in the frame of the robot, base_link by default.
+    """
+    chosen, cell = chosen_model(model_file, brush=brush), robot_cell(robot, part_pose)
     frame_id = frame_id or ('part' if part_pose is None else 'base_link')
     with Progress('plan') as show:
         show('reading the mesh')
-        surface = pd.read_mesh(**part)
-        frame = frame_id if part_pose is None else 'part'
+        surface = part.surface()
         given: dict[str, Any] = {
-            'frame_id': frame, 'envelope': envelope, 'robot': cell, 'progress': show,
-            'zones': options.zones_of(zones_file, part), **wanted,
+            'frame_id': frame_id if part_pose is None else 'part', 'envelope': envelope,
+            'robot': cell, 'progress': show, 'zones': part.zones(), **dict(request),
         }  # fmt: skip
         result: pd.Plan | pd.PartPlan
         if faces == 'one':
-            result = pd.plan(surface, model, **given)
+            result = pd.plan(surface, chosen.model, **given)
         else:
-            result = pd.plan_faces(surface, model, face_angle_deg=face_angle_deg, **given)
+            given['face_angle_deg'] = face_angle_deg
+            result = pd.plan_faces(surface, chosen.model, **given)
         show('writing')
         made_from = {
-            'mesh': str(part['path']),
-            'model': str(model_file or 'default'),
-            'zones_file': str(zones_file or ''),
-            'frame_id': frame_id,
-            'part_pose': part_pose,
-        }
+            **inputs(mesh=part.mesh, zones_file=part.zones_file),
+            'model': str(model_file or 'default'), 'frame_id': frame_id, 'part_pose': part_pose,
+        }  # fmt: skip
         results.write(
             result, made_from=made_from, part_pose=part_pose, frame_id=frame_id,
             paint_moves=paint_moves,
         )  # fmt: skip
-    options.print_all('note', surface.notes)
-    options.print_all('warning', result.warnings)
-    results.print(_plan_lines(result), model=chosen.words)
+    results.print(_plan_lines(result), chosen.words, surface.notes, result.warnings)
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
-    film = result.statistics
+    from paint_deposition.film.paint_used import paint_sentence
+
+    film, whole, gun = result.statistics, result.whole_part, result.envelope
+    first = result.unoptimised if isinstance(result, pd.Plan) else None
     yield result.sentence
     yield result.comparison
-    whole = result.whole_part
     yield (
         f'film there {film.min_um:.1f} to {film.max_um:.1f} µm; on the whole part '
         f'{whole.min_um:.1f} to {whole.max_um:.1f} µm, mean {whole.mean_um:.1f} µm, coverage '
         f'{100 * whole.coverage:.0f} %, capture fraction '
         f'{100 * whole.capture_fraction:.0f} %'
     )
-    first = result.unoptimised if isinstance(result, pd.Plan) else None
-    yield from options.zone_lines(film.zones, first.statistics.zones if first else {})
-    yield from options.paint_lines(result)
-    if result.drive:
-        yield result.drive.sentence
-    gun = result.envelope
+    yield from zone_lines(film.zones, first.statistics.zones if first else {})
+    yield from filter(None, [paint_sentence(result), result.drive and result.drive.sentence])
     if not result.contacts:
         yield (
             f'gun ({2e3 * gun.radius_m:.0f} mm wide, {1e3 * gun.length_m:.0f} mm long) and the '
             f'{1e3 * gun.before_m:.0f} mm before it keep clear of the part'
         )
-    if isinstance(result, pd.Plan) and result.unoptimised:
-        first, paint = result.unoptimised, result.unoptimised.statistics
+    if first:
+        paint = first.statistics
         yield (
             f'without --optimise: {first.sentence}; paint {paint.emitted_volume_cm3:.1f} instead '
             f'of {film.emitted_volume_cm3:.1f} cm3, capture fraction '
             f'{100 * paint.capture_fraction:.0f} %'
         )
+
+
+@click.command('improve')
+@options.part_options(0.02, zones=True)
+@click.option(
+    '--trajectory', required=True, type=options.FILE,
+    help='The programme: a bag, a table of poses, or a RAPID module, taken as programmed.',
+)  # fmt: skip
+@options.model_option()
+@click.option(
+    '--rival', 'rivals', type=options.FILE, multiple=True,
+    help='Another model that explains the readings equally well; the film is optimised for all.',
+)  # fmt: skip
+@options_of(ImproveRequest)
+@options.seed_option('the models drawn from the posterior of the model file')
+@options.motion_options
+@PAINT_MOVES
+@options.option_of(DrivingRobot, 'joint_acceleration')
+@options.ALLOW_EFFECTS
+@results_options('the bag, passes.csv, passes.mod, improvement.json, the picture and the film')
+def improve_command(
+    request: ImproveRequest,
+    part: Part,
+    trajectory: Path,
+    model_file: Path | None,
+    rivals: tuple[Path, ...],
+    paint_moves: bool,
+    seed: int,
+    motion: dict[str, Any],
+    joint_acceleration: float | None,
+    results: Results,
+) -> None:
+    """Make the film of a given programme more even; its path stays as it is.
+
+    Speeds along the passes, flows and the places where the gun opens and closes are chosen
+    through the whole model. What changes is printed pass by pass. With --urdf and --part-pose no
+    joint of the robot is faster than it can be.
+    """
+    from paint_deposition.files.motion_files import holds_joints
+
+    with Progress('improve') as show:
+        show('reading')
+        chosen, part_pose = model_for(model_file, trajectory), motion['part_pose']
+        robot = {name: motion[name] for name in ('urdf', 'tip_link', 'base_link')}
+        limits = {'joint_acceleration': joint_acceleration}
+        cell = robot_cell(robot | limits, part_pose) if part_pose else None
+        known = motion if holds_joints(trajectory) else motion | dict.fromkeys(robot)
+        recorded = pd.read_recording(trajectory, **known)
+        show('refining the mesh')
+        result = pd.improve(
+            part.surface(), recorded, chosen.model, posterior=chosen.posterior,
+            rivals=[pd.read_model(path) for path in rivals], robot=cell, zones=part.zones(),
+            seed=seed, progress=show, **dict(request),
+        )  # fmt: skip
+        made_from = {
+            **inputs(mesh_file=part.mesh, trajectory=trajectory, model_file=chosen.path,
+                     zones_file=part.zones_file),
+            'rivals': [str(path) for path in rivals], 'part_pose': part_pose,
+        }  # fmt: skip
+        show('writing and drawing')
+        results.write(result, made_from=made_from, part_pose=part_pose, paint_moves=paint_moves)
+    notes = (*result.surface.notes, *recorded.notes, *result.notes)
+    results.print(_improvement_lines(result), chosen.words, notes, result.warnings)
+
+
+def _improvement_lines(result: pd.Improvement) -> Iterator[str]:
+    before, after = result.before, result.after
+    yield f'{result.region}:'
+    yield result.sentence
+    films = {'there': (before.statistics, after.statistics)}
+    if not result.target_region.all():
+        films['on the whole part'] = before.whole_part, after.whole_part
+    for where, (a, b) in films.items():
+        yield (
+            f'film {where}: mean {a.mean_um:.1f} → {b.mean_um:.1f} µm; {a.min_um:.1f} to '
+            f'{a.max_um:.1f} µm before, {b.min_um:.1f} to {b.max_um:.1f} µm after'
+        )
+    yield from zone_lines(after.statistics.zones, before.statistics.zones)
+    for change in result.changes:
+        yield change.sentence
+    yield from result.limit_sentences
+    if result.drive:
+        yield result.drive.sentence
+    yield (
+        'the robot program lays the film of the bag within '
+        f'{100 * result.program_difference:.2f} % of its peak'
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,15 +11,18 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import models_for
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.models import models_for
+from paint_deposition.cli.results import Progress, Results, inputs, results_options, zone_lines
+from paint_deposition.request import FilmBand
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
 
+MOST_WARNINGS = 5
+
 
 @click.command('simulate')
-@options.part_options(0.01)
+@options.part_options(0.01, zones=True)
 @click.option(
     '--trajectory', 'trajectories', required=True, multiple=True, type=options.FILE,
     help='Bag with the poses: ROS 1 .bag, rosbag2 folder (sqlite3 or MCAP) or a single .mcap; a '
@@ -54,14 +57,11 @@ if TYPE_CHECKING:
 @options.POINTS
 @options.motion_options
 @options.MAX_POSE_GAP
-@click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
-@click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
-              help='Accepted difference from the target, either way [µm].')  # fmt: skip
-@options.ZONES
+@options.band_options
 @options.ALLOW_EFFECTS
-@options.results_options('film.ply, film.csv, stats.json and film.png')
+@results_options('film.ply, film.csv, stats.json and film.png')
 def simulate_command(
-    part: dict[str, Any],
+    part: options.Part,
     trajectories: tuple[Path, ...],
     atomizers: tuple[str, ...],
     coats: tuple[str, ...],
@@ -70,9 +70,9 @@ def simulate_command(
     readings_file: Path | None,
     points_file: Path | None,
     motion: dict[str, Any],
-    zones_file: Path | None,
-    results: options.Results,
-    **wanted: float,
+    max_pose_gap_s: float,
+    band: FilmBand,
+    results: Results,
 ) -> None:
     """Compute the film on a part from a recorded trajectory.
 
@@ -80,8 +80,6 @@ def simulate_command(
     """
     if wet_on_wet and not coats:
         raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
-    if wanted['tolerance_um'] and not wanted['target_um']:
-        raise click.UsageError('--tolerance-um has no --target-um; give both')
     with Progress('simulate') as show:
         show('loading')
         from paint_deposition.files.motion_files import read_gun_motions
@@ -93,48 +91,37 @@ def simulate_command(
         guns = read_gun_motions(trajectories, source, atomizers)
         chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
         show('refining the mesh')
-        surface = pd.read_mesh(**part)
-        zones = options.zones_of(zones_file, part)
-        readings = None
+        surface, readings = part.surface(), None
+        zones = part.zones()
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
             surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
             names=[gun.name for gun in guns], coats=coats, wet_on_wet=wet_on_wet,
-            readings=readings, zones=zones, strict=source.strict, progress=show, **wanted,
+            readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones, strict=source.strict,
+            progress=show, **dict(band),
         )  # fmt: skip
         made_from = {
-            'mesh_file': str(part['path']),
+            **inputs(mesh_file=part.mesh, zones_file=part.zones_file),
             'trajectory': ', '.join(map(str, trajectories)),
-            'zones_file': str(zones_file or ''),
             'model_file': ', '.join(dict.fromkeys(str(m.path) for m in chosen if m.path)),
         }
         show('writing and drawing')
         results.write(film, made_from=made_from)
-    options.print_all('note', film.notes)
-    options.print_all('note', [readings.understood] if readings else [])
-    options.print_all('warning', film.warnings)
+    notes = (*film.notes, *([readings.understood] if readings else []))
     words = '; '.join(dict.fromkeys(model.words for model in chosen))
-    results.print(_lines(film), model=words)
+    results.print(_film_lines(film), words, notes, film.warnings)
 
 
-def _film_line(what: str, s: FilmStatistics) -> str:
-    return (
-        f'{what} {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
-        f'{s.area_m2:.2f} m2'
-    )
+def _film_lines(film: pd.Film) -> Iterator[str]:
+    from paint_deposition.film.paint_used import paint_sentence
 
-
-def _lines(film: pd.Film) -> Iterator[str]:
     s, counts = film.statistics, film.counts
     laid_cm3 = sum(gun.painted_volume_cm3 for gun in film.guns)
     for gun in film.guns:
-        if gun.name:
-            share = gun.painted_volume_cm3 / laid_cm3
-            yield f'{gun.name}: {100 * share:.1f} % of the paint; {gun.geometry.sentence}'
-        else:
-            yield gun.geometry.sentence
+        share = 100 * gun.painted_volume_cm3 / laid_cm3
+        own = f'{gun.name}: {share:.1f} % of the paint; ' if gun.name else ''
+        yield own + gun.geometry.sentence
     for coat in film.coats:
         wet_film = '' if math.isnan(coat.mean_wet_um) else f', {coat.mean_wet_um:.1f} µm mean wet'
         yield _film_line(f'coat {coat.name}', coat.statistics) + wet_film
@@ -146,15 +133,14 @@ def _lines(film: pd.Film) -> Iterator[str]:
             f'{100 * s.within_target:.1f} % of it within {"its own band" if s.zones else band}, '
             f'{100 * s.below_target:.1f} % below, {100 * s.above_target:.1f} % above{cpk}'
         )
-    yield from options.zone_lines(s.zones)
+    yield from zone_lines(s.zones)
     if not math.isnan(s.capture_fraction):
         yield (
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
-    yield from options.paint_lines(film)
-    coarsest = max(film.guns, key=lambda gun: gun.geometry.facet_error)
-    yield coarsest.geometry.facet_sentence
+    yield from filter(None, [paint_sentence(film)])
+    yield max((gun.geometry for gun in film.guns), key=lambda of: of.facet_error).facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (
             f'{counts.rejected} of {counts.received} poses dropped, {counts.gaps} gaps taken as '
@@ -162,7 +148,12 @@ def _lines(film: pd.Film) -> Iterator[str]:
         )
 
 
-MOST_WARNINGS = 5
+def _film_line(what: str, s: FilmStatistics) -> str:
+    return (
+        f'{what} {s.mean_um:.1f} µm mean, {s.std_dev_um:.1f} µm standard deviation, '
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm on the painted {100 * s.coverage:.1f} % of '
+        f'{s.area_m2:.2f} m2'
+    )
 
 
 @click.command('sweep')
@@ -177,10 +168,8 @@ MOST_WARNINGS = 5
     help='Processes on this machine, of one thread each; default: one a core.',
 )  # fmt: skip
 @options.ALLOW_EFFECTS
-@options.results_options('cases.parquet, sweep.json and sweep.png')
-def sweep_command(
-    sweep: Path, results: options.Results, scheduler: str | None, count: int | None
-) -> None:
+@results_options('cases.parquet, sweep.json and sweep.png')
+def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: int | None) -> None:
     """Compute the variations that SWEEP, a YAML file, describes.
 
     Each case is what `simulate` computes. Finished cases are kept in the folder `finished` of the
@@ -194,21 +183,15 @@ def sweep_command(
         found = computed(sweep, results.output, scheduler=scheduler, count=count, progress=show)
         show('writing and drawing')
         results.write(found)
-    options.print_all('note', found.job.notes)
-    odd = ((f'case {number}', line) for number, line in (*found.errors, *found.warnings))
-    _print_warnings(odd, results.output / 'cases.parquet')
-    results.print(found.lines)
-
-
-def _print_warnings(warnings: Iterable[tuple[str, str]], file: Path) -> None:
-    """Print some of many warnings (name, reason), each reason once, and the file of all."""
-    named: dict[str, list[str]] = {}
-    for name, reason in warnings:
-        named.setdefault(reason, []).append(name)
-    lines = [
-        f'{first}{f" and {len(others)} more" if others else ""}: {reason}'
+    # Each reason once, with the first of its cases.
+    named: dict[str, list[int]] = {}
+    for number, reason in (*found.errors, *found.warnings):
+        named.setdefault(reason, []).append(number)
+    warnings = [
+        f'case {first}{f" and {len(others)} more" if others else ""}: {reason}'
         for reason, (first, *others) in named.items()
     ]
-    options.print_all('warning', lines[:MOST_WARNINGS])
-    if len(lines) > MOST_WARNINGS:
-        options.print_all('warning', [f'{len(lines) - MOST_WARNINGS} more in {file}'])
+    if len(warnings) > MOST_WARNINGS:
+        more = f'{len(warnings) - MOST_WARNINGS} more in {results.output / "cases.parquet"}'
+        warnings = [*warnings[:MOST_WARNINGS], more]
+    results.print(found.lines, notes=found.job.notes, warnings=warnings)

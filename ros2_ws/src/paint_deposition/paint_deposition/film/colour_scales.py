@@ -17,6 +17,8 @@ UNDER_RGB = (250, 153, 191)
 OVER_RGB = (214, 38, 41)
 BARE_RGB = (158, 158, 158)
 NICE_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+# A scale that does not begin at 0 ends at multiples of one of these, about so many of them apart.
+STEPS, FEWEST_STEPS = (1.0, 2.0, 5.0, 10.0), 8
 
 
 def _palette(
@@ -60,9 +62,17 @@ class ColourScale:
 
 
 def film_scale(film_um: np.ndarray, low_um: float = 0.0, high_um: float = 0.0) -> ColourScale:
-    """The scale for a film [um]: fixed, or from 0 to a round figure if both ends are 0."""
+    """The scale for a film [um]: fixed, or around the film between round figures if both are 0.
+
+    It begins at 0 unless the whole film is thicker than a quarter of its peak.
+    """
     if low_um == 0.0 and high_um == 0.0:
-        high_um = round_up(float(film_um.max(initial=0.0)))
+        least, most = float(film_um.min(initial=np.inf)), float(film_um.max(initial=0.0))
+        if least <= 0.25 * most or not len(film_um):
+            return ColourScale(0.0, round_up(most), FILM_PALETTE)
+        step = round_up(max(most - least, 0.01 * most) / FEWEST_STEPS, STEPS)
+        first = math.floor(least / step)
+        low_um, high_um = step * first, step * max(math.ceil(most / step), first + 1)
     return ColourScale(low_um, high_um, FILM_PALETTE)
 
 
@@ -73,9 +83,9 @@ def residual_scale(residual_um: np.ndarray, largest_um: float = 0.0) -> ColourSc
     return ColourScale(-largest_um, largest_um, RESIDUAL_PALETTE)
 
 
-def round_up(value: float) -> float:
+def round_up(value: float, figures: tuple[float, ...] = NICE_STEPS) -> float:
     """The next round figure; 1 for 0, so that a scale has a width."""
     if value <= 0.0:
         return 1.0
     unit = 10.0 ** math.floor(math.log10(value))
-    return next(step * unit for step in NICE_STEPS if step * unit >= value * (1.0 - 1e-9))
+    return next(step * unit for step in figures if step * unit >= value * (1.0 - 1e-9))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.film.tabular import Tabular
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
 from paint_deposition.part.surface import Surface
@@ -79,7 +80,7 @@ class CoatFilm:
 
 
 @dataclass(frozen=True)
-class Film:
+class Film(Tabular):
     """The film on a part, with all that it was computed from.
 
     Attributes:
@@ -112,6 +113,28 @@ class Film:
             f'Film({s.mean_um:.1f} ± {s.std_dev_um:.1f} µm at {len(self.film_um)} vertices, '
             f'{100 * s.coverage:.0f} % of {s.area_m2:.2f} m² painted)'
         )
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """At the vertices, the columns of ``film.csv``."""
+        columns = dict(zip(('x_m', 'y_m', 'z_m'), self.surface.vertices_m.T, strict=True))
+        columns['thickness_um'] = self.film_um
+        columns |= {f'{coat.name}_um': coat.film_um for coat in self.coats}
+        return columns | ({'zone': self.zones.names} if self.zones else {})
+
+    def short_table(self) -> list[Sequence[Any]]:
+        """The film on the part and on each zone."""
+        rows = {'part': self.statistics, **self.statistics.zones}
+        return [
+            ('', 'mean [µm]', 'SD [µm]', 'least [µm]', 'greatest [µm]', 'painted', 'in the band'),
+            *(
+                (
+                    name, f'{s.mean_um:.1f}', f'{s.std_dev_um:.1f}', f'{s.min_um:.1f}',
+                    f'{s.max_um:.1f}', f'{s.coverage:.0%}',
+                    f'{s.within_target:.0%}' if s.has_target else '',
+                )
+                for name, s in rows.items()
+            ),
+        ]  # fmt: skip
 
     @property
     def trajectory(self) -> Trajectory:

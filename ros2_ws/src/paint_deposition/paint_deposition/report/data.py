@@ -16,12 +16,11 @@ from paint_deposition.film.statistics import wanted_at
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
-from paint_deposition.inference.diagnosis.verdict import Diagnosis
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
-from paint_deposition.report.writers.models import history_as_list
 
 
 class Change(NamedTuple):
@@ -73,31 +72,17 @@ class ReportData:
         """The experiments of the campaign."""
         return self.study.campaign.experiments
 
-    @property
-    def target_um(self) -> float | None:
-        """The film wanted [um], if the campaign says so."""
-        return self.study.campaign.target_um
-
-    @property
-    def tolerance_um(self) -> float | None:
-        """What it may differ [um]."""
-        return self.study.campaign.tolerance_um
-
     @cached_property
-    def wanted_um(self) -> tuple[np.ndarray, np.ndarray]:
-        """Target and tolerance (P,) at the points, those of their zones [um]; NaN: none."""
-        target_of = self.study.campaign.target_of
-        each = [
-            wanted_at(one.means.mean_um, *target_of(one), one.zones_of_points)
-            for one in self.experiments
-        ]
-        target, tolerance = map(np.concatenate, zip(*each, strict=True))
-        return target, tolerance
-
-    @property
-    def has_target(self) -> bool:
-        """Whether a film is wanted anywhere."""
-        return not np.isnan(self.wanted_um[0]).all()
+    def bands(self) -> list[str]:
+        """Where the film measured at each point is beside its own target band; '' without one."""
+        target_of, bands = self.study.campaign.target_of, []
+        for one in self.experiments:
+            measured = one.means.mean_um
+            target, tolerance = wanted_at(measured, *target_of(one), one.zones_of_points)
+            off = measured - target
+            within = np.where(np.abs(off) <= tolerance, 'in', np.where(off < 0.0, 'low', 'high'))
+            bands += np.where(np.isnan(off), '', within).tolist()
+        return bands
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -113,6 +98,12 @@ class ReportData:
     def model(self) -> DepositionModel:
         """The best model."""
         return self.models[-1]
+
+    @property
+    def best(self) -> str:
+        """Of models side by side the one with the smallest error."""
+        errors = [comparison.points.rmse_um for comparison in self.comparisons]
+        return self.names[int(np.argmin(errors))]
 
     @property
     def improved(self) -> bool:
@@ -182,6 +173,11 @@ class ReportData:
         """Along columns and rows."""
         return profiles_of(self.study, self.models)
 
+    @property
+    def lined(self) -> bool:
+        """Whether the readings lie in columns or rows, along which models can be drawn."""
+        return all(len(profile.line_m) for profile in self.profiles)
+
     def rows_of(self, index: int) -> slice:
         """Points of the study that belong to an experiment."""
         first, stop = np.searchsorted(self.study.campaign.experiment_of, [index, index + 1])
@@ -205,3 +201,36 @@ def _painted(experiment: Experiment, model: DepositionModel) -> PredictedFilm:
         sum_um((sign, film.film_um) for sign, film in films),
         sum(sign * film.emitted_cm3 for sign, film in films),
     )
+
+
+def history_as_list(
+    study: Study, steps: Sequence[Step], older: Sequence[Mapping[str, Any]] = ()
+) -> list[dict[str, Any]]:
+    """What was added to a model and the errors it left.
+
+    Errors can be compared within one campaign only, so each step names its campaign, with the
+    noise of its gauge. The start model is the last of the older steps: refitted to the
+    same campaign it replaces that step, fitted to another one it follows it.
+
+    Args:
+        study: the readings.
+        steps: the models, the start model, refitted, first.
+        older: what the start model's own file says.
+    """
+    campaign = study.campaign.name
+    found = [
+        {
+            'added': step.added,
+            'rmse_um': round(step.rmse_um, 4),
+            'holdout_rmse_um': round(step.holdout_rmse_um, 4),
+            'noise_floor_um': round(study.noise_floor_um, 4),
+            'campaign': campaign,
+        }
+        for step in steps
+    ]
+    kept = [dict(step) for step in older]
+    if kept and kept[-1].get('campaign', campaign) == campaign:
+        found[0] = kept.pop() | found[0] | {'added': older[-1].get('added', 'pattern')}
+    else:
+        found[0]['added'] = 'refit' if kept or steps[0].model.effects else 'pattern'
+    return [*kept, *found]

@@ -1,7 +1,7 @@
 """What the report calls things, in words of the paint shop."""
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -20,8 +20,6 @@ from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.proposals import Spray
 from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.report.style import TWO_SIDED_95
-from paint_deposition.report.writers.models import PATTERN, REFIT
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
     'incidence_deg': ('Incidence angle', 'deg'),
@@ -42,15 +40,6 @@ COVARIATES: Mapping[str, tuple[str, str]] = {
 }
 FORMS_SHOWN = 3
 SUPERSCRIPTS = str.maketrans('-+0123456789', '⁻⁺⁰¹²³⁴⁵⁶⁷⁸⁹')
-SYMBOLS = {
-    'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
-    'K2': ('K2', 'weight of the centred Gaussian', ''),
-    'K3': ('K3', 'asymmetry of the ring', ''),
-    'phi_rad': ('φ', 'phase of the asymmetry', 'rad'),
-    'r_m': ('r', 'radius of the ring', 'm'),
-    'sigma1_m': ('σ1', 'width of the ring', 'm'),
-    'sigma2_m': ('σ2', 'width of the centred Gaussian', 'm'),
-}
 
 
 def covariate_label(name: str) -> str:
@@ -95,13 +84,6 @@ def is_learned(effect_id: str) -> bool:
     return effect_id.startswith('learned:')
 
 
-def step_words(step: Mapping[str, Any]) -> str:
-    """What one step of a model's history added."""
-    added = str(step.get('added', PATTERN))
-    known = {PATTERN: 'pattern of eq. (1) alone', REFIT: 'model as given, refitted'}
-    return known.get(added) or f'+ {effect_name(added)}'
-
-
 def effect_meaning(effect: type[Effect] | None) -> str:
     """A sentence on an effect: the first line of its docstring, or what else it says of itself."""
     if effect is None:
@@ -124,8 +106,7 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
     shown = ('addition', 'µm') if law.kind == 'addition' else ('factor', '')
     words = [(shown[0], f'{least} to {most}', shown[1])]
     if isinstance(law, LearnedCurve):
-        first = 1.0 if law.covariate == 'spray_pass' else 0.0
-        low, high = (number(end + first) for end in (law.low, law.high))
+        low, high = (number(counted_from_1(law, end)) for end in (law.low, law.high))
         words.append(('over', f'{low} to {high}', unit_words(law.unit)))
     elif isinstance(law, LearnedMap):
         for grid in law.maps:
@@ -136,19 +117,18 @@ def learned_words(law: LearnedLaw) -> list[tuple[str, str, str]]:
     return words
 
 
-def learned_range(law: LearnedLaw) -> str:
-    """Where a learned law holds, that it is neutral elsewhere, and how well it is known."""
-    name = capital(effect_name(law.id))
-    if isinstance(law, LearnedMap):
-        return f'{name}: neutral outside the area of the readings, and on any other part.'
-    if isinstance(law, LearnedFootprint):
-        reach = f'{number(1e3 * law.reach_m)} mm'
-        return f'{name}: neutral farther than {reach} from the axis on the model plane.'
-    _, ends, unit = learned_words(law)[1]
-    words = f"{name}: neutral outside the readings' range, {ends} {unit}".rstrip() + '.'
-    if not (isinstance(law, LearnedCurve) and law.sd):
-        return words
-    return f'{words}{_band_words(law)} {form_words(law)}'
+def counted_from_1(law: LearnedCurve, values: Any) -> Any:
+    """Values of a curve's covariate as they are shown: passes count from 1."""
+    return values + (1.0 if law.covariate == 'spray_pass' else 0.0)
+
+
+def law_lines(law: Effect | None) -> list[str]:
+    """A learned law in a line for its values and range, and in one for its closed forms."""
+    if not isinstance(law, LearnedLaw):
+        return []
+    shape = ', '.join(' '.join(row).rstrip() for row in learned_words(law))
+    forms = [form_words(law)] if isinstance(law, LearnedCurve) and law.sd else []
+    return [f'{effect_name(law.id)}: {shape}', *forms]
 
 
 def form_words(law: LearnedCurve) -> str:
@@ -163,22 +143,6 @@ def form_words(law: LearnedCurve) -> str:
         return 'No closed form of few parameters fits within its band.'
     more = f'; {len(forms) - FORMS_SHOWN} more fit' if len(forms) > FORMS_SHOWN else ''
     return f'Closed forms within its band: {"; ".join(forms[:FORMS_SHOWN])}{more}.'
-
-
-def _band_words(law: LearnedCurve) -> str:
-    """Where the band of a curve is narrow, and where wide, as a sentence."""
-    values = np.linspace(law.low, law.high, 101)
-    half = TWO_SIDED_95 * law.deviation(values)
-    shown = values + (1.0 if law.covariate == 'spray_pass' else 0.0)
-
-    def known(at: np.intp) -> str:
-        wide = f'± {number(half[at], 2)} {"µm" if law.kind == "addition" else ""}'.rstrip()
-        return f'{wide} at {number(shown[at])} {unit_words(law.unit)}'.rstrip()
-
-    return (
-        f' At 95 % it is known best, to {known(half.argmin())}, and least, to '
-        f'{known(half.argmax())}.'
-    )
 
 
 def probability_words(found: EffectClass) -> str:
@@ -269,7 +233,7 @@ def count_words(study: Study) -> str:
     return f'{text} on {names}'
 
 
-def joined(words: list[str], last: str = 'and') -> str:
+def joined(words: Sequence[str], last: str = 'and') -> str:
     """'a, b and c'."""
     if len(words) < 2:
         return ''.join(words)

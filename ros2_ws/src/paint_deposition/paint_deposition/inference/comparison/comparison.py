@@ -5,7 +5,7 @@ Zones stand beside their targets as on an acceptance sheet.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from typing import Any
@@ -15,6 +15,7 @@ from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.film.tabular import Tabular
 from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign
@@ -123,7 +124,7 @@ class Dependence:
 
 
 @dataclass(frozen=True)
-class Comparison:
+class Comparison(Tabular):
     """The model compared with the readings.
 
     Attributes:
@@ -154,6 +155,34 @@ class Comparison:
             f'gauge noise {self.study.noise.typical_um:.2f} µm, '
             f'{len(self.regions)} regions of misfit)'
         )
+
+    def columns(self) -> dict[str, np.ndarray]:
+        """Of every reading, the columns of ``residuals.csv``; NaN where it was left out."""
+        parts = self.study.campaign.experiments
+        taken, used = [part.taken for part in parts], np.concatenate([part.used for part in parts])
+        columns = {'experiment': np.repeat([part.name for part in parts], list(map(len, taken)))}
+        for name in ('point', 'group'):
+            columns[name] = np.concatenate([getattr(readings, name) for readings in taken])
+        positions = np.concatenate([readings.positions_m for readings in taken])
+        columns |= dict(zip(('x_m', 'y_m', 'z_m'), positions.T, strict=True))
+        columns['thickness_um'] = np.concatenate([readings.thickness_um for readings in taken])
+        for name in ('predicted_um', 'residual_um', 'sigma_um'):
+            columns[name] = np.full(len(used), np.nan)
+            columns[name][used] = getattr(self.readings, name)
+        layers = np.concatenate([readings.layer for readings in taken])
+        return columns | {'used': used, 'layer': layers}
+
+    def short_table(self) -> list[Sequence[Any]]:
+        """The misfit of each experiment."""
+        rows = ((m.label, m.residuals) for m in self.misfits if m.kind == 'experiment')
+        return [
+            ('', 'readings', 'bias [µm]', 'RMSE [µm]', 'χ² per reading'),
+            *(
+                (label, len(of), f'{of.bias_um:+.2f}', f'{of.rmse_um:.2f}',
+                 f'{of.chi_square_per_reading:.2f}')
+                for label, of in rows
+            ),
+        ]  # fmt: skip
 
     @cached_property
     def geometry(self) -> dict[str, SprayGeometry]:

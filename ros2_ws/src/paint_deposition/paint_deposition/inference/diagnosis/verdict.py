@@ -11,6 +11,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.film.tabular import Tabular
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
@@ -117,7 +118,7 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Diagnosis:
+class Diagnosis(Tabular):
     """The verdict and what it rests on.
 
     Attributes:
@@ -157,6 +158,29 @@ class Diagnosis:
         before, after = self.history[0].rmse_um, self.history[-1].rmse_um
         found = f' {", ".join(self.accepted)}' if self.accepted else ''
         return f'Diagnosis({self.verdict}{found}, RMSE {before:.2f} -> {after:.2f} µm)'
+
+    def columns(self) -> dict[str, list[Any]]:
+        """Of every class of effects: its members, whether it was added, how probable it is."""
+        return {
+            'best': [one.best for one in self.classes],
+            'members': [', '.join(one.members) for one in self.classes],
+            'accepted': [one.best in self.accepted for one in self.classes],
+            'probability': [one.probability for one in self.classes],
+            'parameters': [
+                ', '.join(
+                    f'{name} {value.value:.4g} ({value.low:.4g} to {value.high:.4g})'
+                    for name, value in one.parameters.items()
+                )
+                for one in self.classes
+            ],
+        }
+
+    def short_table(self) -> list[Sequence[Any]]:
+        """A row for each class."""
+        columns = self.columns()
+        columns['accepted'] = ['added' if one else '' for one in columns['accepted']]
+        columns['probability'] = list(map(percent, columns['probability']))
+        return [tuple(columns), *zip(*columns.values(), strict=True)]
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -1,4 +1,4 @@
-"""The painted part with the figures of its film; first what is in the target band, if any."""
+"""The painted part with the gun's way over it, the target band, and the figures of its film."""
 
 from textwrap import fill
 
@@ -6,7 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.gridspec import SubplotSpec
+from matplotlib.markers import MarkerStyle
 from matplotlib.patches import Patch
+from matplotlib.transforms import Affine2D
 
 from paint_deposition.film.colour_scales import BARE_RGB, ColourScale, film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
@@ -14,7 +16,7 @@ from paint_deposition.film.statistics import CPK_MEANS, FilmStatistics, wanted_a
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
+from paint_deposition.report.pictures.part import HALO, PartPicture, View
 from paint_deposition.report.style import (
     BARE,
     BELOW,
@@ -237,3 +239,48 @@ def _draw_legend(
         f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
         f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
     )
+
+
+def draw_tool_path(
+    axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray
+) -> None:
+    """Draw passes as lines with number and arrows, the way between them dashed, within corners."""
+    on = spray.flow > 0.0
+    apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
+    # Coats follow each other in one path: their clocks begin anew.
+    breaks = 1 + np.flatnonzero(
+        (on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0) | (np.abs(apart_s) > 1e-3)
+    )
+    drawn: set[int] = set()
+    for rows in np.split(np.arange(len(spray)), breaks):
+        line = view.flat(spray.position_m[rows])
+        if not on[rows].any():
+            axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
+            continue
+        number = int(spray.spray_pass[rows[0]]) + 1
+        axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)
+        room = 0.02 * (high - low).max()
+        shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
+        if len(shown) < 2:
+            continue
+        _draw_arrows(axes, shown, (high - low).max() / 3.0)
+        if number not in drawn:
+            drawn.add(number)
+            axes.annotate(
+                str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
+                bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},
+            )  # fmt: skip
+
+
+def _draw_arrows(axes: Axes, line: np.ndarray, every_m: float) -> None:
+    """Arrow heads along a line, in its direction."""
+    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    count = max(1, round(along[-1] / every_m))
+    for middle in along[-1] * (np.arange(count) + 0.5) / count:
+        row = max(1, int(np.searchsorted(along, middle)))
+        right, up = line[row] - line[row - 1]
+        turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
+        axes.plot(
+            *line[row], marker=MarkerStyle('^', transform=turn), markersize=9,
+            markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
+        )  # fmt: skip

@@ -34,7 +34,7 @@ def write_geometry_picture(
 ) -> Path:
     """Draw part and motion from the gun, and from the right and the top of that picture."""
     front = View.of_front(surface.outward, surface.down)
-    views = (front, front.from_the_right(), front.from_above())
+    views = (front, *front.others())
     corners = np.concatenate([surface.vertices_m, spray.position_m])
     sizes = [np.maximum(np.ptp(view.flat(corners), axis=0), 1e-3) for view in views]
     figure = new_figure(11.5, 8.0)

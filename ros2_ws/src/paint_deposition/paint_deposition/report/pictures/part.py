@@ -1,4 +1,4 @@
-"""A part as a flat picture from the sides of the gun, with the gun's way over it."""
+"""A part as a flat picture from the side of the gun."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,10 +8,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.figure import Figure
-from matplotlib.markers import MarkerStyle
 from matplotlib.patheffects import Normal, Stroke
 from matplotlib.ticker import MaxNLocator
-from matplotlib.transforms import Affine2D
 from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
 
@@ -58,16 +56,12 @@ class View:
         right = np.cross(up, toward)
         return View(right, up, toward, (_name(right, 'right'), _name(up, 'up')))
 
-    def from_the_right(self) -> 'View':
-        """View of the part from the right of this picture."""
-        return View(
-            -self.toward, self.up, self.right, (_name(self.toward, 'away'), self.labels[1])
-        )
-
-    def from_above(self) -> 'View':
-        """View of the part from the top of this picture, its front below."""
-        return View(
-            self.right, -self.toward, self.up, (self.labels[0], _name(self.toward, 'away'))
+    def others(self) -> tuple['View', 'View']:
+        """Views from the right of this picture, and from its top with the front below."""
+        (right, up), away = self.labels, _name(self.toward, 'away')
+        return (
+            View(-self.toward, self.up, self.right, (away, up)),
+            View(self.right, -self.toward, self.up, (right, away)),
         )
 
     def flat(self, points_m: np.ndarray) -> np.ndarray:
@@ -279,49 +273,4 @@ def label_points(
         axes.annotate(
             word, place / points_per_m, spot - place, textcoords='offset points', ha='center',
             va='center', **style,
-        )  # fmt: skip
-
-
-def draw_tool_path(
-    axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray
-) -> None:
-    """Draw passes as lines with number and arrows, the way between them dashed, within corners."""
-    on = spray.flow > 0.0
-    apart_s = np.diff(spray.stamp_ns) * 1e-9 - 0.5 * (spray.dwell_s[1:] + spray.dwell_s[:-1])
-    # Coats follow each other in one path: their clocks begin anew.
-    breaks = 1 + np.flatnonzero(
-        (on[1:] != on[:-1]) | (np.diff(spray.spray_pass) != 0) | (np.abs(apart_s) > 1e-3)
-    )
-    drawn: set[int] = set()
-    for rows in np.split(np.arange(len(spray)), breaks):
-        line = view.flat(spray.position_m[rows])
-        if not on[rows].any():
-            axes.plot(*line.T, color='#3a4048', linewidth=0.9, linestyle=(0, (3, 3)), alpha=0.8)
-            continue
-        number = int(spray.spray_pass[rows[0]]) + 1
-        axes.plot(*line.T, color='white', linewidth=1.7, path_effects=HALO)
-        room = 0.02 * (high - low).max()
-        shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
-        if len(shown) < 2:
-            continue
-        _draw_arrows(axes, shown, (high - low).max() / 3.0)
-        if number not in drawn:
-            drawn.add(number)
-            axes.annotate(
-                str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
-                bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},
-            )  # fmt: skip
-
-
-def _draw_arrows(axes: Axes, line: np.ndarray, every_m: float) -> None:
-    """Arrow heads along a line, in its direction."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = max(1, round(along[-1] / every_m))
-    for middle in along[-1] * (np.arange(count) + 0.5) / count:
-        row = max(1, int(np.searchsorted(along, middle)))
-        right, up = line[row] - line[row - 1]
-        turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
-        axes.plot(
-            *line[row], marker=MarkerStyle('^', transform=turn), markersize=9,
-            markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
         )  # fmt: skip

@@ -1,4 +1,4 @@
-"""A recommended index, and a programme before and after."""
+"""A recommended index, a programme before and after, and places of the part and the gauge."""
 
 import math
 from pathlib import Path
@@ -6,15 +6,22 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 
 from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
+from paint_deposition.film.integrator import NO_PAINT_UM
+from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
 from paint_deposition.planning.part_place import PartPlaces
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
-from paint_deposition.report.pictures.film import page_film
-from paint_deposition.report.pictures.part import PartPicture, draw_tool_path
+from paint_deposition.report.pictures.film import draw_tool_path, page_film
+from paint_deposition.report.pictures.part import (
+    PALE_HALO,
+    PartPicture,
+    label_points,
+)
 from paint_deposition.report.style import (
     ACCENT,
     BEFORE,
@@ -34,6 +41,7 @@ CHOSEN = '#c0392b'
 # The colours span the films but for this share at either end.
 SHOWN = 0.99
 FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
+PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26
 
 
 def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
@@ -170,10 +178,7 @@ def _scale(result: Improvement) -> ColourScale:
     films = np.concatenate(
         [one.film_um[result.target_region] for one in (result.before, result.after)]
     )
-    least, most = np.quantile(films, [1.0 - SHOWN, SHOWN])
-    step = 10.0 ** math.floor(math.log10(max(most - least, 0.01 * most)))
-    low, high = step * math.floor(least / step), step * math.ceil(most / step)
-    return film_scale(films, low, high)
+    return film_scale(np.quantile(films, [1.0 - SHOWN, SHOWN]))
 
 
 def _title(name: str, laid: FilmSummary) -> str:
@@ -234,3 +239,56 @@ def write_places(path: str | Path, places: PartPlaces) -> Path:
     axes.set_ylim(low[1], high[1])
     axes.set_aspect('equal')
     return save_picture(figure, path)
+
+
+def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
+    """Draw the part with its numbered points, and how surely each effect would be found."""
+    part = PartPicture.of(chosen.surface)
+    width, height = PART_IN * (part.high_m - part.low_m) / (part.high_m - part.low_m).max()
+    rows = ROW_IN * len(chosen.power) + 1.2
+    figure = new_figure(width + BARS_IN + 0.8, max(height + 1.2, rows, 4.0))
+    grid = GridSpec(1, 2, figure, width_ratios=[width, BARS_IN])
+    draw_points(figure.add_subplot(grid[0]), chosen, part)
+    _draw_power(figure.add_subplot(grid[1]), chosen)
+    return save_picture(figure, path)
+
+
+def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = None) -> None:
+    """Draw the part, its film and its points on axes of your own, seen from the gun's side."""
+    part = part or PartPicture.of(chosen.surface)
+    scale = film_scale(chosen.film_um)
+    room = 0.03 * (part.high_m - part.low_m).max()
+    part.dress(axes, part.low_m - room, part.high_m + room)
+    part.draw(axes, scale.rgba(chosen.film_um, chosen.film_um > NO_PAINT_UM))
+    part.draw_contours(axes, chosen.film_um, scale.low, scale.high)
+    places = part.view.flat(chosen.positions_m)
+    twice = np.isin(np.arange(len(chosen)), chosen.read_twice)
+    for which, marker, label in ((~twice, 'o', 'read once'), (twice, 's', 'read twice')):
+        axes.plot(
+            *places[which].T, marker, markersize=6, color='white', markeredgecolor=INK,
+            linestyle='', label=label,
+        )  # fmt: skip
+    names = [name.removeprefix('P').lstrip('0') for name in chosen.names]
+    per_m = 72.0 * PART_IN / (part.high_m - part.low_m).max()
+    label_points(axes, places, names, per_m, fontsize=8.5, color=INK, path_effects=PALE_HALO)
+    axes.set_title(
+        f'{len(chosen)} points for the gauge; lines: expected film [µm]', loc='left', fontsize=12,
+        color=INK, pad=24,
+    )  # fmt: skip
+    legend(axes, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
+
+
+def _draw_power(axes: Axes, chosen: ChosenReadings) -> None:
+    """A bar an effect, and what a grid of as many points would give."""
+    names = sorted(chosen.power, key=lambda name: chosen.power[name])
+    quiet(axes, 'probability of detection at the typical size [%]', '', size=9.0)
+    rows = np.arange(len(names))
+    axes.barh(rows, [100 * chosen.power[n] for n in names], 0.6, color=ACCENT, label='these')
+    axes.plot(
+        [100 * chosen.grid_power[n] for n in names], rows, '|', color=INK, markersize=11,
+        markeredgewidth=2, label=f'{len(chosen)} on a grid',
+    )  # fmt: skip
+    axes.axvline(5.0, color=BEFORE, linewidth=0.9, linestyle='--')
+    axes.set_yticks(rows, names, fontsize=8.5, color=MUTED)
+    axes.set(xlim=(0, 101), ylim=(-0.7, len(names) - 0.3))
+    legend(axes, loc='lower right')

@@ -13,8 +13,8 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import draw_film
-from paint_deposition.report.pictures.inference import draw_agreement, draw_points
-from paint_deposition.report.pictures.planning import draw_curve
+from paint_deposition.report.pictures.planning import draw_curve, draw_points
+from paint_deposition.report.pictures.readings import draw_agreement
 
 
 def plot(result: Any, ax: Axes | None = None) -> Axes:

@@ -1,26 +1,64 @@
-"""What readings say of a model on disk: figures, residuals, the fitted model and the report."""
+"""What readings say of a model on disk: figures, residuals, models, effect files, the report."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from paint_deposition.effects.base import Effect
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.atomic import write_json
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LEAST_FACTOR, LearnedLaw
+from paint_deposition.files.atomic import filled, write_json, write_text
 from paint_deposition.files.gauge_readings import write_table
-from paint_deposition.files.model_file import ModelFile
+from paint_deposition.files.model_file import ModelFile, write_model
 from paint_deposition.files.provenance import origin
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
+from paint_deposition.inference.diagnosis.closed_forms import (
+    ClosedForm,
+    Parameter,
+    at_knots,
+    variable,
+)
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
+from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.report.data import ReportData
-from paint_deposition.report.page.report import write_report
-from paint_deposition.report.pictures.comparison import comparison_figure
-from paint_deposition.report.pictures.inference import write_calibration_pictures
+from paint_deposition.inference.posterior import Posterior
+from paint_deposition.report.data import ReportData, history_as_list
+from paint_deposition.report.page import write_report
+from paint_deposition.report.pictures.readings import (
+    comparison_figure,
+    write_calibration_pictures,
+)
 from paint_deposition.report.style import save_picture
-from paint_deposition.report.writers.models import write_fitted
 from paint_deposition.report.writers.write import written
+
+# What a law is over, in the words of an effect's code, and the family of such effects.
+VARIABLES = {
+    'incidence_deg': ('ray.cos_incidence', 'incidence'),
+    'standoff_ratio': ('ray.standoff_ratio', 'standoff'),
+    'time_s': ('path.time_s', 'time'),
+    'spray_pass': ('np.where(np.isnan(path.time_s), np.nan, path.passes_before + 1.0)', 'order'),
+    'stroke_end_m': ('np.minimum(path.from_turn_m, path.to_turn_m)', 'boundary'),
+    'since_trigger_s': ('path.since_on_s', 'boundary'),
+    'speed_m_per_s': ('path.speed_m_per_s', 'time'),
+    'curvature_per_m': ('points.curvature_per_m', 'curvature'),
+    'edge_distance_m': ('points.edge_distance_m', 'boundary'),
+    'sky_view_factor': ('points.sky_view_factor', 'visibility'),
+    'height_fraction': ('points.height_fraction', 'order'),
+    'across_m': ('places_m(points)[:, 0]', 'lateral shift'),
+    'film_um': ('film_um', 'level'),
+}
+# An amplitude may become so many times as far from neutral, a shape so many times as long.
+ROOM = 10.0
+TEMPLATE = Path(__file__).parent / 'templates' / 'effect.py.j2'
 
 
 @written.register
@@ -92,27 +130,141 @@ def _write_results(
 
 def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
     """A heading and a row a reading; those that were left out are without a prediction."""
-    yield (
-        'experiment', 'point', 'group', 'x_m', 'y_m', 'z_m', 'thickness_um', 'predicted_um',
-        'residual_um', 'sigma_um', 'used', 'layer',
-    )  # fmt: skip
-    found = comparison.readings
-    fitted = zip(found.predicted_um, found.residual_um, found.sigma_um, strict=True)
-    for experiment in comparison.study.campaign.experiments:
-        readings = experiment.taken
-        for k, used in enumerate(experiment.used):
-            yield [
-                experiment.name,
-                str(readings.point[k]),
-                str(readings.group[k]),
-                *(f'{value:.5f}' for value in readings.positions_m[k]),
-                f'{readings.thickness_um[k]:.3f}',
-                *([f'{value:.3f}' for value in next(fitted)] if used else [''] * 3),
-                str(int(used)),
-                str(readings.layer[k]),
-            ]
+    columns = comparison.columns()
+    yield [*columns]
+    for row in zip(*columns.values(), strict=True):
+        told = dict(zip(columns, row, strict=True))
+        for name in ('x_m', 'y_m', 'z_m'):
+            told[name] = f'{told[name]:.5f}'
+        for name in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
+            told[name] = '' if np.isnan(told[name]) else f'{told[name]:.3f}'
+        yield [*map(str, (told | {'used': int(told['used'])}).values())]
 
 
 def file_name(name: str) -> str:
     """An experiment's name without what file systems do not like."""
     return re.sub(r'[^\w.-]+', '_', name).strip('._') or 'experiment'
+
+
+def write_fitted(
+    path: str | Path,
+    study: Study,
+    steps: Sequence[Step],
+    start: ModelFile | None = None,
+    header_comment: str = '',
+) -> None:
+    """Write the last step's model; an older file is replaced at once.
+
+    Fitted numbers are rounded to ``DIGITS`` significant digits, all others stay as given.
+
+    Args:
+        path: YAML.
+        study: the readings that it was fitted to.
+        steps: the models, the start model, refitted, first.
+        start: what was started from: the name stays, the history goes on, and uncertainties
+            stay where the fit has no newer ones.
+        header_comment: lines to put at the top.
+    """
+    start = start or ModelFile(steps[0].model)
+    fit = steps[-1].fit
+    history = history_as_list(study, steps, start.history)
+    uncertainty = _uncertainty(fit, start.uncertainty)
+    fitted = _rounded(fit, steps[0].model.effects)
+    found = posterior_of(fit, study.campaign)
+    few = {'mean': _short(found.mean), 'covariance': _short(found.covariance)}
+    posterior: Posterior | None = found.model_copy(update=few)
+    whole = fitted.with_missing_brushes(start.model)
+    if whole is not fitted:
+        # It is that of some brushes only and would be taken for that of all.
+        fitted, posterior = whole, None
+    write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
+
+
+def _rounded(fit: Fit, given: Sequence[Effect]) -> DepositionModel:
+    """The fitted model with what was fitted at few digits, within its bounds.
+
+    Learned laws among the ``given`` effects were not learned here and stay as they are.
+    """
+    model = fit.model.with_patterns(
+        p.model_copy(update={name: _short(getattr(p, name)) for name in PATTERN_NAMES})
+        for p in fit.model.patterns
+    )
+    for effect in model.effects:
+        if isinstance(effect, LearnedLaw) and effect not in given:
+            # The numbers of a learned law.
+            values = {
+                n: _short(v) for n, v in effect if isinstance(v, float) or n in ('learned', 'sd')
+            }
+        else:
+            values = {
+                name: min(max(_short(getattr(effect, name)), info['low']), info['high'])
+                for name, info in effect.parameters().items()
+                if (effect.id, name) in fit.parameters.varied
+            }
+        model = model.with_effect(effect.model_copy(update=values))
+    return model
+
+
+def _short(value: Any) -> Any:
+    """A value, list or mapping with few digits in all its numbers."""
+    if isinstance(value, float):
+        # Eight digits leave the film within 1e-6 of its peak; the uncertainty is far larger.
+        return float(f'{value:.8g}')
+    if isinstance(value, dict):
+        return {name: _short(one) for name, one in value.items()}
+    return type(value)(map(_short, value))
+
+
+def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
+    """Standard deviations in the sections of the model."""
+    sections = {key: dict(value) for key, value in older.items() if isinstance(value, Mapping)}
+    for value in estimates(fit):
+        section, _, name = value.name.rpartition('.')
+        if value.name in PATTERN_NAMES:
+            section = 'planar'
+        sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
+    return sections
+
+
+def effect_entry(form: ClosedForm, file: str | Path) -> str:
+    """What stands in a model file for the effect of a form: its file and its values."""
+    return f'file: {file}, ' + ', '.join(f'{n}: {p.value:.6g}' for n, p in form.parameters.items())
+
+
+def write_effect_file(path: Path, law: LearnedCurve, form: ClosedForm) -> Path:
+    """Write a form of a learned law as an effect; absent at its defaults.
+
+    Args:
+        path: the file, named for the effect.
+        law: what was learned.
+        form: one of those that fit it.
+    """
+    value, family = VARIABLES[law.covariate]
+    effect_id = re.sub(r'\W+', '_', path.stem.lower()).strip('_') or 'learned'
+    if effect_id in EFFECTS or not effect_id[0].isalpha():
+        effect_id = f'learned_{effect_id}'
+    acts_on = 'path' if type(law).on_path is not LearnedCurve.on_path else 'film'
+    (name, unit), knots = variable(type(law)), at_knots(law)
+    text = filled(
+        TEMPLATE, law=law, form=form, id=effect_id, family=family, value=value, file=path.name,
+        entry=effect_entry(form, path.name).partition(', ')[2],
+        acts_on='ray' if law.flux_factor is not None else acts_on,
+        functions=', '.join(one for one in ('exp', 'log') if f'{one}(' in form.code),
+        variable=name if unit == '1' else f'{name} [{unit}]', lowest=LEAST_FACTOR,
+        low=f'{float(knots.min()):.6}', high=f'{float(knots.max()):.6}', bounds=_bounds,
+        literal=repr,
+    )  # fmt: skip
+    write_text(path, text)
+    return path
+
+
+def _bounds(found: Parameter) -> str:
+    """Default and bounds of a parameter of the effect, wide about what was learned."""
+    value, neutral = float(f'{found.value:.6g}'), float(f'{found.neutral:.6g}')
+    if found.role == 'shape':
+        role, low, high = "role='shape'", value / ROOM, value * ROOM
+    else:
+        away = ROOM * max(abs(value - neutral), 0.1 if neutral else 1e-3)
+        role, low, high = f'typical={value}', neutral - away, neutral + away
+        low = max(low, 0.0) if found.role == 'level' else low
+    return f'{neutral}, low={low:.4g}, high={high:.4g}, {role}'

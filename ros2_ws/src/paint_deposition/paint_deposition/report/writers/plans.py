@@ -39,10 +39,10 @@ from paint_deposition.planning.part_plan import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.inference import write_measuring_picture
 from paint_deposition.report.pictures.motion import write_geometry_picture
 from paint_deposition.report.pictures.planning import (
     write_improvement_picture,
+    write_measuring_picture,
     write_places,
     write_uniformity,
 )
@@ -81,7 +81,13 @@ def write_passes(
         OSError: it cannot be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    digest, moves = model_digest(result.model), _in_frame(result.moves, part)
+    digest, moves = model_digest(result.model), result.moves
+    if part:
+        poses = [part[1].applied(move.position_m, move.quaternion_xyzw) for move in moves]
+        moves = [
+            replace(move, position_m=position, quaternion_xyzw=quaternion)
+            for move, (position, quaternion) in zip(moves, poses, strict=True)
+        ]
     _write_bag(folder / BAG, result, part, digest)
     write_table(folder / TABLE, _table(moves))
     made = 'Improved' if isinstance(result, Improvement) else 'Planned'
@@ -102,16 +108,6 @@ def write_passes(
     ]
     write_table(folder / JOINTS, [['time_s', *names], *rows])
     return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, JOINTS]
-
-
-def _in_frame(moves: Sequence[Move], part: tuple[str, Rigid] | None) -> Sequence[Move]:
-    if part is None:
-        return moves
-    poses = [part[1].applied(move.position_m, move.quaternion_xyzw) for move in moves]
-    return [
-        replace(move, position_m=position, quaternion_xyzw=quaternion)
-        for move, (position, quaternion) in zip(moves, poses, strict=True)
-    ]
 
 
 def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
@@ -260,10 +256,14 @@ def _chosen_readings(
     about = with_provenance(of_part | dict(made_from or {}), result.model)
     part = None if part_pose is None else Rigid.of(part_pose)
     files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv')]
-    positions, quaternions = result.positions_m, _gauge_quaternions(result)
+    poses: list[Sequence[object]] = [('point', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw')]
+    at_points = zip(result.names, result.positions_m, _gauge_quaternions(result), strict=True)
+    for name, *pose in at_points:
+        position, quaternion = part.applied(*pose) if part else pose
+        poses.append([name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)])
     write_json(files[0], result.to_dict() | about)
     write_table(files[1], _points(result))
-    write_table(files[2], _poses(result.names, positions, quaternions, part))
+    write_table(files[2], poses)
     return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
 
 
@@ -287,12 +287,3 @@ def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
             *(f'{value:.0f}' for value in face_mm[k]), f'{chosen.expected_um[k]:.1f}',
             ' '.join(chosen.speaks_for[k]),
         ]  # fmt: skip
-
-
-def _poses(
-    names: Sequence[str], positions_m: np.ndarray, quaternions: np.ndarray, part: Rigid | None
-) -> Iterator[Sequence[object]]:
-    yield 'point', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw'
-    for name, *pose in zip(names, positions_m, quaternions, strict=True):
-        position, quaternion = part.applied(*pose) if part else pose
-        yield [name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)]

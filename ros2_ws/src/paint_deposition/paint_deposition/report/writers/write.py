@@ -118,7 +118,8 @@ def _write_simulation(
     )
     picture = film_picture(
         result.surface, result.film_um, result.path, result.statistics,
-        f'Film on {mesh or "the part"}', f'{motion}, {model or "default model"}', result.zones,
+        f'Film on {mesh or "the part"}',
+        ', '.join(filter(None, [motion, model or 'default model'])), result.zones,
     )  # fmt: skip
     return [*files, save_picture(picture, folder / f'film.{pictures}')]
 

@@ -1,18 +1,22 @@
-"""Which model a command works with, and the line that says so."""
+"""Which model a command works with, with the line that says so, and which robot drives."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+import click
 
 import paint_deposition as pd
-from paint_deposition.cli.options import print_all
+from paint_deposition.cli.results import print_all
 from paint_deposition.errors import ModelError
 
 if TYPE_CHECKING:
     from paint_deposition.files.model_file import ModelFile
+    from paint_deposition.inference.posterior import Posterior
+    from paint_deposition.planning.driving import RobotCell
 
 
 @dataclass(frozen=True)
@@ -29,6 +33,11 @@ class ChosenModel:
         """The model of the file, else that of a 50 mm bell."""
         model = self.file.model if self.file else pd.DepositionModel()
         return model.with_brush(self.brush) if self.brush else model
+
+    @property
+    def posterior(self) -> Posterior | None:
+        """What the file says is known of the model."""
+        return self.file.posterior if self.file else None
 
 
 def chosen_model(given: Path | None, brush: int = 0, named: bool = True) -> ChosenModel:
@@ -106,3 +115,14 @@ def model_words(path: Path, file: ModelFile) -> str:
     brushes = ', '.join(str(brush.number) for brush in file.model.brushes)
     of_brushes = f', brushes: {brushes}' if brushes else ''
     return f'{path}{called} ({digest}){of_brushes}, effects: {effects}'
+
+
+def robot_cell(robot: dict[str, Any], part_pose: list[float] | None) -> RobotCell | None:
+    """The robot of ``options.robot_options`` with the part; None where none is given."""
+    if robot['urdf'] is None:
+        return None
+    if part_pose is None:
+        raise click.UsageError('--urdf needs --part-pose: where the part stands in its base')
+    from paint_deposition.api.planning import read_robot
+
+    return read_robot(part_pose=part_pose, **robot)

@@ -1,8 +1,8 @@
-"""Commands on recordings: `inspect` and `recover`."""
+"""The command `inspect`: what a recording, a program, a table or a mesh holds."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,15 +10,19 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.inspected import mesh_in, readings_in
-from paint_deposition.cli.model_choice import model_for
-from paint_deposition.cli.results_folder import SHOW_PROGRESS_AFTER_S, Progress
+from paint_deposition.cli.models import model_for
+from paint_deposition.cli.results import Progress, print_all
+from paint_deposition.errors import some
 from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.bag_summary import BagSummary, PoseSource
     from paint_deposition.motion.stream_quality import StreamQuality
+
+MOST_NAMED = 8
+# Figures, and the same in words.
+Contents = tuple[dict[str, Any], list[str]]
 
 
 @click.command('inspect')
@@ -40,12 +44,13 @@ if TYPE_CHECKING:
 def inspect_command(
     recording: Path | None,
     points_file: Path | None,
-    part: dict[str, Any],
+    part: options.Part,
     trajectory: Path | None,
-    max_pose_gap_s: float,
+    output: Path | None,
+    model_file: Path | None,
     motion: dict[str, Any],
+    max_pose_gap_s: float,
     as_json: bool,
-    **drawn: Any,
 ) -> None:
     """Show what RECORDING holds, or how the gun ran over a part.
 
@@ -60,20 +65,20 @@ def inspect_command(
     path = trajectory or recording
     if path is None or (trajectory and recording):
         raise click.UsageError('give one recording: RECORDING, or --mesh M --trajectory T')
-    if part['path'] is not None:
-        figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, **drawn)
+    if part.mesh is not None:
+        figures, lines = _gun_on_part(part, path, motion, max_pose_gap_s, output, model_file)
     else:
-        if any(drawn[name] for name in ('output', 'model_file')):
+        if output or model_file:
             raise click.UsageError('--out and --model need --mesh')
         figures, lines = _contents(path, points_file, motion, max_pose_gap_s)
         figures |= {'provenance': origin(files={'recording': path})}
-    click.echo(json_text(figures) if as_json else lines)
+    click.echo(json_text(figures) if as_json else '\n'.join(lines))
 
 
 def _contents(
     path: Path, points_file: Path | None, motion: dict[str, Any], max_pose_gap_s: float
-) -> tuple[dict[str, Any], str]:
-    """What a module, table, mesh or bag holds: figures, and the same in words."""
+) -> Contents:
+    """What a module, table, mesh or bag holds."""
     from paint_deposition.errors import RecordingError
     from paint_deposition.files.mesh_bodies import SUFFIXES
     from paint_deposition.files.motion_files import read_table
@@ -86,14 +91,14 @@ def _contents(
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
-        return mesh_in(path)
-    if is_gauge_file(path):
-        return readings_in(path, points_file)
-    if is_pose_table(path) and (points_file or holds_readings(path) or not may_hold_poses(path)):
-        return readings_in(path, points_file)
-    if is_pose_table(path):
+        return _mesh_contents(path)
+    is_table = is_pose_table(path)
+    of_readings = is_table and (points_file or holds_readings(path) or not may_hold_poses(path))
+    if is_gauge_file(path) or of_readings:
+        return _readings_contents(path, points_file)
+    if is_table:
         poses = read_table(path, source)
-        options.print_all('warning', poses.warnings)
+        print_all('warning', poses.warnings)
         return _table_contents(poses, max_pose_gap_s)
     kind = 'a RAPID module' if is_rapid(path) else 'a bag'
     source.require_kind(path, kind)
@@ -102,47 +107,120 @@ def _contents(
         raise click.UsageError(f'how the motion of {kind} is read needs --mesh')
     if is_rapid(path):
         program = read_program(path, **of_program)
-        return asdict(program), program_as_text(program)
+        return asdict(program), [program_as_text(program)]
     summary = summarise(path, max_pose_gap_s)
     streams = [source.to_dict() for source in summary.pose_streams]
-    return asdict(summary) | {'pose_streams': streams}, _bag_contents(summary)
+    return asdict(summary) | {'pose_streams': streams}, _bag_lines(summary)
 
 
-def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, str]:
-    """What was understood of a table of poses: figures, and the same in words."""
+def _mesh_contents(path: Path) -> Contents:
+    """A mesh: its size in the unit that it has, or seems to have, and its bodies."""
+    import numpy as np
+
+    from paint_deposition.files.mesh_bodies import WITH_UNIT, read_bodies
+    from paint_deposition.files.meshes import LARGEST_M
+
+    bodies, scale, unit = read_bodies(path), 1.0, ''
+    if path.suffix.lower() not in WITH_UNIT:
+        unit = 'it has no unit and is taken for metres'
+        largest = float(np.ptp(bodies.vertices, axis=0).max()) if len(bodies.vertices) else 0.0
+        if largest > LARGEST_M:
+            scale, unit = 1e-3, (
+                f'it has no unit and looks like millimetres, else it would be {largest:.4g} m '
+                'large: give --mesh-scale 0.001'
+            )  # fmt: skip
+    surface = pd.read_mesh(path, scale, LARGEST_M)
+    box, where = _box(surface.vertices_m)
+    area_m2 = float(surface.vertex_areas_m2.sum())
+    figures = {
+        'triangles': len(bodies.faces), **box, 'area_m2': area_m2, 'mesh_scale': scale,
+        'notes': list(surface.notes),
+    }  # fmt: skip
+    size = ' x '.join(f'{side:.3f}' for side in np.ptp(surface.vertices_m, axis=0))
+    what = f'{path.name}: a mesh of {len(bodies.faces)} triangles, {size} m, {area_m2:.3g} m2'
+    return figures, [*filter(None, [what, unit, where]), *surface.notes]
+
+
+def _readings_contents(path: Path, points_file: Path | None) -> Contents:
+    """The readings of a table: how many, where, of what film, their zeros and repeats."""
+    import numpy as np
+
+    from paint_deposition.inference.readings.gauge_noise import gauge_noise
+    from paint_deposition.inference.readings.readings import PointMeans
+
+    readings = pd.read_readings(path, points_file)
+    # A point that is read in two layers is two points.
+    named = zip(readings.point, readings.layer, strict=True)
+    places = [f'{point}, {layer}' if layer else point for point, layer in named]
+    readings = replace(readings, point=np.array(places))
+    film, means, noise = readings.thickness_um, PointMeans.of(readings), gauge_noise(readings)
+    zeros, repeated = (
+        list(dict.fromkeys(readings.point[rows].tolist()))
+        for rows in (film == 0.0, (means.repeats > 1)[means.owner])
+    )
+    warnings = [*readings.doubts]
+    if zeros:
+        warnings.append(
+            f'{np.count_nonzero(film == 0.0)} readings are 0 (points {some(zeros, MOST_NAMED)}): '
+            'bare metal, or not measured; write n/a for the latter, or say zero: in the campaign'
+        )
+    print_all('warning', warnings)
+    box, where = _box(readings.positions_m)
+    figures = {
+        'readings': len(readings), 'points': len(means.first), 'zeros': zeros,
+        'repeated': repeated, 'noise_um': noise.typical_um, 'noise_source': noise.source,
+        'mean_um': film.mean(), 'min_um': film.min(), 'max_um': film.max(), **box,
+        'notes': [readings.understood], 'warnings': warnings,
+    }  # fmt: skip
+    repeats = f'{len(repeated)} of them measured again' if repeated else 'none measured again'
+    return figures, [
+        readings.understood,
+        f'{len(readings)} readings at {len(means.first)} points, {repeats}: noise of the gauge '
+        f'{noise.typical_um:.2f} µm, {noise.source}',
+        f'film {film.min():.1f} to {film.max():.1f} µm, mean {film.mean():.1f} µm',
+        where,
+    ]
+
+
+def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> Contents:
+    """What was understood of a table of poses."""
     import numpy as np
 
     from paint_deposition.motion.stream_quality import StreamQuality
-    from paint_deposition.part.points import box_words
 
     values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
     quality = StreamQuality.of(poses.stamps_ns, values, max_gap_s=max_pose_gap_s)
-    low, high = poses.positions_m.min(axis=0), poses.positions_m.max(axis=0)
+    box, where = _box(poses.positions_m)
     figures = {
-        'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id,
-        'low_m': low.tolist(), 'high_m': high.tolist(), 'notes': list(poses.notes),
-        **vars(quality),
+        'poses': len(poses), 'duration_s': poses.duration_s, 'frame_id': poses.frame_id, **box,
+        'notes': list(poses.notes), **vars(quality),
     }  # fmt: skip
     frame = f"'{poses.frame_id}'" if poses.frame_id else 'a frame that is not named'
-    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: '
-    line += box_words(poses.positions_m)
-    return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
+    line = f'{len(poses)} poses in {frame} over {poses.duration_s:.3f} s: {where}'
+    return figures, [line, *poses.notes, _stream_words(quality)]
 
 
-def _bag_contents(summary: BagSummary) -> str:
+def _box(points_m: Any) -> tuple[dict[str, list[float]], str]:
+    """The box around points (N, 3): figures, and the same in words."""
+    from paint_deposition.part.points import box_words
+
+    corners = {'low_m': points_m.min(axis=0), 'high_m': points_m.max(axis=0)}
+    return {name: corner.tolist() for name, corner in corners.items()}, box_words(points_m)
+
+
+def _bag_lines(summary: BagSummary) -> list[str]:
     from paint_deposition.files.recordings.message_definitions import TF_TYPES
 
-    lines = [summary.path]
     width = max((len(topic.name) for topic in summary.topics), default=0)
-    lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
+    topics = [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
+    lines = [summary.path, *topics]
     for source in summary.pose_streams:
         lines += _source_lines(source)
     if not summary.pose_streams:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
     if {topic.type for topic in summary.topics} & {*TF_TYPES}:
         lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
-    lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
-    return '\n'.join(lines)
+    return [*lines, f'triggers: {" ".join(summary.triggers) or "none"}']
 
 
 def _source_lines(source: PoseSource) -> list[str]:
@@ -178,70 +256,31 @@ def _stream_words(quality: StreamQuality) -> str:
 
 
 def _gun_on_part(
-    part: dict[str, Any],
+    part: options.Part,
     path: Path,
     motion: dict[str, Any],
     max_pose_gap_s: float,
     output: Path | None,
     model_file: Path | None,
-) -> tuple[dict[str, Any], str]:
+) -> Contents:
     """How the gun ran over a part, drawn if a picture is wanted; what is odd goes to stderr."""
-    mesh = part['path']
     with Progress('inspect') as show:
         show('reading')
         recorded = pd.read_recording(path, **motion)
-        surface = pd.read_mesh(**part)
         model = model_for(model_file, path).model
-        seen = pd.look_at(surface, recorded, model, max_pose_gap_s=max_pose_gap_s)
+        seen = pd.look_at(part.surface(), recorded, model, max_pose_gap_s=max_pose_gap_s)
         if output is not None:
             from paint_deposition.report.pictures.motion import write_geometry_picture
 
             show('drawing')
-            title = f'{path.name} over {mesh.name}'
+            title = f'{path.name} over {Path(str(part.mesh)).name}'
             write_geometry_picture(output, seen.surface, seen.path, seen.geometry, title)
-    options.print_all('note', seen.notes)
-    options.print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
-    figures: dict[str, Any] = {'mesh_file': str(mesh), 'trajectory': str(path), 'picture': output}
-    figures |= {'provenance': origin(model, {'mesh': mesh, 'trajectory': path})}
-    lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
-    lines += [f'  {output}'] if output else []
-    return seen.to_dict() | figures, '\n'.join(lines)
-
-
-@click.command('recover')
-@click.argument('run', type=options.FILE)
-@click.option(
-    '-o', '--output', type=options.FILE,
-    help='Folder to make; default: RUN with _recovered behind its name.',
-)  # fmt: skip
-@options.JSON
-def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
-    """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.
-
-    RUN is a run's folder or its .mcap file.
-    """
-    from tqdm import tqdm
-
-    from paint_deposition.files.recordings.bag_files import mcap_files
-    from paint_deposition.files.recordings.mcap_recovery import recover
-
-    output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
-    size = sum(file.stat().st_size for file in mcap_files(run))
-    with tqdm(
-        total=size, unit='B', unit_scale=True, desc='recover', delay=SHOW_PROGRESS_AFTER_S,
-        disable=None,
-    ) as bar:  # fmt: skip
-        found = recover(run, output, on_bytes=bar.update)
-    figures = {
-        'folder': str(found.folder), 'messages': found.message_count, 'topics': found.counts,
-        'damaged_chunks': found.damaged_chunks, 'breaks': found.breaks,
-        'skipped_topics': found.skipped_topics, 'provenance': origin(files={'recording': run}),
+    print_all('note', seen.notes)
+    print_all('warning', [*seen.trajectory.warnings, *seen.geometry.warnings])
+    files = {'mesh': str(part.mesh), 'trajectory': str(path)}
+    figures = seen.to_dict() | {
+        'mesh_file': str(part.mesh), 'trajectory': str(path), 'picture': output,
+        'provenance': origin(model, files),
     }  # fmt: skip
-    lines = [*found.breaks]
-    if found.damaged_chunks:
-        lines.append(f'{found.damaged_chunks} damaged chunks left out')
-    if found.skipped_topics:
-        lines.append(f'left out, not CDR or without a schema: {" ".join(found.skipped_topics)}')
-    lines += [f'{count:10d}  {topic}' for topic, count in found.counts.items()]
-    lines.append(f'{found.message_count} messages recovered: {found.folder}')
-    click.echo(json_text(figures) if as_json else '\n'.join(lines))
+    lines = [seen.geometry.sentence, seen.geometry.facet_sentence]
+    return figures, [*lines, *([f'  {output}'] if output else [])]

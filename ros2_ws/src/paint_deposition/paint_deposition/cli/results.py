@@ -1,19 +1,29 @@
 """What a command shows while it works, and the folder of its results, whole or as it was."""
 
+from __future__ import annotations
+
 import hashlib
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from pathlib import Path, PurePosixPath
 from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
 
+import click
 from filelock import FileLock
 from tqdm import tqdm
 
+import paint_deposition as pd
+from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
 from paint_deposition.files.atomic import write_text
+
+if TYPE_CHECKING:
+    from paint_deposition.film.statistics import FilmStatistics
 
 # A bar shows itself only for work that takes longer, and never when piped.
 SHOW_PROGRESS_AFTER_S = 2.0
@@ -41,7 +51,7 @@ class Progress:
         self._done = Event()
         self._clock = Thread(target=self._redraw, daemon=True)
 
-    def __enter__(self) -> 'Progress':
+    def __enter__(self) -> Progress:
         if not self._bar.disable:
             self._clock.start()
         return self
@@ -63,6 +73,89 @@ class Progress:
         while not self._done.wait(pause_s):
             self._bar.refresh()
             pause_s = REDRAWN_EVERY_S
+
+
+def print_all(label: str, lines: Iterable[str]) -> None:
+    """Print each line behind its label on stderr: notes, warnings."""
+    for line in lines:
+        click.echo(f'{label}: {line}', err=True)
+
+
+def python(code: str, *words: str) -> list[str]:
+    """The command of another Python that runs code and takes no module from this folder."""
+    head = 'import sys; sys.path[:] = filter(None, sys.path); '
+    return [sys.executable, '-c', head + code, *words]
+
+
+def inputs(**files: Path | None) -> dict[str, str]:
+    """The files that a result was made from, by what they are."""
+    return {what: str(file or '') for what, file in files.items()}
+
+
+@dataclass
+class Results:
+    """Where a command writes its results, and how it shows them."""
+
+    output: Path
+    pictures: str
+    as_json: bool
+    files: Sequence[Path] = ()
+
+    def write(self, result: Any, **more: Any) -> None:
+        """Write a result to the folder, all or nothing."""
+        with results_in(self.output) as folder:
+            files = pd.write(result, folder, pictures=self.pictures, **more)
+        self.files = [self.output / file.name for file in files]
+
+    def print(
+        self,
+        lines: Iterable[str],
+        model: str = '',
+        notes: Iterable[str] = (),
+        warnings: Iterable[str] = (),
+    ) -> None:
+        """Print the file of figures as written, or else the model, these lines and the files."""
+        print_all('note', notes)
+        print_all('warning', warnings)
+        head = [f'model: {model}'] if model else []
+        if self.as_json:
+            figures = next(file for file in self.files if file.suffix == '.json')
+            click.echo(figures.read_text(encoding='utf-8'), nl=False)
+        else:
+            click.echo('\n'.join([*head, *lines, *(f'  {file}' for file in self.files)]))
+
+
+def results_options(what: str, default: str | None = None) -> Decorator:
+    """A command takes ``Results``; their folder is to be named where there is no default."""
+    text = (
+        f'Folder for {what}. It is made if it is not there. Results that an earlier command wrote '
+        'into it are removed; other files in it are kept as they are. Nothing is changed before '
+        'all results are complete.'
+    )
+    each = (
+        click.option('-o', '--output', type=FOLDER, required=default is None, default=default,
+                     help=text),
+        click.option('--pictures', type=click.Choice(['png', 'svg', 'pdf']), default='png',
+                     show_default=True, help='Format of the pictures.'),
+        JSON,
+    )  # fmt: skip
+    return option_group(each, 'results', Results)
+
+
+def zone_lines(
+    now: Mapping[str, FilmStatistics], before: Mapping[str, FilmStatistics] | None = None
+) -> Iterator[str]:
+    """The film on each zone by its name, and what it was before."""
+    for name, zone in now.items():
+        was = before and before[name]
+        bare = f', {100 * (1.0 - zone.coverage):.1f} % of it bare' if zone.coverage < 1.0 else ''
+        yield (
+            f'{name}, {zone.target_um:g} ± {zone.target_tolerance_um:g} µm: '
+            f'{f"{was.mean_um:.1f} → " if was else ""}{zone.mean_um:.1f} µm mean, '
+            f'{zone.min_um:.1f} to {zone.max_um:.1f} µm, '
+            f'{f"{100 * was.within_target:.1f} → " if was else ""}'
+            f'{100 * zone.within_target:.1f} % within{bare}'
+        )
 
 
 # In every folder of results: the files that the last command wrote there, one a line.

@@ -7,9 +7,17 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from paint_deposition.cli.options_of import options_of
+from paint_deposition.cli.main import paint
+from paint_deposition.cli.options import options_of
 from paint_deposition.errors import PlanError
-from paint_deposition.request import Request, given, takes
+from paint_deposition.request import (
+    FilmBand,
+    MotionOptions,
+    OnePart,
+    Request,
+    given,
+    takes,
+)
 
 
 class Coat(Request):
@@ -87,3 +95,11 @@ def test_a_verb_shows_the_fields_of_its_request():
     shown = inspect.signature(spray)
     assert list(shown.parameters)[:3] == ['model', 'frame_id', 'speed_m_per_s']
     assert shown.parameters['speed_m_per_s'].default == 0.3
+
+
+@pytest.mark.parametrize('kind', [MotionOptions, OnePart, FilmBand])
+def test_options_are_the_keys_of_files_in_the_same_words(kind):
+    command = paint.get_command(click.Context(paint), 'simulate')
+    helps = {option.name: option.help for option in command.params if option.name}
+    for name, field in kind.model_fields.items():
+        assert helps[name] == field.description, name

@@ -1,4 +1,4 @@
-"""Rows of the report's tables."""
+"""Rows of the report's tables: figures and names; the sentences around them are the template's."""
 
 from dataclasses import astuple
 from itertools import product
@@ -7,41 +7,47 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.statistics import film_statistics
-from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.report import words
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.style import TWO_SIDED_95
 
+# What a parameter of the pattern is called: symbol, meaning, unit.
+SYMBOLS = {
+    'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
+    'K2': ('K2', 'weight of the centred Gaussian', ''),
+    'K3': ('K3', 'asymmetry of the ring', ''),
+    'phi_rad': ('φ', 'phase of the asymmetry', 'rad'),
+    'r_m': ('r', 'radius of the ring', 'mm'),
+    'sigma1_m': ('σ1', 'width of the ring', 'mm'),
+    'sigma2_m': ('σ2', 'width of the centred Gaussian', 'mm'),
+}
 LOW, IN, HIGH = 'low', 'in', 'high'
 
 
 def class_rows(data: ReportData) -> list[dict[str, Any]]:
     """Candidate causes with the effects they are confounded with, and parameters."""
-    diagnosis = data.diagnosis
-    return [_class_row(data, diagnosis, c) for c in diagnosis.classes] if diagnosis else []
-
-
-def _class_row(data: ReportData, diagnosis: Diagnosis, found: EffectClass) -> dict[str, Any]:
-    effect = data.effect_class(found.best)
-    like = [member for member in found.members if member != found.best]
-    parameters = [
-        _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
-    ]
-    return {
-        'id': found.best,
-        'found': found,
-        'name': words.effect_name(found.best),
-        'like': like,
-        'others': [words.effect_name(member) for member in like],
-        'accepted': found.best in diagnosis.accepted,
-        'meaning': words.effect_meaning(effect),
-        'signature': effect.signature if effect else '',
-        'parameters': parameters + _learned(data.model.effect(found.best)),
-    }
+    rows = []
+    for found in data.diagnosis.classes if data.diagnosis else ():
+        effect = data.effect_class(found.best)
+        like = [member for member in found.members if member != found.best]
+        parameters = [
+            _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
+        ]
+        rows.append({
+            'id': found.best, 'found': found, 'name': words.effect_name(found.best),
+            'learned': words.is_learned(found.best),
+            'like': like, 'others': [words.effect_name(member) for member in like],
+            'accepted': data.diagnosis is not None and found.best in data.diagnosis.accepted,
+            'meaning': words.effect_meaning(effect),
+            'signature': effect.signature if effect else '',
+            'parameters': parameters + _learned(data.model.effect(found.best)),
+        })  # fmt: skip
+    return rows
 
 
 def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
@@ -62,6 +68,34 @@ def _learned(effect: Effect | None) -> list[dict[str, str]]:
     return [dict(zip(keys, row, strict=True)) for row in words.learned_words(effect)]
 
 
+def law_rows(data: ReportData) -> list[dict[str, str]]:
+    """Learned laws of the best model: where each holds, and how well a curve is known."""
+    rows = []
+    for law in data.model.effects:
+        row = {'name': words.effect_name(law.id), 'best': ''}
+        if isinstance(law, LearnedMap):
+            rows.append(row | {'kind': 'map'})
+        elif isinstance(law, LearnedFootprint):
+            rows.append(row | {'kind': 'footprint', 'ends': words.number(1e3 * law.reach_m)})
+        elif isinstance(law, LearnedCurve):
+            _, ends, unit = words.learned_words(law)[1]
+            row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
+            rows.append(row | (_band(law) if law.sd else {}))
+    return rows
+
+
+def _band(law: LearnedCurve) -> dict[str, str]:
+    """Where the band of a curve is narrow, and where wide."""
+    values = np.linspace(law.low, law.high, 101)
+    half, shown = TWO_SIDED_95 * law.deviation(values), words.counted_from_1(law, values)
+    unit, along = ' µm' if law.kind == 'addition' else '', words.unit_words(law.unit)
+    ends = [
+        f'± {words.number(half[at], 2)}{unit} at {words.number(shown[at])} {along}'.rstrip()
+        for at in (half.argmin(), half.argmax())
+    ]
+    return {'best': ends[0], 'least': ends[1], 'forms': words.form_words(law)}
+
+
 def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     """The pattern's parameters; with 95 % intervals where the model was fitted."""
     fitted = estimates(data.diagnosis.history[-1].fit) if data.diagnosis else ()
@@ -69,26 +103,15 @@ def pattern_rows(data: ReportData) -> list[dict[str, str]]:
     brushes, rows = data.model.brushes, []
     of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
     for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
-        symbol, meaning, unit = words.SYMBOLS[name]
-        factor, shown = (1e3, 'mm') if unit == 'm' else (1.0, unit)
+        symbol, meaning, unit = SYMBOLS[name]
+        factor = 1e3 if unit == 'mm' else 1.0
         value = words.number(factor * getattr(planar, name), 4)
-        row = {'symbol': symbol, 'words': whose + meaning, 'unit': shown, 'value': value}
+        row = {'symbol': symbol, 'words': whose + meaning, 'unit': unit, 'value': value}
         if name in found:
             ends = (words.number(factor * end) for end in (found[name].low, found[name].high))
             row['interval'] = ' to '.join(ends)
         rows.append(row)
     return rows
-
-
-def noise_rows(data: ReportData) -> list[tuple[str, str, str]]:
-    """What the readings scatter by: what, how much, and how that is known."""
-    noise, texture = data.study.noise, data.study.texture
-    known = {'repeats': 'from repeats', 'stated': 'as stated', 'neighbours': 'from neighbours'}
-    rows = (
-        ('noise of the gauge, one reading', words.micrometres(noise.typical_um), noise.source),
-        ('texture of the film', f'{100 * texture.share:.2g} % of it', texture.source),
-    )
-    return [(what, amount, known.get(source, source)) for what, amount, source in rows]
 
 
 def effect_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -111,25 +134,22 @@ def blind_rows(data: ReportData) -> list[dict[str, Any]]:
     diagnosis, rows = data.diagnosis, []
     if diagnosis is None:
         return []
-    ids = dict.fromkeys((*diagnosis.not_testable, *diagnosis.detectable))
-    for effect_id in ids:
+    for effect_id in dict.fromkeys((*diagnosis.not_testable, *diagnosis.detectable)):
         if effect_id in diagnosis.accepted:
             continue
         effect, seen = data.effect_class(effect_id), diagnosis.detectable.get(effect_id, {})
-        parameters = effect.parameters() if effect else {}
         amplitudes = [
             {
                 'words': words.parameter_words(name, info['unit']),
                 'least': _size(seen.get(name), info['unit']),
                 'usual': _size(info['typical'], info['unit']),
             }
-            for name, info in parameters.items()
+            for name, info in (effect.parameters() if effect else {}).items()
             if info['role'] == 'amplitude'
         ]
-        testable = effect_id not in diagnosis.not_testable
         rows.append({
-            'id': effect_id, 'testable': testable, 'amplitudes': amplitudes,
-            'meaning': words.effect_meaning(effect),
+            'id': effect_id, 'testable': effect_id not in diagnosis.not_testable,
+            'amplitudes': amplitudes, 'meaning': words.effect_meaning(effect),
         })  # fmt: skip
     return rows
 
@@ -154,28 +174,20 @@ def film_rows(data: ReportData) -> list[dict[str, Any]]:
     """For each part its readings, and its film as the best model predicts it."""
     rows = []
     for k, experiment in enumerate(data.experiments):
-        measured, painted = data.study.measured_um[data.rows_of(k)], data.painted[k][-1]
-        of_points = range(*data.rows_of(k).indices(len(data.study)))
-        bands = [band for row in of_points if (band := band_of(data, row))]
+        of_part, painted = data.rows_of(k), data.painted[k][-1]
+        bands = [band for band in data.bands[of_part] if band]
         target_um, tolerance_um = data.study.campaign.target_of(experiment)
         film = film_statistics(
             painted.film_um, experiment.surface.vertex_areas_m2, painted.emitted_cm3,
             target_um=target_um, target_tolerance_um=tolerance_um, zones=experiment.zones,
         )  # fmt: skip
-        areas = {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target}
         rows.append({
-            'name': experiment.name, 'measured': measured, 'areas': areas, 'film': film,
+            'name': experiment.name, 'measured': data.study.measured_um[of_part], 'film': film,
+            'areas': {LOW: film.below_target, IN: film.within_target, HIGH: film.above_target},
             # Shares of the points that are low, in and high; empty without a target.
             'bands': {b: bands.count(b) / len(bands) for b in (LOW, IN, HIGH) if bands},
         })  # fmt: skip
     return rows
-
-
-def band_of(data: ReportData, row: int) -> str:
-    """Where the film measured at a point is beside its target band; '' without a target."""
-    target, tolerance = (wanted[row] for wanted in data.wanted_um)
-    off = data.study.measured_um[row] - target
-    return '' if np.isnan(off) else IN if abs(off) <= tolerance else LOW if off < 0.0 else HIGH
 
 
 def point_rows(data: ReportData) -> list[dict[str, Any]]:
@@ -185,19 +197,21 @@ def point_rows(data: ReportData) -> list[dict[str, Any]]:
     readings; the film is right in the target band.
     """
     found = data.comparisons[-1].points
+    scatter_um = TWO_SIDED_95 * found.sigma_um
     rows: list[dict[str, Any]] = []
     for k, experiment in enumerate(data.experiments):
-        first = data.rows_of(k).start
         labels, groups = experiment.readings.point[experiment.means.first], experiment.groups
-        for p, position in enumerate(experiment.measured_points.positions_m):
-            row = first + p
-            residual, scatter = found.residual_um[row], TWO_SIDED_95 * found.sigma_um[row]
+        places = 1e3 * experiment.measured_points.positions_m
+        for row, point, group, place in zip(
+            range(*data.rows_of(k).indices(len(data.study))), labels, groups, places, strict=True
+        ):
+            residual = found.residual_um[row]
             rows.append({
-                'part': experiment.name, 'point': str(labels[p]), 'group': str(groups[p]),
-                **dict(zip(('x_mm', 'y_mm', 'z_mm'), 1e3 * position, strict=True)),
+                'part': experiment.name, 'point': str(point), 'group': str(group),
+                **dict(zip(('x_mm', 'y_mm', 'z_mm'), place, strict=True)),
                 'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
-                'deviation_um': residual, 'scatter_um': scatter,
-                'model': 'OK' if abs(residual) <= scatter else 'off',
-                'film': band_of(data, row),
+                'deviation_um': residual, 'scatter_um': scatter_um[row],
+                'model': 'OK' if abs(residual) <= scatter_um[row] else 'off',
+                'film': data.bands[row],
             })  # fmt: skip
     return rows

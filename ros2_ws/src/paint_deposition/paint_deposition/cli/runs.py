@@ -1,11 +1,10 @@
-"""The commands `watch` and `view`: a run, results or a live cell on a page in 3D, or in Rerun."""
+"""Commands on recorded runs: `watch` also results and the live cell, `view`, `recover`."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
-from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 from threading import Event
@@ -15,13 +14,14 @@ import click
 
 import paint_deposition as pd
 from paint_deposition.cli import options
-from paint_deposition.cli.model_choice import models_for
-from paint_deposition.cli.results_folder import Progress
+from paint_deposition.cli.models import models_for
+from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Progress, print_all, python
 from paint_deposition.errors import PaintError
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
+    from paint_deposition.request import FilmBand
 
 NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
 RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
@@ -36,9 +36,7 @@ RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=
     '--rate', default=1.0, show_default=True, type=options.NOT_NEGATIVE,
     help='Speed of a run relative to the recording; 0: as fast as it can be painted.',
 )  # fmt: skip
-@click.option('--target-um', default=0.0, type=options.NOT_NEGATIVE, help='Target film [µm].')
-@click.option('--tolerance-um', default=0.0, type=options.NOT_NEGATIVE,
-              help='Accepted difference from the target, either way [µm].')  # fmt: skip
+@options.band_options
 @click.option(
     '--host', default=DEFAULT_HOST, show_default=True,
     help='Address to listen on; any but that of this machine alone needs a token.',
@@ -46,24 +44,23 @@ RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=
 @click.option('--port', default=DEFAULT_PORT, show_default=True, type=click.IntRange(0, 65535),
               help='Port to listen on; 0: one that is free.')  # fmt: skip
 @click.option(
-    '--token',
-    default='',
-    envvar=TOKEN,
+    '--token', default='', envvar=TOKEN,
     help=f'Token that browsers must give; default: that in the environment, {TOKEN}, or made.',
-)
+)  # fmt: skip
 @options.motion_options
 @options.MAX_POSE_GAP
 @options.ALLOW_EFFECTS
 def watch_command(
     run: Path | None,
     live: bool,
-    part: dict[str, Any],
+    part: options.Part,
     model_file: Path | None,
     motion: dict[str, Any],
+    band: FilmBand,
     host: str,
     port: int,
     token: str,
-    **given: float,
+    **pace: float,
 ) -> None:
     """Show RUN on a page in a browser: the part in 3D, gun, film, figures, readings.
 
@@ -72,18 +69,16 @@ def watch_command(
     """
     if live == (run is not None):
         raise click.UsageError('give RUN, or --live for what a simulator paints now')
-    if given['tolerance_um'] and not given['target_um']:
-        raise click.UsageError('--tolerance-um has no --target-um; give both')
-    if live and not part['path']:
+    if live and not part.mesh:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
-    at: dict[str, Any] = {'host': host, 'port': port, 'token': token}
-    if live:
-        _start_node({
-            'mesh_file': part['path'], 'mesh_scale': part['scale'],
-            'max_edge_length_m': part['max_edge_length_m'], 'target_um': given['target_um'],
-            'target_tolerance_um': given['tolerance_um'], 'host': host, 'port': port,
+    if run is None:
+        _become_node({
+            'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
+            'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
+            'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
         }, token)  # fmt: skip
-    assert run is not None
+        return
+    replay: Replay | None = None
     with Progress('watch') as show:
         show('loading')
         from paint_deposition.api.shown_results import is_results, results_scenes
@@ -91,17 +86,23 @@ def watch_command(
         if is_results(run):
             show('painting the parts')
             scenes, warnings = results_scenes(run)
-            serve = Page(scenes, **at), lambda stop: stop.wait()
         else:
-            replay = _replay(show, run, part, model_file, motion, given)
-            warnings = list(replay.warnings)
-            serve = Page([replay.scene], **at, command=replay.command), replay.run
-    options.print_all('warning', warnings)
-    _serve(*serve)
+            replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
+            scenes, warnings = [replay.scene], [*replay.warnings]
+        page = Page(scenes, host, port, token, replay.command if replay else None)
+    print_all('warning', warnings)
+    click.echo(f'{page.url}  (Ctrl-C ends it)')
+    stop = Event()
+    try:
+        replay.run(stop) if replay else stop.wait()
+    except KeyboardInterrupt:
+        stop.set()
+    finally:
+        page.close()
 
 
 def _replay(
-    show: Progress, run: Path, part: dict[str, Any], model_file: Path | None,
+    show: Progress, run: Path, part: options.Part, model_file: Path | None,
     motion: dict[str, Any], given: dict[str, float],
 ) -> Replay:  # fmt: skip
     from paint_deposition.api.replaying import Replay
@@ -118,39 +119,26 @@ def _replay(
     if recorded and not motion['state_topic']:
         with open_bag(run) as bag:
             motion['state_topic'] = STATE_TOPIC if bag.find(STATE_TOPIC) else None
-    mesh = part['path'] or recorded.get('mesh_file')
+    mesh = part.mesh or recorded.get('mesh_file')
     if not mesh:
         raise click.UsageError(f'{run} does not name the mesh of its part; give --mesh')
     named = Path(recorded['model_file']) if recorded.get('model_file') else None
-    source = validate(MotionSource, 'motion', motion, pd.PaintError)
-    guns = read_gun_motions([run], source)
+    guns = read_gun_motions([run], validate(MotionSource, 'motion', motion, pd.PaintError))
     files = [file for file in (model_file or named,) if file]
     chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)
     show('refining the mesh')
-    surface = pd.read_mesh(**part | {'path': Path(mesh)})
+    surface = part.surface(Path(mesh))
     replay = Replay(surface, guns, [model.model for model in chosen], **given)
     replay.scene.tell('about', text=f'{run.name} on {Path(mesh).name}')
     return replay
 
 
-def _serve(page: Page, work: Callable[[Event], object]) -> None:
-    """Keep the page until Ctrl-C."""
-    click.echo(f'{page.url}  (Ctrl-C ends it)')
-    stop = Event()
-    try:
-        work(stop)
-    except KeyboardInterrupt:
-        stop.set()
-    finally:
-        page.close()
-
-
-def _start_node(parameters: dict[str, object], token: str) -> None:
+def _become_node(parameters: dict[str, object], token: str) -> None:
     """Become the node `web_view`, which says what it needs; others can read its words."""
     os.environ[TOKEN] = token
     words = [w for name, value in parameters.items() if value not in ('', None)
              for w in ('-p', f'{name}:={value}')]  # fmt: skip
-    command = options.python(NODE, '--ros-args', *words)
+    command = python(NODE, '--ros-args', *words)
     os.execv(command[0], command)
 
 
@@ -167,4 +155,45 @@ def view_command(run: Path) -> None:
         raise PaintError(f'{run}: no .mcap file; give a run that run_recorder recorded')
     if find_spec('rerun') is None:
         raise PaintError('Rerun is not installed; run: pip install rerun-sdk')
-    sys.exit(subprocess.run(options.python(RERUN, *map(str, files))).returncode)
+    sys.exit(subprocess.run(python(RERUN, *map(str, files))).returncode)
+
+
+@click.command('recover')
+@click.argument('run', type=options.FILE)
+@click.option(
+    '-o', '--output', type=options.FILE,
+    help='Folder to make; default: RUN with _recovered behind its name.',
+)  # fmt: skip
+@options.JSON
+def recover_command(run: Path, output: Path | None, as_json: bool) -> None:
+    """Make a whole rosbag2 folder of what can be read of RUN, an unfinished or damaged MCAP run.
+
+    RUN is a run's folder or its .mcap file.
+    """
+    from tqdm import tqdm
+
+    from paint_deposition.files.atomic import json_text
+    from paint_deposition.files.provenance import origin
+    from paint_deposition.files.recordings.bag_files import mcap_files
+    from paint_deposition.files.recordings.mcap_recovery import recover
+
+    output = output or run.with_name(f'{run.stem if run.is_file() else run.name}_recovered')
+    size = sum(file.stat().st_size for file in mcap_files(run))
+    with tqdm(
+        total=size, unit='B', unit_scale=True, desc='recover', delay=SHOW_PROGRESS_AFTER_S,
+        disable=None,
+    ) as bar:  # fmt: skip
+        found = recover(run, output, on_bytes=bar.update)
+    figures = {
+        'folder': str(found.folder), 'messages': found.message_count, 'topics': found.counts,
+        'damaged_chunks': found.damaged_chunks, 'breaks': found.breaks,
+        'skipped_topics': found.skipped_topics, 'provenance': origin(files={'recording': run}),
+    }  # fmt: skip
+    lines = [*found.breaks]
+    if found.damaged_chunks:
+        lines.append(f'{found.damaged_chunks} damaged chunks left out')
+    if found.skipped_topics:
+        lines.append(f'left out, not CDR or without a schema: {" ".join(found.skipped_topics)}')
+    lines += [f'{count:10d}  {topic}' for topic, count in found.counts.items()]
+    lines.append(f'{found.message_count} messages recovered: {found.folder}')
+    click.echo(json_text(figures) if as_json else '\n'.join(lines))

@@ -1,0 +1,252 @@
+"""Pages: the report, and that of `paint demo`, each one HTML file that needs no network."""
+
+import json
+from base64 import b64encode
+from collections.abc import Callable, Mapping
+from datetime import datetime
+from io import BytesIO
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.special import fdtrc
+
+from paint_deposition import __version__
+from paint_deposition.files.atomic import plain, write_text
+from paint_deposition.files.version import git_version
+from paint_deposition.film.colour_scales import film_scale
+from paint_deposition.film.film import Film
+from paint_deposition.film.statistics import CPK_MEANS
+from paint_deposition.inference.comparison.comparison import SideBySide
+from paint_deposition.inference.diagnosis.model_space import SURE
+from paint_deposition.inference.diagnosis.procedure import ALPHA
+from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
+from paint_deposition.planning.improvement import FilmSummary, Improvement
+from paint_deposition.report import tables, words
+from paint_deposition.report.charts import figures_of
+from paint_deposition.report.data import ReportData
+from paint_deposition.report.pictures.film import page_film
+from paint_deposition.report.pictures.part import PartPicture
+from paint_deposition.report.pictures.planning import improved_figures
+from paint_deposition.report.pictures.readings import (
+    part_figures,
+    profile_figures,
+    profile_legend,
+    residual_figures,
+)
+from paint_deposition.report.style import DOTS_PER_INCH
+
+TEMPLATES = Path(__file__).parent / 'templates'
+# A figure of a page: label, before or '', after, unit or remark.
+Row = tuple[str, str, str, str]
+FILTERS: dict[str, Callable[..., Any]] = {
+    'um': words.fixed,
+    'signed': lambda value: words.fixed(value, signed=True),
+    'whole': lambda value: words.fixed(value, 0),
+    'micrometres': words.micrometres,
+    'p': words.p_words,
+    'percent': percent,
+    'probability': words.probability_words,
+    'in_print': words.in_print,
+    'effect': words.effect_name,
+    'capital': words.capital,
+    'joined': words.joined,
+    'covariate': words.covariate_label,
+    'explanations': words.competing_explanations,
+    'separation': words.separation_words,
+    'film': lambda value: '' if np.isnan(value) else words.fixed(value, 1),
+    'shares': lambda of: ', '.join(f'{100 * share:.0f} % {band}' for band, share in of.items()),
+}
+
+
+def write_report(path: Path, data: ReportData) -> Path:
+    """Write the report as one HTML file, whole or not at all."""
+    write_text(path, report_html(data))
+    return path
+
+
+def report_html(data: ReportData) -> str:
+    """The page as text."""
+    from plotly.offline import get_plotlyjs
+
+    figures = figures_of(data)
+    content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
+    films, git = tables.film_rows(data), git_version()
+    zone_films = {row['name']: row['film'].zones for row in films}
+    return _filled(
+        'report.html.j2',
+        **_verdict(data),
+        key_figures=key_figures(data),
+        head=list(data.study.campaign.head.items()),
+        film=films,
+        zones=[(z, zone_films[z.experiment][z.name]) for z in data.comparisons[-1].zones],
+        cpk=CPK_MEANS,
+        points=tables.point_rows(data),
+        effects=tables.effect_rows(data),
+        pattern=tables.pattern_rows(data),
+        learned=tables.law_rows(data),
+        blind=tables.blind_rows(data),
+        misfits=tables.misfit_rows(data),
+        places=data.proposals[0],
+        made=datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z'),
+        version=f'{__version__} ({git})' if git else __version__,
+        figures=[figure['name'] for figure in figures],
+        content=content.replace('<', '\\u003c'),  # it stands inside a script element
+        parts=[[*map(_embedded, part_figures(data, k))] for k in range(len(data.experiments))],
+        profiles=list(map(_embedded, profile_figures(data))),
+        profile_legend=profile_legend(data),
+        script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
+        plotly=get_plotlyjs(),
+    )
+
+
+def write_story(
+    path: Path,
+    film: Film,
+    found: Diagnosis,
+    unseen: SideBySide,
+    improved: Improvement,
+    hidden: str,
+    commands: Mapping[str, str],
+) -> Path:
+    """Write the page of `paint demo`, whole or not at all.
+
+    Args:
+        film: that a recording leaves on a door.
+        found: what the readings of doors like it say; unseen: both models on readings that no fit
+            has seen.
+        improved: the next door.
+        hidden: the effect that was hidden in the readings, for the sceptic.
+        commands: that do the same by hand, by their names.
+    """
+    data = ReportData.of(found)
+    index = [experiment.name for experiment in data.experiments].index('door')
+    door = PartPicture.of(film.surface)
+    painted, _ = page_film(
+        door, film.film_um, film.path, 'film predicted', film_scale(film.film_um)
+    )
+    residuals = residual_figures(data, index, PartPicture.of(data.experiments[index].surface))
+    page = _filled(
+        'story.html.j2', **_verdict(data), gun=film.guns[0], unseen=unseen, improved=improved,
+        hidden=hidden, commands=commands, key_figures=key_figures(data),
+        film_figures=film_figures(film), unseen_figures=unseen_figures(unseen),
+        improvement_figures=improvement_figures(improved), painted=_embedded(painted),
+        residuals=list(map(_embedded, residuals)),
+        programmes=list(map(_embedded, improved_figures(improved))),
+    )  # fmt: skip
+    write_text(path, page)
+    return path
+
+
+def _filled(name: str, **given: Any) -> str:
+    """A page from its template, in the style that all pages share."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined,
+        trim_blocks=True, lstrip_blocks=True,
+    )  # fmt: skip
+    environment.filters.update(FILTERS)
+    style = (TEMPLATES / 'report.css').read_text(encoding='utf-8')
+    return environment.get_template(name).render(style=style, **given)
+
+
+def _embedded(figure: Figure) -> str:
+    """A picture as the address of an image that needs no file."""
+    content = BytesIO()
+    figure.savefig(content, format='png', dpi=DOTS_PER_INCH, facecolor='white')
+    return f'data:image/png;base64,{b64encode(content.getvalue()).decode("ascii")}'
+
+
+def _verdict(data: ReportData) -> dict[str, Any]:
+    """What ``templates/verdict.j2`` puts into words for the engineer who runs the process."""
+    diagnosis, rows = data.diagnosis, tables.class_rows(data)
+    added = [row for row in rows if row['accepted']]
+    kind = 'side_by_side' if data.names else 'compared'
+    if diagnosis:
+        # A diagnosis adds effects that it is sure of, and keeps learned laws for what they
+        # predict: others were added by the user.
+        asked = any(
+            row['found'].probability < 1.0 if row['learned'] else row['found'].probability <= SURE
+            for row in added
+        )
+        kind = 'asked_for' if asked else diagnosis.verdict
+    points, freedom = data.comparisons[-1].points, min(data.study.noise.degrees_of_freedom, 1e6)
+    history = diagnosis.history if diagnosis else (None,)
+    return {
+        'data': data, 'd': diagnosis, 'kind': kind, 'counts': words.count_words(data.study),
+        'classes': rows, 'added': added, 'open': [row for row in rows if not row['accepted']],
+        'named': [row for row in added if not row['learned']],
+        'laws': [row for row in added if row['learned']],
+        'first': history[0], 'last': history[-1], 'steps': list(pairwise(history)),
+        'least': min((row['found'].probability for row in added), default=1.0),
+        'sprays': data.proposals[1], 'SURE': SURE, 'ALPHA': ALPHA,
+        # Deviations so large come from the gauge alone in 1 % of cases.
+        'beyond_chance': fdtrc(len(points), freedom, points.chi_square_per_reading) < 0.01,
+    }  # fmt: skip
+
+
+def key_figures(data: ReportData) -> list[Row]:
+    """The figures beside the verdict."""
+    noise, diagnosis = data.study.noise, data.diagnosis
+    source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
+    floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
+    if diagnosis is None:
+        labels = [f'Error, {name}' for name in data.names] or ['Error']
+        return [
+            *(
+                (label, '', f'{found.points.rmse_um:.2f}', 'µm RMS at the points')
+                for label, found in zip(labels, data.comparisons, strict=True)
+            ),
+            floor,
+        ]
+    first, last = diagnosis.history[0], diagnosis.history[-1]
+    rows = []
+    for label, name in (
+        (f'Error on {diagnosis.left_out} left out', 'holdout_rmse_um'),
+        ('Error at fitted points', 'rmse_um'),
+    ):
+        before = f'{getattr(first, name):.2f}' if first is not last else ''
+        rows.append((label, before, f'{getattr(last, name):.2f}', 'µm RMS'))
+    rows.append(floor)
+    open_too = diagnosis.verdict == 'undecided'
+    for best in diagnosis.classes:
+        if not words.is_learned(best.best) and (open_too or best.best in diagnosis.accepted):
+            remark = 'probability' + (', with its like' if len(best.members) > 1 else '')
+            return [*rows, (words.effect_name(best.best), '', percent(best.probability), remark)]
+    return rows
+
+
+def film_figures(film: Film) -> list[Row]:
+    """The film of the demo."""
+    s = film.statistics
+    return [
+        ('Film', '', f'{s.mean_um:.1f}', 'µm on average'),
+        ('Least and greatest', '', f'{s.min_um:.1f} to {s.max_um:.1f}', 'µm'),
+        ('Paint on the door', '', f'{100 * s.capture_fraction:.0f}', '% of what the bell gives'),
+    ]
+
+
+def unseen_figures(unseen: SideBySide) -> list[Row]:
+    """The errors of both models of the demo on readings that no fit has seen."""
+    before, after = (words.fixed(one.points.rmse_um) for one in unseen.by_name.values())
+    count = len(unseen.by_name[unseen.best].readings)
+    return [(f'RMSE, {count} unseen readings', before, after, 'µm')]
+
+
+def improvement_figures(found: Improvement) -> list[Row]:
+    """A programme before and after, in the film that the model predicts."""
+
+    def both(label: str, unit: str, digits: int, figure: Callable[[FilmSummary], float]) -> Row:
+        before, after = (words.fixed(figure(of), digits) for of in (found.before, found.after))
+        return label, before, after, unit
+
+    return [
+        both('Standard deviation', '% of the mean', 1, lambda f: 100 * f.sigma_n),
+        both('Area', f'% within {found.band}', 0, lambda f: 100 * f.within),
+        both('Least film', 'µm', 1, lambda f: f.statistics.min_um),
+        both('Paint', 'cm³', 1, lambda f: f.paint_cm3),
+        both('Time', 's', 1, lambda f: f.cycle_s),
+    ]
