@@ -113,8 +113,8 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
         recommended(LOPSIDED, tolerance=0.2, gun_turns=turns) for turns in (False, True)
     )
     assert turned.sigma_n > 1.2 * kept.sigma_n
-    assert 'keeps its orientation' in kept.setup.assumption
-    assert 'turns' in turned.setup.assumption
+    assert 'keeps its orientation' in kept.request.assumption
+    assert 'turns' in turned.request.assumption
     note = next(line for line in kept.notes if 'turned by 180 deg' in line)
     profile = kept.collapse
     other_way = SampledCollapse(-profile.x_m[::-1], profile.film_um[::-1], profile.finest_m)

@@ -26,7 +26,7 @@ from paint_deposition.planning.planned_film import WantedFilm, evenness, simulat
 from paint_deposition.planning.programme import Programme, closed_beside, moves_of
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.surface_map import painted_side, pass_axes
+from paint_deposition.planning.surface_map import painted_side
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]
@@ -122,6 +122,5 @@ def improve(
 def _target_region(surface: Surface, film_um: np.ndarray, tool_z: np.ndarray) -> np.ndarray:
     reached = film_um > COUNTED_ABOVE * film_um.max()
     towards = -tool_z.mean(axis=0)
-    if np.linalg.norm(towards) < ONE_SIDE:
-        return reached
-    return reached & painted_side(surface, pass_axes(surface, outward=towards))
+    length = np.linalg.norm(towards)
+    return reached & painted_side(surface, towards / length) if length >= ONE_SIDE else reached

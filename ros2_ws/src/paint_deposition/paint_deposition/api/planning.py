@@ -9,8 +9,8 @@ from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
 from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.part_plan import plan_faces as planned_faces
+from paint_deposition.planning.faces import PartPlan
+from paint_deposition.planning.faces import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.recommendation import Recommendation

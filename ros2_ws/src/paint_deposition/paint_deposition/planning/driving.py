@@ -20,7 +20,6 @@ from paint_deposition.planning.joints import (
     JointPace,
     PassLimit,
     Start,
-    Ways,
     follow,
     settled,
     starts,
@@ -132,7 +131,7 @@ class RobotCell:
             later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
             return first_ns + np.round(1e9 * later_s).astype(np.int64)
 
-        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(begun.roll_rad)
+        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(begun[1])
         slowed = replace(
             trajectory,
             stamps_ns=slowed_ns(trajectory.stamps_ns),
@@ -167,10 +166,10 @@ class RobotCell:
         """
         times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
         positions, turns = self.poses(trajectory, times_s)
-        _, ways = _ways(self.arm, positions, turns, free_roll)
-        if not len(ways.whole):
-            return float(ways.reached.max(initial=0)) / TRIED, 0.0, 0.0
-        joints = ways.joints[_best(self.arm, ways, times_s)]
+        _, ways, reached = _ways(self.arm, positions, turns, free_roll)
+        if not (reached == TRIED).any():
+            return float(reached.max(initial=0)) / TRIED, 0.0, 0.0
+        joints = ways[_best(self.arm, ways, reached, times_s)]
         speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
         return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
 
@@ -193,7 +192,7 @@ def _joints(
     """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
     rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
     way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
-    axes = (turns * _roll(begun.roll_rad)).as_matrix()
+    axes = (turns * _roll(begun[1])).as_matrix()
     joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
     if error.max() > REACHED:
         raise PlanError(
@@ -216,21 +215,21 @@ def _best_way(
     begin: Start | None,
 ) -> tuple[np.ndarray, Start]:
     """(N, J), of all ways through the poses the one that is driven the fastest, and its begin."""
-    begins, ways = _ways(arm, positions_m, turns, free_roll, begin)
+    begins, ways, reached = _ways(arm, positions_m, turns, free_roll, begin)
     if not begins:
         raise PlanError(
             f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
             'check --part-pose, or let paint place look where the part may stand'
         )
-    if not len(ways.whole):
-        far = int(ways.reached.max())
+    far = int(reached.max())
+    if far < len(times_s):
         raise PlanError(
             f'the robot follows the motion to {times_s[far]:.1f} of {times_s[-1]:.1f} s and not '
             f'beyond {_words(positions_m[far])} m in its base, in none of {len(begins)} '
             'configurations; let paint place look where the part may stand'
         )
-    best = _best(arm, ways, times_s)
-    return ways.joints[best], begins[best]
+    best = _best(arm, ways, reached, times_s)
+    return ways[best], begins[best]
 
 
 def _ways(
@@ -239,23 +238,25 @@ def _ways(
     turns: Rotation,
     free_roll: bool,
     chosen: Start | None = None,
-) -> tuple[list[Start], Ways]:
+) -> tuple[list[Start], np.ndarray, np.ndarray]:
+    """All starts, or the chosen one, with the ways that ``follow`` finds from them."""
     begin = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
-    axes = np.reshape([(turns * _roll(one.roll_rad)).as_matrix() for one in begin],
+    axes = np.reshape([(turns * _roll(roll_rad)).as_matrix() for _, roll_rad in begin],
                       (len(begin), len(positions_m), 3, 3))  # fmt: skip
-    joints = np.reshape([one.joints for one in begin], (len(begin), len(arm)))
+    joints = np.reshape([own for own, _ in begin], (len(begin), len(arm)))
     positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
-    return begin, follow(arm, joints, positions, axes)
+    return begin, *follow(arm, joints, positions, axes)
 
 
-def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
+def _best(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) -> int:
     """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
-    joints = ways.joints[ways.whole]
+    whole = np.flatnonzero(reached == len(times_s))
+    joints = ways[whole]
     speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
     late = np.maximum(speeds.max(axis=2), 1.0)
     # Ways that come nearer to the limit of a joint than this share of its range are avoided.
     near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
-    return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
+    return int(whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
 
 
 def _times(trajectory: Trajectory) -> np.ndarray:

@@ -18,12 +18,7 @@ from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
 from paint_deposition.planning.planned_film import WantedFilm, evenness
-from paint_deposition.planning.programme import (
-    STANDING_M,
-    Programme,
-    Strokes,
-    speed_along,
-)
+from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
 from paint_deposition.planning.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
@@ -340,15 +335,12 @@ class Improvement:
 
 def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
     """The changes of all passes, numbered as a simulation of the improved programme does."""
-    strokes = Strokes.of(improved)
-    passes = np.flatnonzero(strokes.begins_pass)
+    ends_m, numbers, begins_pass = strokes_of(improved)
     given = Programme.of(original.original).openings
     opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
     pairs = list(zip(original.openings, improved.openings, strict=True))
     found: list[PassChange] = []
-    for begin, end, number in zip(
-        strokes.ends_m[passes], strokes.ends_m[passes + 1], strokes.spray_pass[passes], strict=True
-    ):
+    for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
         own = [
             (before, after) for before, after in pairs
             if min(after.off_m, end) - max(after.on_m, begin) > 0.05

@@ -30,30 +30,8 @@ MARGIN = 0.03
 SLOWEST = 0.01
 
 
-@dataclass(frozen=True)
-class Start:
-    """A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad]."""
-
-    joints: np.ndarray
-    roll_rad: float
-
-
-@dataclass(frozen=True)
-class Ways:
-    """S ways to follow N poses.
-
-    Attributes:
-        joints: (S, N, J), NaN behind the last pose that is reached.
-        reached: (S,) number of poses that each reaches within the limits.
-    """
-
-    joints: np.ndarray
-    reached: np.ndarray
-
-    @property
-    def whole(self) -> np.ndarray:
-        """Rows of the ways that reach all poses."""
-        return np.flatnonzero(self.reached == self.joints.shape[1])
+# A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad].
+Start = tuple[np.ndarray, float]
 
 
 def starts(
@@ -78,13 +56,19 @@ def starts(
     found: list[Start] = []
     for row in good[np.argsort(np.abs((joints - middle) / half).max(axis=1)[good])]:
         # Configurations that differ by less are one [rad or m].
-        if all(np.abs(joints[row] - other.joints).max() > 0.1 for other in found):
-            found.append(Start(joints[row], float(roll_rad[row])))
+        if all(np.abs(joints[row] - other).max() > 0.1 for other, _ in found):
+            found.append((joints[row], float(roll_rad[row])))
     return found[:FOLLOWED]
 
 
-def follow(arm: Arm, begin: np.ndarray, positions_m: np.ndarray, axes: np.ndarray) -> Ways:
-    """Follow poses (S, N, 3) [m] and (S, N, 3, 3) from configurations (S, J) at the first ones."""
+def follow(
+    arm: Arm, begin: np.ndarray, positions_m: np.ndarray, axes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Follow poses (S, N, 3) [m] and (S, N, 3, 3) from configurations (S, J) at the first ones.
+
+    Returned are joints (S, N, J), NaN behind the last pose that is reached, and (S,) how many
+    poses each start reaches within the limits.
+    """
     joints = np.full((*positions_m.shape[:2], len(arm)), np.nan)
     reached = np.full(len(begin), joints.shape[1])
     now, left = begin, np.arange(len(begin))
@@ -99,7 +83,7 @@ def follow(arm: Arm, begin: np.ndarray, positions_m: np.ndarray, axes: np.ndarra
         joints[left, n] = now
         if not len(left):
             break
-    return Ways(joints, reached)
+    return joints, reached
 
 
 def settled(

@@ -97,12 +97,9 @@ def tool_poses(
     surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
 ) -> tuple[np.ndarray, np.ndarray]:
     """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
-    axes = surface_map.axes
-    normals = surface_map.normals(travel_m, across_m)
-    height = surface_map.height_m(travel_m, across_m)
-    on_surface = axes.points_m(np.stack([travel_m, across_m, height], axis=1))
-    tool_z = -normals
-    way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
+    on_surface = surface_map.places_m(travel_m, across_m)
+    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[:, 0].copy()
+    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)
     cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)

@@ -6,7 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,12 +30,9 @@ from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 NEAR = 0.01
 
 
-class Band(NamedTuple):
-    """What film is accepted at some of V points."""
-
-    points: np.ndarray  # (V,) bool
-    target_um: float  # film wanted
-    tolerance: float | None  # accepted share of it either way; None: any film
+# Some of V points, (V,) bool, the film wanted there [um], and the share of it that is accepted
+# either way; None: any film.
+Band = tuple[np.ndarray, float, float | None]
 
 
 @dataclass(frozen=True)
@@ -109,19 +106,23 @@ class WantedFilm:
     def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
         """Films accepted at vertices (V,), outside of zones by the target and tolerance given."""
         if self.zones is None:
-            return [Band(np.ones(len(rows), dtype=bool), target_um, tolerance)]
+            return [(np.ones(len(rows), dtype=bool), target_um, tolerance)]
         here = self.zones.select(rows)
-        found = [Band(own, z.target_um, z.tolerance_um / z.target_um) for z, own in here]
+        found: list[Band] = [
+            (own, zone.target_um, zone.tolerance_um / zone.target_um) for zone, own in here
+        ]
         if self.elsewhere_um is not None:
-            found.append(Band(here.number < 0, self.elsewhere_um, tolerance))
+            found.append((here.number < 0, self.elsewhere_um, tolerance))
         return found
 
     def limits_um(self, target_um: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
         """Least and greatest film (V,) accepted [um]; the rest as for ``bands``."""
         low, high = np.full((2, len(self.region)), np.nan)
-        for band in self.bands(np.arange(len(low)), target_um, tolerance):
-            low[band.points] = band.target_um * (1.0 - (band.tolerance or 0.0))
-            high[band.points] = band.target_um * (1.0 + (band.tolerance or 0.0))
+        for points, target, off in self.bands(np.arange(len(low)), target_um, tolerance):
+            low[points], high[points] = (
+                target * (1.0 - (off or 0.0)),
+                target * (1.0 + (off or 0.0)),
+            )
         return low, high
 
 

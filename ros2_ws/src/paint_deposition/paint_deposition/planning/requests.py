@@ -91,6 +91,20 @@ class IndexRequest(SpeedLimits, PassRequest):
         'The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
     )
 
+    @property
+    def travel(self) -> str:
+        """'one_way' or 'alternating'."""
+        return 'one_way' if self.one_way else 'alternating'
+
+    @property
+    def assumption(self) -> str:
+        """What is assumed about the gun, in words."""
+        if self.one_way:
+            return 'all passes run the same way with the gun held alike'
+        if self.gun_turns:
+            return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
+        return 'passes alternate and the gun keeps its orientation: all lay the same profile'
+
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
         """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
         # A pattern of a usual SB50 is searched over the usual range, another over its own scale.
