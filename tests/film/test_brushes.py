@@ -14,7 +14,7 @@ from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm, without_refused_states
-from paint_deposition.film.paint_used import seconds_by_pattern
+from paint_deposition.film.statistics import seconds_by_pattern
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange

@@ -351,6 +351,6 @@ def results_options(what: str, default: str | None = None) -> Callable[[Callable
 
 def paint_lines(result: pd.Film | pd.Plan | pd.PartPlan) -> Iterator[str]:
     """Paint sprayed, transfer efficiency and wet film, where the model's brushes say enough."""
-    from paint_deposition.film.paint_used import paint_sentence
+    from paint_deposition.film.statistics import paint_sentence
 
-    return (line for line in [paint_sentence(result)] if line)
+    return (line for line in [paint_sentence(result.paint, result.statistics)] if line)

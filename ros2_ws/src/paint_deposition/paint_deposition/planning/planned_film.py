@@ -13,8 +13,12 @@ import numpy as np
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.paint_used import PaintUsed, paint_figures
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.statistics import (
+    FilmStatistics,
+    PaintUsed,
+    film_statistics,
+    paint_figures,
+)
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
@@ -267,7 +271,7 @@ class PlannedFilm:
             'region': self.region,
             'film': self.statistics.to_dict(),
             'whole_part': self.whole_part.to_dict(),
-            'paint': paint_figures(self),
+            'paint': paint_figures(self.model, self.paint, self.statistics),
             'gun': self.envelope.model_dump(),
             'contacts': [contact.to_dict() for contact in self.contacts],
             'warnings': list(self.warnings),
