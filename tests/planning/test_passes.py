@@ -27,7 +27,7 @@ def bowed():
 
 @pytest.fixture(scope='module')
 def motion(bowed):
-    return trajectory_of(plan_passes(bowed, LINES_M, [STYLE] * 3), STYLE, 'part')
+    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part')
 
 
 def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
@@ -74,7 +74,7 @@ def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
     tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, [one_way] * 3), one_way))
+    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way), one_way))
     on = path.select(path.flow > 0.0)
     ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
@@ -91,7 +91,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
-    passes = plan_passes(bowed, LINES_M, [STYLE] * 3)
+    passes = plan_passes(bowed, LINES_M, STYLE)
     moves = planned_moves(passes, STYLE)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])

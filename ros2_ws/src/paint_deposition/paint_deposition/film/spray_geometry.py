@@ -102,7 +102,7 @@ def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tu
     it is and what to do, else it is ''.
 
     In the middle of each edge the film on the mesh is compared with that on a curve through the
-    corners, see ``part.facets``. On circular and on soft folds with radii of 40 to 530 mm, caps
+    corners, see ``part.creases``. On circular and on soft folds with radii of 40 to 530 mm, caps
     and doors, cut into edges of 6 to 50 mm, the estimate was 0.74 to 1.32 times the worst true
     error of the film, from 0.01 % to 13 % of its peak. Creases count as such and cost nothing.
 

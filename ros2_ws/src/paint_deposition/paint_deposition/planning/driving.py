@@ -115,9 +115,7 @@ class RobotCell:
             PlanError: the robot does not reach all poses.
         """
         arm, first_ns = self.arm, int(trajectory.stamps_ns[0])
-        times_s = _times(trajectory)
-        positions, turns = self.poses(trajectory, times_s)
-        joints, begun = _joints(arm, positions, turns, times_s, free_roll, begin)
+        times_s, _, joints, begun = self._joints(trajectory, free_roll, begin)
         # A joint of which nothing more is known reaches its full speed in this time [s].
         most = arm.fastest / 0.25
         if self.acceleration is not None:
@@ -148,9 +146,7 @@ class RobotCell:
         """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
         at which a joint runs at its greatest speed; and the configuration in which it begins.
         """
-        times_s = _times(trajectory)
-        positions, turns = self.poses(trajectory, times_s)
-        joints, begun = _joints(self.arm, positions, turns, times_s, False)
+        _, positions, joints, begun = self._joints(trajectory, False)
         steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         share = np.abs(np.diff(joints, axis=0)) / (1.0 - MARGIN) / self.arm.fastest
         speed = steps_m / np.maximum(share.max(axis=1), 1e-9)
@@ -173,6 +169,43 @@ class RobotCell:
         speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
         return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
 
+    def _joints(
+        self, trajectory: Trajectory, free_roll: bool, begin: Start | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Start]:
+        """Follow a motion by the way that is driven the fastest.
+
+        Returned are times (N,) [s], positions (N, 3) [m] in the robot's base, joints (N, J), and
+        the configuration in which they begin.
+        """
+        count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
+        times_s = np.linspace(0.0, trajectory.duration_s, count)
+        positions_m, turns = self.poses(trajectory, times_s)
+        rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
+        some_s, some_m = times_s[rows], positions_m[rows]
+        begins, ways, reached = _ways(self.arm, some_m, turns[rows], free_roll, begin)
+        if not begins:
+            raise PlanError(
+                f'the robot does not reach the first pose, {_words(some_m[0])} m in its base; '
+                'check --part-pose, or let paint place look where the part may stand'
+            )
+        far = int(reached.max())
+        if far < len(rows):
+            raise PlanError(
+                f'the robot follows the motion to {some_s[far]:.1f} of {some_s[-1]:.1f} s and not '
+                f'beyond {_words(some_m[far])} m in its base, in none of {len(begins)} '
+                'configurations; let paint place look where the part may stand'
+            )
+        best = _best(self.arm, ways, reached, some_s)
+        axes = (turns * _roll(begins[best][1])).as_matrix()
+        near = PchipInterpolator(some_s, ways[best])(times_s)
+        joints, error = settled(self.arm, near, positions_m, axes)
+        if error.max() > REACHED:
+            raise PlanError(
+                f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m '
+                'in its base; let the part stand elsewhere, paint place shows where'
+            )
+        return times_s, positions_m, joints, begins[best]
+
     def poses(self, trajectory: Trajectory, times_s: np.ndarray) -> tuple[np.ndarray, Rotation]:
         """Positions (N, 3) and turns of the tool in the robot's base at times (N,)."""
         in_base = moved(trajectory, self.part, '')
@@ -181,55 +214,8 @@ class RobotCell:
         return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
 
 
-def _joints(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    times_s: np.ndarray,
-    free_roll: bool,
-    begin: Start | None = None,
-) -> tuple[np.ndarray, Start]:
-    """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
-    rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
-    way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
-    axes = (turns * _roll(begun[1])).as_matrix()
-    joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
-    if error.max() > REACHED:
-        raise PlanError(
-            f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m in '
-            'its base; let the part stand elsewhere, paint place shows where'
-        )
-    return joints, begun
-
-
 def _roll(roll_rad: float) -> Rotation:
     return Rotation.from_rotvec([0.0, 0.0, roll_rad])
-
-
-def _best_way(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    times_s: np.ndarray,
-    free_roll: bool,
-    begin: Start | None,
-) -> tuple[np.ndarray, Start]:
-    """(N, J), of all ways through the poses the one that is driven the fastest, and its begin."""
-    begins, ways, reached = _ways(arm, positions_m, turns, free_roll, begin)
-    if not begins:
-        raise PlanError(
-            f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
-            'check --part-pose, or let paint place look where the part may stand'
-        )
-    far = int(reached.max())
-    if far < len(times_s):
-        raise PlanError(
-            f'the robot follows the motion to {times_s[far]:.1f} of {times_s[-1]:.1f} s and not '
-            f'beyond {_words(positions_m[far])} m in its base, in none of {len(begins)} '
-            'configurations; let paint place look where the part may stand'
-        )
-    best = _best(arm, ways, reached, times_s)
-    return ways[best], begins[best]
 
 
 def _ways(
@@ -257,12 +243,6 @@ def _best(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) 
     # Ways that come nearer to the limit of a joint than this share of its range are avoided.
     near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
     return int(whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
-
-
-def _times(trajectory: Trajectory) -> np.ndarray:
-    """(N,) times at which the joints are looked at [s]."""
-    count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
-    return np.linspace(0.0, trajectory.duration_s, count)
 
 
 def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:

@@ -163,7 +163,7 @@ def plan(
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     target = None if request.speed_m_per_s else wanted.target_um
     for round_ in range(TARGET_ROUNDS):
-        passes = plan_passes(surface_map, lines, [style] * len(lines))
+        passes = plan_passes(surface_map, lines, style)
         found = predicted(
             surface, model, request, wanted,
             trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
@@ -255,7 +255,7 @@ def _timed_plan(
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     passes = tuple(
         replace(planned, style=replace(style, speed_m_per_s=speed))
-        for planned in plan_passes(unoptimised.line_films.surface_map, lines, [style] * len(lines))
+        for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
     programme = Programme.of(trajectory_of(passes, style, unoptimised.trajectory.frame_id))
     start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)

@@ -112,6 +112,12 @@ class Programme:
         columns = [np.interp(travel_m, self._rising_m, column) for column in self.positions_m.T]
         return np.stack(columns, axis=1)
 
+    def speed_about(self, travel_m: np.ndarray, half_m: float) -> np.ndarray:
+        """(n,) mean speed [m/s] within ``half_m`` of lengths of travel (n,)."""
+        low, high = travel_m - half_m, travel_m + half_m
+        low, high = np.maximum(low, 0.0), np.minimum(high, self.travel_m[-1])
+        return (high - low) / np.maximum(self.seconds_at(high) - self.seconds_at(low), 1e-9)
+
     def turns_at_s(self, seconds: np.ndarray) -> Rotation:
         """Turns (n,) of the tool at times (n,) from the first pose."""
         return Slerp(self.clock_s, Rotation.from_quat(self.quaternions_xyzw))(seconds)

@@ -77,6 +77,10 @@ class Problem:
         """Number of unknowns: densities, and a flow for each opening."""
         return len(self.nodes) + len(self.nodes.openings)
 
+    def films_um(self, found: Density) -> list[np.ndarray]:
+        """(V,) film of each model for a density [um]."""
+        return [found.density @ films for films in self.films]
+
     def relaxed(self) -> 'Problem':
         """Without weights and limits, except that on the flow: for evenness alone."""
         weights = dict.fromkeys(('paint_weight', 'time_weight', 'smoothness'), 0.0)
