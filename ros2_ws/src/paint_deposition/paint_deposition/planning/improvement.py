@@ -60,8 +60,7 @@ class FilmSummary:
         region = wanted.region
         film, area = film_um[region], surface.vertex_areas_m2[region]
         path, _ = spray_path(trajectory)
-        low, high = (limit[region] for limit in wanted.limits_um(target_um, tolerance))
-        good = (film >= low) & (film <= high)
+        good = wanted.accepted(film_um, target_um, tolerance)[region]
         zones = wanted.zones
         elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
         return FilmSummary(

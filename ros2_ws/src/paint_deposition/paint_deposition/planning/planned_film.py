@@ -119,15 +119,13 @@ class WantedFilm:
             found.append((here.number < 0, self.elsewhere_um, tolerance))
         return found
 
-    def limits_um(self, target_um: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest film (V,) accepted [um]; the rest as for ``bands``."""
-        low, high = np.full((2, len(self.region)), np.nan)
-        for points, target, off in self.bands(np.arange(len(low)), target_um, tolerance):
-            low[points], high[points] = (
-                target * (1.0 - (off or 0.0)),
-                target * (1.0 + (off or 0.0)),
-            )
-        return low, high
+    def accepted(self, film_um: np.ndarray, target_um: float, tolerance: float) -> np.ndarray:
+        """(V,) bool, where a film (V,) [um] is within its band; the rest as for ``bands``."""
+        good = np.zeros(len(film_um), dtype=bool)
+        for points, target, off in self.bands(np.arange(len(good)), target_um, tolerance):
+            least, most = target * (1.0 - (off or 0.0)), target * (1.0 + (off or 0.0))
+            good |= points & (film_um >= least) & (film_um <= most)
+        return good
 
 
 def simulated(
