@@ -18,8 +18,7 @@ from paint_deposition.motion.part_frame import (
     locate,
 )
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.driving import RobotCell
-from paint_deposition.planning.part_place import PartPlaces, part_places
+from paint_deposition.planning.driving import PartPlaces, RobotCell, part_places
 
 
 def read_robot(

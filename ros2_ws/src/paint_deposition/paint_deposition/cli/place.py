@@ -13,7 +13,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.results_folder import Progress
 
 if TYPE_CHECKING:
-    from paint_deposition.planning.part_place import PartPlaces
+    from paint_deposition.planning.driving import PartPlaces
 
 
 def _span(axis: str) -> Any:

@@ -1,11 +1,13 @@
-"""A planned motion as a robot can drive it: its joints, and as slow as they need it to be."""
+"""A planned motion as a robot can drive it, and where the part may stand for all of it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
@@ -20,9 +22,10 @@ from paint_deposition.planning.joints import (
     JointPace,
     PassLimit,
     Start,
-    follow,
+    fastest_way,
+    rolled,
     settled,
-    starts,
+    ways_of,
 )
 
 # Joints are looked at this often along the planned motion [s].
@@ -129,12 +132,12 @@ class RobotCell:
             later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
             return first_ns + np.round(1e9 * later_s).astype(np.int64)
 
-        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(begun[1])
+        turns = Rotation.from_quat(trajectory.quaternions_xyzw) * rolled(begun[1])
         slowed = replace(
             trajectory,
             stamps_ns=slowed_ns(trajectory.stamps_ns),
             trigger_stamps_ns=slowed_ns(trajectory.trigger_stamps_ns),
-            quaternions_xyzw=rolled.as_quat(),
+            quaternions_xyzw=turns.as_quat(),
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
         limits = pace.limits(spray_pass, shares)
@@ -162,10 +165,10 @@ class RobotCell:
         """
         times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
         positions, turns = self.poses(trajectory, times_s)
-        _, ways, reached = _ways(self.arm, positions, turns, free_roll)
+        _, ways, reached = ways_of(self.arm, positions, turns, free_roll)
         if not (reached == TRIED).any():
             return float(reached.max(initial=0)) / TRIED, 0.0, 0.0
-        joints = ways[_best(self.arm, ways, reached, times_s)]
+        joints = ways[fastest_way(self.arm, ways, reached, times_s)]
         speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
         return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
 
@@ -182,7 +185,7 @@ class RobotCell:
         positions_m, turns = self.poses(trajectory, times_s)
         rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
         some_s, some_m = times_s[rows], positions_m[rows]
-        begins, ways, reached = _ways(self.arm, some_m, turns[rows], free_roll, begin)
+        begins, ways, reached = ways_of(self.arm, some_m, turns[rows], free_roll, begin)
         if not begins:
             raise PlanError(
                 f'the robot does not reach the first pose, {_words(some_m[0])} m in its base; '
@@ -195,8 +198,8 @@ class RobotCell:
                 f'beyond {_words(some_m[far])} m in its base, in none of {len(begins)} '
                 'configurations; let paint place look where the part may stand'
             )
-        best = _best(self.arm, ways, reached, some_s)
-        axes = (turns * _roll(begins[best][1])).as_matrix()
+        best = fastest_way(self.arm, ways, reached, some_s)
+        axes = (turns * rolled(begins[best][1])).as_matrix()
         near = PchipInterpolator(some_s, ways[best])(times_s)
         joints, error = settled(self.arm, near, positions_m, axes)
         if error.max() > REACHED:
@@ -214,37 +217,6 @@ class RobotCell:
         return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
 
 
-def _roll(roll_rad: float) -> Rotation:
-    return Rotation.from_rotvec([0.0, 0.0, roll_rad])
-
-
-def _ways(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    free_roll: bool,
-    chosen: Start | None = None,
-) -> tuple[list[Start], np.ndarray, np.ndarray]:
-    """All starts, or the chosen one, with the ways that ``follow`` finds from them."""
-    begin = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
-    axes = np.reshape([(turns * _roll(roll_rad)).as_matrix() for _, roll_rad in begin],
-                      (len(begin), len(positions_m), 3, 3))  # fmt: skip
-    joints = np.reshape([own for own, _ in begin], (len(begin), len(arm)))
-    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
-    return begin, *follow(arm, joints, positions, axes)
-
-
-def _best(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) -> int:
-    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
-    whole = np.flatnonzero(reached == len(times_s))
-    joints = ways[whole]
-    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
-    late = np.maximum(speeds.max(axis=2), 1.0)
-    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
-    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
-    return int(whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
-
-
 def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
     """(N,) number of the pass sprayed at each time, as a simulation counts; -1 for none."""
     path, _ = spray_path(trajectory)
@@ -259,3 +231,109 @@ def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
 
 def _words(place_m: np.ndarray) -> str:
     return '(' + ', '.join(f'{value:.2f}' for value in place_m) + ')'
+
+
+@dataclass(frozen=True)
+class PartPlaces:
+    """What a robot can do with the part at each place of a grid, all poses alike but for x and y.
+
+    Attributes:
+        cell: the robot, with the part where it was said to stand.
+        x_m, y_m: (X,) and (Y,) places of the part in the robot's base.
+        reached: (Y, X) share of the motion that is followed.
+        speed: (Y, X) share of the planned speed at the slowest moment; 0 where not all is reached.
+        room: (Y, X) least distance of a joint from its limits, as a share of its range.
+    """
+
+    cell: RobotCell
+    x_m: np.ndarray
+    y_m: np.ndarray
+    reached: np.ndarray
+    speed: np.ndarray
+    room: np.ndarray
+
+    @property
+    def good(self) -> np.ndarray:
+        """(Y, X) bool, places from which the robot is as fast as it can be from any."""
+        return self.speed >= min(1.0, self.speed.max())
+
+    @property
+    def amid(self) -> np.ndarray:
+        """(Y, X) bool, those all of whose neighbours were tried and are good too."""
+        return minimum_filter(self.good, 3, mode='constant', cval=False)
+
+    @property
+    def best(self) -> tuple[int, int]:
+        """Row and column of the place to choose: amid good ones if it can, with most room."""
+        score = np.where(self.amid if self.amid.any() else self.good, self.room, -1.0)
+        return divmod(int(score.argmax()), len(self.x_m))
+
+    @property
+    def part_pose(self) -> tuple[float, ...]:
+        """Pose of the part at the best place: x y z [m] and qx qy qz qw."""
+        row, column = self.best
+        return _placed(self.cell.part, self.x_m[column], self.y_m[row]).values
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a sentence."""
+        whole, count = int((self.reached == 1.0).sum()), self.reached.size
+        if not whole:
+            row, column = divmod(int(self.reached.argmax()), len(self.x_m))
+            return (
+                f'from none of {count} places the robot drives the whole motion; from '
+                f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it follows '
+                f'{100 * self.reached.max():.0f} % of it'
+            )
+        row, column = self.best
+        return (
+            f'from {whole} of {count} places the robot drives the whole motion, from '
+            f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
+            f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
+            f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
+            + (
+                ''
+                if self.amid[row, column]
+                else '; not all places beside it were tried and are as good'
+            )
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures by name."""
+        arrays = ('x_m', 'y_m', 'reached', 'speed', 'room')
+        return {
+            'sentence': self.sentence,
+            'part_pose': self.part_pose if self.speed.max() > 0.0 else None,
+            **{name: getattr(self, name).tolist() for name in arrays},
+        }
+
+
+def part_places(
+    trajectory: Trajectory,
+    cell: RobotCell,
+    x_m: np.ndarray,
+    y_m: np.ndarray,
+    free_roll: bool = False,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> PartPlaces:
+    """Try a motion, in the part's frame, with the part at each place of a grid.
+
+    ``cell.part`` gives the height and the turn of the part.
+
+    Raises:
+        PlanError: the grid is empty.
+    """
+    if not len(x_m) or not len(y_m):
+        raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
+    shape = len(y_m), len(x_m)
+    reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for number, (row, column) in enumerate(np.ndindex(shape)):
+        progress('places', number / reached.size)
+        part = _placed(cell.part, x_m[column], y_m[row])
+        tried = replace(cell, part=part).reachability(trajectory, free_roll)
+        reached[row, column], speed[row, column], room[row, column] = tried
+    return PartPlaces(cell, x_m, y_m, reached, speed, room)
+
+
+def _placed(part: Rigid, x_m: float, y_m: float) -> Rigid:
+    return replace(part, translation_m=np.array([x_m, y_m, part.translation_m[2]]))

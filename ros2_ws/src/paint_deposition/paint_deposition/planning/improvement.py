@@ -209,8 +209,36 @@ class Improvement:
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
-        """What changes, pass by pass."""
-        return changes(self.retiming.original, self.retiming.programme)
+        """What changes, pass by pass, numbered as a simulation of the improved programme does."""
+        original, improved = self.retiming.original, self.retiming.programme
+        ends_m, numbers, begins_pass = strokes_of(improved)
+        given = Programme.of(self.original).openings
+        opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
+        pairs = list(zip(original.openings, improved.openings, strict=True))
+        found: list[PassChange] = []
+        for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
+            own = [
+                (before, after) for before, after in pairs
+                if min(after.off_m, end) - max(after.on_m, begin) > 0.05
+            ]  # fmt: skip
+            if not own:
+                continue
+            (first_before, first), (last_before, last) = own[0], own[-1]
+            on, off = max(first.on_m, begin), min(last.off_m, end)
+            inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
+            # A turn that is sprayed through has no trigger that could be earlier or later.
+            opens = on == first.on_m and first_before.on_m in opened_m
+            closes = off == last.off_m and last_before.off_m in closed_m
+            earlier = first_before.on_m - on if opens else 0.0
+            later = off - last_before.off_m if closes else 0.0
+            old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
+            speed = speed_along(improved, np.linspace(*inside, 61))
+            found.append(PassChange(
+                int(number) + 1, (on, off), (old, new), float(speed.min()), float(speed.max()),
+                earlier, later, earlier / float(speed[0]), later / float(speed[-1]),
+                (first_before.flow, first.flow),
+            ))  # fmt: skip
+        return tuple(found)
 
     @cached_property
     def paths(self) -> tuple[SprayPath, SprayPath]:
@@ -330,39 +358,3 @@ class Improvement:
             'robot': self.drive and self.drive.to_dict(),
             'warnings': list(self.warnings),
         }
-
-
-def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
-    """The changes of all passes, numbered as a simulation of the improved programme does."""
-    ends_m, numbers, begins_pass = strokes_of(improved)
-    given = Programme.of(original.original).openings
-    opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
-    pairs = list(zip(original.openings, improved.openings, strict=True))
-    found: list[PassChange] = []
-    for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
-        own = [
-            (before, after) for before, after in pairs
-            if min(after.off_m, end) - max(after.on_m, begin) > 0.05
-        ]  # fmt: skip
-        if not own:
-            continue
-        (first_before, first), (last_before, last) = own[0], own[-1]
-        on, off = max(first.on_m, begin), min(last.off_m, end)
-        inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
-        # A turn that the programme sprays through has no trigger that could be earlier or later.
-        opens = on == first.on_m and first_before.on_m in opened_m
-        closes = off == last.off_m and last_before.off_m in closed_m
-        earlier = first_before.on_m - on if opens else 0.0
-        later = off - last_before.off_m if closes else 0.0
-        old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-        speed = speed_along(improved, np.linspace(*inside, 61))
-        found.append(
-            PassChange(
-                int(number) + 1, (on, off),
-                (old, new),
-                float(speed.min()), float(speed.max()), earlier, later,
-                earlier / float(speed[0]), later / float(speed[-1]),
-                (first_before.flow, first.flow),
-            )
-        )  # fmt: skip
-    return tuple(found)

@@ -121,6 +121,38 @@ def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
     return np.logical_not(outside.any(axis=-1))
 
 
+def rolled(roll_rad: float) -> Rotation:
+    """The turn of a tool that is rolled about its own axis."""
+    return Rotation.from_rotvec([0.0, 0.0, roll_rad])
+
+
+def ways_of(
+    arm: Arm,
+    positions_m: np.ndarray,
+    turns: Rotation,
+    free_roll: bool,
+    chosen: Start | None = None,
+) -> tuple[list[Start], np.ndarray, np.ndarray]:
+    """All starts, or the chosen one, with the ways that ``follow`` finds from them."""
+    begin = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    axes = np.reshape([(turns * rolled(roll_rad)).as_matrix() for _, roll_rad in begin],
+                      (len(begin), len(positions_m), 3, 3))  # fmt: skip
+    joints = np.reshape([own for own, _ in begin], (len(begin), len(arm)))
+    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
+    return begin, *follow(arm, joints, positions, axes)
+
+
+def fastest_way(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) -> int:
+    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
+    whole = np.flatnonzero(reached == len(times_s))
+    joints = ways[whole]
+    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
+    late = np.maximum(speeds.max(axis=2), 1.0)
+    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
+    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
+    return int(whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
+
+
 @dataclass(frozen=True)
 class PassLimit:
     """The joint that keeps a pass from its planned speed."""
