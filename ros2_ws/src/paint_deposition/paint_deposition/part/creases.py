@@ -27,15 +27,16 @@ CREASE_RAD = np.radians(30.0)
 RIM_FOLD_RAD = np.radians(60.0)
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
-# Folds that turn more slowly belong to a curved surface.
-WIDEST_STRIP_M = 0.02
+# Folds of less are none, and a strip between two folds of a hem is no wider.
 LEAST_FOLD_RAD = np.radians(4.0)
+WIDEST_STRIP_M = 0.02
+# Pieces of folds that are compared [m]; they lie beside each other if they are this parallel.
 PIECE_M = 0.005
 PARALLEL_COSINE = 0.8
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
 GUN_M = 0.3
-# What a shorter edge costs lies within the spot of a gauge: fillets and hems.
+# Those that cost the most are kept.
 MOST_EDGES = 5_000
 
 
@@ -62,14 +63,39 @@ def _folds_rad(vertices, faces, normals, paired):
 def rim_folds(
     vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, folds: np.ndarray
 ) -> np.ndarray:
-    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem."""
+    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem.
+
+    A hem is a row of folds that together turn convexly by as much as a rim.
+    """
     rim = folds >= RIM_FOLD_RAD
     rows = np.flatnonzero(folds > LEAST_FOLD_RAD)
-    ends = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
+    ends_m = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
     beside = faces[edges.paired[rows] // 3].reshape(-1, 3)
     area = face_areas_m2(vertices_m, beside).reshape(-1, 2).min(axis=1)
-    width = 2.0 * area / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    rim[rows] |= hem_folds(ends, folds[rows], width, RIM_FOLD_RAD)
+    width_m = 2.0 * area / np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1)
+    # Folds that turn more slowly belong to a curved surface.
+    close = folds[rows] > 20.0 * width_m
+    rows, ends_m = rows[close], ends_m[close]
+    if not len(rows):
+        return rim
+    along = ends_m[:, 1] - ends_m[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    along = along / length[:, None]
+    pieces, whose = cut_segments(ends_m, PIECE_M)
+    half = 0.5 * (length / np.bincount(whose))[whose]
+    middle = pieces.mean(axis=1)
+    fold = folds[rows]
+    turn = fold[whose]
+    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
+        i = i + block.start
+        parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
+        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
+        i, j = i[beside], j[beside]
+        ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
+        # Of a fold beside it in several pieces each counts as far as it lies abreast.
+        abreast = 0.5 + (half[j] - ahead) / (2.0 * np.minimum(half[i], half[j]))
+        turn += np.bincount(i, np.clip(abreast, 0.0, 1.0) * fold[whose[j]], minlength=len(turn))
+    rim[rows[np.bincount(whose, turn >= RIM_FOLD_RAD, minlength=len(rows)) > 0]] = True
     return rim
 
 
@@ -108,42 +134,6 @@ def rim_segments_m(
     return np.concatenate(
         [without_seams(single), half_edges_m(vertices_m, faces, edges.paired[rim, 0])]
     )
-
-
-def hem_folds(
-    ends_m: np.ndarray, folds_rad: np.ndarray, width_m: np.ndarray, turn_rad: float
-) -> np.ndarray:
-    """(E,) bool: folds of which several in a row turn convexly by at least ``turn_rad``.
-
-    Of each its ends (E, 2, 3), its angle, positive if convex, and the height of the lower
-    triangle.
-    """
-    hem = np.zeros(len(folds_rad), dtype=bool)
-    # Folds that turn more slowly belong to a curved surface.
-    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > 20.0 * width_m)
-    rows = np.flatnonzero(close)
-    if not len(rows):
-        return hem
-    along = ends_m[rows, 1] - ends_m[rows, 0]
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
-    along = along / length[:, None]
-    pieces, whose = cut_segments(ends_m[rows], PIECE_M)
-    half = 0.5 * (length / np.bincount(whose))[whose]
-    middle = pieces.mean(axis=1)
-    fold = folds_rad[rows]
-    turn = fold[whose]
-    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
-        i = i + block.start
-        parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
-        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
-        i, j = i[beside], j[beside]
-        ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
-        # Of a fold beside it in several pieces each counts as far as it lies abreast.
-        abreast = 0.5 + (half[j] - ahead) / (2.0 * np.minimum(half[i], half[j]))
-        turn += np.bincount(i, np.clip(abreast, 0.0, 1.0) * fold[whose[j]], minlength=len(turn))
-    rim = np.bincount(whose, turn >= turn_rad, minlength=len(rows)) > 0
-    hem[rows[rim]] = True
-    return hem
 
 
 def strip_vertices(
