@@ -19,12 +19,13 @@ from paint_deposition.planning.clearance import rows_apart
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,
+    ROUNDS,
     JointPace,
     PassLimit,
     Start,
     fastest_way,
     rolled,
-    settled,
+    towards,
     ways_of,
 )
 
@@ -201,7 +202,7 @@ class RobotCell:
         best = fastest_way(self.arm, ways, reached, some_s)
         axes = (turns * rolled(begins[best][1])).as_matrix()
         near = PchipInterpolator(some_s, ways[best])(times_s)
-        joints, error = settled(self.arm, near, positions_m, axes)
+        joints, error = towards(self.arm, near, positions_m, axes, ROUNDS)
         if error.max() > REACHED:
             raise PlanError(
                 f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m '
