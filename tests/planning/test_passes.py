@@ -34,7 +34,7 @@ def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
     planned = plan_pass(bowed, 0.1, STYLE)
     tool_z = planned.rotations[:, :, 2]
     on_surface = planned.positions_m + STYLE.standoff_m * tool_z
-    u, v, height = ((on_surface - bowed.origin_m) @ bowed.axes).T
+    u, v, height = ((on_surface - bowed.origin_m) @ bowed.axes.T).T
     np.testing.assert_allclose(v, 0.1, atol=1e-9)
     np.testing.assert_allclose(height, bowed.height_m(u, v), atol=1e-9)
     np.testing.assert_allclose(tool_z, -bowed.normals(u, v), atol=1e-9)
@@ -48,7 +48,7 @@ def test_gun_is_on_from_before_the_part_to_behind_it(bowed):
     path, _ = spray_path(trajectory_of((planned,), STYLE))
     # Where the gun's axis meets the surface: the TCP leans out over the bow.
     aimed_at = path.position_m + STYLE.standoff_m * path.rotation[:, :, 2]
-    on = ((aimed_at[path.flow > 0.0] - bowed.origin_m) @ bowed.axes)[:, 0]
+    on = ((aimed_at[path.flow > 0.0] - bowed.origin_m) @ bowed.axes.T)[:, 0]
     assert on.min() == pytest.approx(-0.5 - STYLE.overspray_m, abs=0.02)
     assert on.max() == pytest.approx(0.5 + STYLE.overspray_m, abs=0.02)
 

@@ -25,9 +25,9 @@ def sheet(height, half_m=0.5, count=41) -> Surface:
 def test_axes_of_a_standing_part_seen_from_its_gun():
     surface = sheet(lambda x, z: 0.0 * x)
     level = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]]
-    np.testing.assert_allclose(pass_axes(surface).T, level, atol=1e-9)
+    np.testing.assert_allclose(pass_axes(surface), level, atol=1e-9)
     vertical = [[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
-    np.testing.assert_allclose(pass_axes(surface, 'vertical').T, vertical, atol=1e-9)
+    np.testing.assert_allclose(pass_axes(surface, 'vertical'), vertical, atol=1e-9)
 
 
 def test_a_plane_keeps_its_place_and_normal_to_its_edges():

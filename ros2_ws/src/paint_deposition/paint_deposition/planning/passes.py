@@ -98,7 +98,7 @@ def tool_poses(
 ) -> tuple[np.ndarray, np.ndarray]:
     """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
     on_surface = surface_map.places_m(travel_m, across_m)
-    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[:, 0].copy()
+    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[0]
     way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)

@@ -16,7 +16,7 @@ from paint_deposition.part.surface import Surface
 def pass_axes(
     surface: Surface, direction: str = 'horizontal', outward: ArrayLike | None = None
 ) -> np.ndarray:
-    """(3, 3) unit vectors along which passes are laid, as columns: travel, across and outward.
+    """(3, 3) unit vectors along which passes are laid, a row each: travel, across and outward.
 
     Horizontal passes run to the right as the gun sees it, vertical ones down; ``across`` lies to
     the right of that. ``outward`` leads from the part to the gun, any length; default: the mean
@@ -37,7 +37,7 @@ def pass_axes(
     side = side / np.linalg.norm(side)
     toward = across_axis if direction == 'horizontal' else downhill_axis
     travel = toward(side, surface.down)
-    return np.stack([travel, np.cross(-side, travel), side], axis=1)
+    return np.stack([travel, np.cross(-side, travel), side])
 
 
 class SurfaceMap:
@@ -50,12 +50,11 @@ class SurfaceMap:
 
     def __init__(self, surface: Surface, axes: np.ndarray, radius_m: float) -> None:
         self.axes, self.radius_m, self.origin_m = axes, radius_m, surface.centre_m
-        outward = axes[:, 2].copy()
-        self.painted = painted_side(surface, outward)
+        self.painted = painted_side(surface, axes[2])
         if not self.painted.any():
             raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
-        self.surface_m = (surface.vertices_m[self.painted] - self.origin_m) @ axes
-        facing = surface.normals @ outward
+        self.surface_m = (surface.vertices_m[self.painted] - self.origin_m) @ axes.T
+        facing = surface.normals @ axes[2]
         weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]
         cell = min(max(radius_m / 5.0, 0.004), 0.02)
         cell = max(cell, surface.longest_edge_m)
@@ -79,12 +78,12 @@ class SurfaceMap:
         """(N, 3) unit normals of the smoothed surface, in the part's frame."""
         slopes = [spline.ev(travel_m, across_m) for spline in self._splines[1:]]
         normals = np.stack([-slopes[0], -slopes[1], np.ones(len(slopes[0]))], axis=1)
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes.T
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes
 
     def places_m(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
         """(N, 3) places on the smoothed surface, in the part's frame [m]."""
         height_m = self.height_m(travel_m, across_m)
-        return self.origin_m + np.stack([travel_m, across_m, height_m], axis=1) @ self.axes.T
+        return self.origin_m + np.stack([travel_m, across_m, height_m], axis=1) @ self.axes
 
     @cached_property
     def extent_m(self) -> np.ndarray:
