@@ -309,28 +309,23 @@ def _between(
 
 
 def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
-    """One motion after the other; each begins where the one before ends."""
-    clock, shifts = 0, []
+    """One motion after the other; where one ends and the next begins there is one pose."""
+    clock_ns = 0
+    pieces: list[tuple[np.ndarray, ...]] = []
     for part in parts:
-        shifts.append(clock - int(part.stamps_ns[0]))
-        clock += int(part.stamps_ns[-1] - part.stamps_ns[0])
-
-    def rows(name: str, number: int) -> np.ndarray:
-        # Where one ends and the next begins there is one pose.
-        return getattr(parts[number], name)[1 if number else 0 :]
-
-    numbers = range(len(parts))
-    return Trajectory(
-        np.concatenate([rows('stamps_ns', k) + shifts[k] for k in numbers]),
-        np.concatenate([rows('positions_m', k) for k in numbers]),
-        np.concatenate([rows('quaternions_xyzw', k) for k in numbers]),
-        frame_id=frame_id,
-        trigger_stamps_ns=np.concatenate(
-            [parts[k].trigger_stamps_ns + shifts[k] for k in numbers]
-        ),
-        trigger_flow=np.concatenate([part.trigger_flow for part in parts]),
-        trigger_brush=np.concatenate([part.trigger_brush for part in parts]),
+        shift_ns, rows = clock_ns - int(part.stamps_ns[0]), slice(1 if pieces else 0, None)
+        pieces.append((
+            part.stamps_ns[rows] + shift_ns, part.positions_m[rows], part.quaternions_xyzw[rows],
+            part.trigger_stamps_ns + shift_ns, part.trigger_flow, part.trigger_brush,
+        ))  # fmt: skip
+        clock_ns += int(part.stamps_ns[-1] - part.stamps_ns[0])
+    stamps, positions, quaternions, switched, flow, brush = map(
+        np.concatenate, zip(*pieces, strict=True)
     )
+    return Trajectory(
+        stamps, positions, quaternions, frame_id=frame_id,
+        trigger_stamps_ns=switched, trigger_flow=flow, trigger_brush=brush,
+    )  # fmt: skip
 
 
 def _reversed(planned: PlannedPass) -> PlannedPass:
