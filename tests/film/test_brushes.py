@@ -9,12 +9,11 @@ import pytest
 from brushes import NARROW, WIDE, switched, two_brushes
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.pose_lag import PoseLag
-from paint_deposition.effects.library.trigger_lag import TriggerLag
 from paint_deposition.errors import ModelError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import term_weights
 from paint_deposition.film.live_film import LiveFilm, without_refused_states
-from paint_deposition.film.paint_used import seconds_by_pattern
+from paint_deposition.film.statistics import seconds_by_pattern
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.pose_stream import TriggerChange
@@ -38,17 +37,14 @@ def with_one_brush(motion: Trajectory, number: int) -> Trajectory:
 
 
 def test_two_brushes_on_one_part_lay_the_sum_of_their_films():
-    motion = replace(weaving(TIMES_S), **CHANGES)
-    both = painted(lying_plane(), motion, MODEL, precision='double')
+    motion, points = replace(weaving(TIMES_S), **CHANGES), lying_plane()
+    both = painted(points, motion, MODEL, precision='double')
     apart = [
-        painted(
-            lying_plane(),
-            with_one_brush(motion, n),
-            DepositionModel(planar=planar),
-            precision='double',
+        painted(points, one_brush, DepositionModel(planar=planar), precision='double')
+        for planar, one_brush in (
+            (NARROW, with_one_brush(motion, 1)), (WIDE, with_one_brush(motion, 2))
         )
-        for n, planar in ((1, NARROW), (2, WIDE))
-    ]
+    ]  # fmt: skip
     total = sum(one.film_um for one in apart)
     # Sub-steps are not cut where both sides of a change are without paint.
     assert np.abs(both.film_um - total).max() < 2e-4 * total.max()
@@ -67,20 +63,6 @@ def test_one_brush_is_its_pattern_to_the_last_bit(number):
     assert np.array_equal(painted(lying_plane(), motion, one).film_um, plain.film_um)
     # A cell that numbers its only brush needs no other model.
     assert np.array_equal(painted(lying_plane(), motion, DepositionModel()).film_um, plain.film_um)
-
-
-@pytest.mark.parametrize(
-    ('batch', 'effect'), [(3, None), (10, TriggerLag(rise_s=0.05, fall_s=0.08))]
-)
-def test_the_live_film_is_the_offline_film_to_the_last_bit(batch, effect):
-    model = MODEL.with_effect(effect) if effect else MODEL
-    motion = replace(weaving(TIMES_S), **CHANGES)
-    film, expected = LiveFilm(lying_plane(), model), painted(lying_plane(), motion, model)
-    for event in events(motion, batch):
-        film.replay([event])
-    assert np.array_equal(film.snapshot().film_um, expected.film_um)
-    assert film.snapshot().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
-    assert (film.flow, film.brush) == (1.2, 1)
 
 
 @pytest.mark.parametrize('lag_s', [0.03, -0.03])

@@ -1,4 +1,4 @@
-"""The integral: no paint is lost or invented, and the film does not depend on how it was cut."""
+"""The integral: the film does not depend on how the path was sampled, cut or placed."""
 
 import numpy as np
 import pytest
@@ -10,13 +10,9 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
-from scenes import LOOKING_DOWN, lying_plane, stamps_ns, straight_pass, weaving
+from scenes import lying_plane, stamps_ns, straight_pass, weaving
 
 MODEL = DepositionModel()
-# All of it lands within 0.3 m of the axis at the standoffs used here.
-NARROW = DepositionModel(
-    planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
-)
 
 
 def painted(points, motion, model=MODEL, precision='double'):
@@ -25,21 +21,6 @@ def painted(points, motion, model=MODEL, precision='double'):
 
 def largest_error(film, expected):
     return np.abs(film - expected).max() / expected.max()
-
-
-@pytest.mark.parametrize('tilt_rad', [0.0, 0.3])
-def test_what_the_bell_emits_is_on_the_plane(tilt_rad):
-    """1 um m^2 is 1 cm^3: the film summed over the plane is K1 times the time sprayed."""
-    turned = Rotation.from_quat(LOOKING_DOWN) * Rotation.from_euler('y', tilt_rad)
-    trajectory = straight_pass(
-        np.arange(0.0, 2.0, 0.02), (-0.3, 0.0, 0.25), (0.3, 0.0, 0.3), turned.as_quat(),
-        trigger_stamps_ns=stamps_ns([0.3337, 1.5]), trigger_flow=np.array([0.8, 0.0]),
-    )  # fmt: skip
-    points = lying_plane(1.0, 201)
-    film = painted(points, trajectory, NARROW)
-    emitted = 1.3 * 0.8 * (1.5 - 0.3337)
-    assert film.emitted_cm3 == pytest.approx(emitted, rel=1e-12)
-    assert points.area_m2 @ film.film_um == pytest.approx(emitted, rel=1e-5)
 
 
 # The weaving way at 0.3 m/s with a tool that sways, as a robot's log may show it.
@@ -120,16 +101,6 @@ def test_the_film_is_in_proportion_to_flow_k1_and_time():
     slow = painted(points, straight_pass(np.linspace(0.0, 4.0, 401))).film_um
     fast = painted(points, straight_pass(np.linspace(0.0, 2.0, 401))).film_um
     assert largest_error(slow, 2.0 * fast) < 1e-12
-
-
-def test_a_symmetric_pattern_lays_a_symmetric_film():
-    round_ = DepositionModel(planar=PlanarPattern(K3=0.0))
-    count = 31
-    film = painted(lying_plane(count=count), straight_pass(np.linspace(0, 2, 101)), round_).film_um
-    film = film.reshape(count, count)  # rows y, columns x
-    # What lies beyond the reach is left out by blocks, which are not symmetric.
-    assert np.allclose(film, film[::-1], rtol=1e-10, atol=1e-7 * film.max())
-    assert np.allclose(film, film[:, ::-1], rtol=1e-10, atol=1e-7 * film.max())
 
 
 def test_moving_part_and_gun_together_changes_nothing():

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from brushes import two_brushes
-from paint_deposition.effects.catalogue import LEARNED, effect_class
+from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.film.live_film import LiveFilm
@@ -27,10 +27,6 @@ from scenes import (
 MODEL = DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
 LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
-# Its film at a place depends on the time since the motion began.
-DRIFTING = MODEL.with_effect(
-    LEARNED['time_s'](low=0.0, high=4.0, learned=(0.0, 0.4, -0.3, 0.2, -0.5))
-)
 TIMES_S = np.arange(0.0, 4.0, 0.004)
 TRIGGERS = {
     'trigger_stamps_ns': stamps_ns([0.5013, 1.7502, 2.2]),
@@ -42,24 +38,6 @@ def followed(coming, model=MODEL, **options):
     film = LiveFilm(lying_plane(), model, **options)
     film.replay(coming)
     return film
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(
-    'model', [MODEL, LAGGING, DRIFTING], ids=['plain', 'whole strokes', 'over time']
-)
-@pytest.mark.parametrize('batch', [1, 100])
-def test_any_batches_give_the_offline_film_to_the_last_bit(model, batch):
-    motion = weaving(TIMES_S)
-    expected = painted(lying_plane(), motion, model)
-    film = LiveFilm(lying_plane(), model)
-    for event in events(motion, batch):
-        film.replay([event])
-        if batch > 1:
-            film.snapshot()  # looking at the film changes nothing
-    assert np.array_equal(film.snapshot().film_um, expected.film_um)
-    assert film.snapshot().emitted_cm3 == pytest.approx(expected.emitted_cm3, rel=1e-12)
-    assert expected.film_um.max() > 1.0
 
 
 @pytest.mark.slow

@@ -10,7 +10,7 @@ import scenes
 from brushes import NARROW, WIDE, switched
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.paint_used import PaintUsed, efficiency, impossible_brushes
+from paint_deposition.film.statistics import PaintUsed, efficiency, impossible_brushes
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.motion.path_builder import spray_path
 from scenes import lying_plane, stamps_ns, straight_pass

@@ -22,9 +22,10 @@ from scenes import LOOKING_DOWN, lying_plane, painted, poses, stamps_ns
 
 EXAMPLES = int(os.environ.get('PAINT_EXAMPLES', '10'))
 many = settings(max_examples=EXAMPLES, suppress_health_check=[HealthCheck.too_slow])
-# Of each way in which a law can act: on the flux, on the path, with what lies ahead.
+# Of each way in which a law can act: on the flux, on the path, with what lies ahead, over time.
 LAWS = [
     (), ('incidence_attraction',), ('trigger_lag', 'air_drift'), ('corner_slowdown',),
+    ('flow_drift',),
 ]  # fmt: skip
 PLANE = lying_plane(0.7, 72)
 
@@ -101,6 +102,7 @@ def test_the_live_film_is_the_offline_film_to_the_last_bit(motion, model, sizes)
         while states and states[0][0] <= batch.stamps_ns[-1]:
             film.add_trigger(TriggerChange(states[0][0], float(states.pop(0)[1])))
         film.add_poses(batch)
+        film.snapshot()  # looking at the film changes nothing
         start, turn = rows.stop, turn + 1
     for stamp, flow in states:
         film.add_trigger(TriggerChange(stamp, float(flow)))

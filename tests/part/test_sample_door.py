@@ -1,4 +1,4 @@
-"""The sample parts and motions are what the documentation says they are."""
+"""The sample parts are what the documentation says they are."""
 
 import subprocess
 import sys
@@ -6,12 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.motion_files import read_recording
-from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.points import SurfacePoints
 
 
 @pytest.fixture(scope='module')
@@ -22,16 +17,6 @@ def samples(repository):
 @pytest.fixture(scope='module')
 def door(samples):
     return read_mesh(samples / 'door.stl')
-
-
-def motion(samples, name):
-    return read_recording(samples / name, '/atomizer/pose', '/atomizer/state')
-
-
-def film_um(points: SurfacePoints, trajectory) -> np.ndarray:
-    integrator = FilmIntegrator(points, DepositionModel(), precision='double')
-    integrator.add(spray_path(trajectory)[0])
-    return integrator.film_um
 
 
 def test_the_door_has_its_convex_line_and_its_concave_third(door):

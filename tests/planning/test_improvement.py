@@ -74,10 +74,7 @@ def test_speed_takes_away_what_an_effect_lays_too_much(levelled):
     slope, level = np.polyfit(places[inside, 0], speed[inside], 1)
     # 1 + h rises by 0.5 a metre.
     assert slope / level == pytest.approx(0.5, rel=0.2)
-
-
-@pytest.mark.slow
-def test_the_mean_stays_and_the_path_too(levelled):
+    # The mean stays, and the path too.
     assert levelled.after.mean_um == pytest.approx(levelled.before.mean_um, rel=3e-3)
     original, new = levelled.original.positions_m, levelled.trajectory.positions_m
     assert cKDTree(original).query(new)[0].max() < 0.004
@@ -200,7 +197,7 @@ CHANGES = switched(stamps_ns([0.5, 1.5, 2.0, 3.0, 3.5]), (1, 1), (1, 2), (0, 0),
 SWITCHED = replace(straight_pass(np.arange(0.0, 4.001, 0.02)), **CHANGES)
 
 
-def test_openings_end_where_the_brush_changes_and_moves_keep_it():
+def test_openings_end_where_the_brush_changes_also_between_poses_and_moves_keep_it():
     programme = Programme.of(SWITCHED)
     found = [(o.on_m, o.off_m, o.flow, o.brush) for o in programme.openings]
     expected = [(0.15, 0.45, 1.0, 1), (0.45, 0.6, 1.0, 2), (0.9, 1.05, 0.5, 2)]
@@ -209,6 +206,13 @@ def test_openings_end_where_the_brush_changes_and_moves_keep_it():
     assert opened == [(1.0, 1), (1.0, 2), (0.5, 2)]
     moves = [(m.flow, m.brush) for m in moves_of(programme, ImproveRequest()) if m.spraying]
     assert list(dict.fromkeys(moves)) == [(1.0, 1), (1.0, 2), (0.5, 2)]
+    # Two openings meet where no pose is: none takes no time.
+    flows = switched(stamps_ns([0.503, 1.507, 2.0]), (1, 1), (1, 2), (0, 0))
+    programme = Programme.of(replace(SWITCHED, **flows))
+    assert (np.diff(programme.trajectory().stamps_ns) > 0).all()
+    spraying = [m for m in moves_of(programme, ImproveRequest()) if m.spraying]
+    assert list(dict.fromkeys(m.brush for m in spraying)) == [1, 2]
+    assert max(m.speed_m_per_s for m in spraying) < 0.301
 
 
 @pytest.mark.slow
@@ -236,17 +240,6 @@ def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     # In turns that are sprayed through no trigger is earlier or later.
     one, other = kept.changes
     assert one.closes_later_m == other.opens_earlier_m == 0.0
-
-
-def test_brushes_that_change_between_poses_are_followed():
-    """Two openings meet where no pose is: none takes no time."""
-    flows = switched(stamps_ns([0.503, 1.507, 2.0]), (1, 1), (1, 2), (0, 0))
-    programme = Programme.of(replace(SWITCHED, **flows))
-    timed_again = programme.trajectory()
-    assert (np.diff(timed_again.stamps_ns) > 0).all()
-    moves = moves_of(programme, ImproveRequest())
-    assert list(dict.fromkeys(m.brush for m in moves if m.spraying)) == [1, 2]
-    assert max(m.speed_m_per_s for m in moves) < 0.301
 
 
 def test_gaps_between_poses_close_the_gun_and_flows_are_averaged():

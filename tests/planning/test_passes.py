@@ -27,14 +27,14 @@ def bowed():
 
 @pytest.fixture(scope='module')
 def motion(bowed):
-    return trajectory_of(plan_passes(bowed, LINES_M, [STYLE] * 3), STYLE, 'part')
+    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part')
 
 
 def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
     planned = plan_pass(bowed, 0.1, STYLE)
     tool_z = planned.rotations[:, :, 2]
     on_surface = planned.positions_m + STYLE.standoff_m * tool_z
-    u, v, height = bowed.axes.coordinates_m(on_surface).T
+    u, v, height = ((on_surface - bowed.origin_m) @ bowed.axes.T).T
     np.testing.assert_allclose(v, 0.1, atol=1e-9)
     np.testing.assert_allclose(height, bowed.height_m(u, v), atol=1e-9)
     np.testing.assert_allclose(tool_z, -bowed.normals(u, v), atol=1e-9)
@@ -48,7 +48,7 @@ def test_gun_is_on_from_before_the_part_to_behind_it(bowed):
     path, _ = spray_path(trajectory_of((planned,), STYLE))
     # Where the gun's axis meets the surface: the TCP leans out over the bow.
     aimed_at = path.position_m + STYLE.standoff_m * path.rotation[:, :, 2]
-    on = bowed.axes.coordinates_m(aimed_at[path.flow > 0.0])[:, 0]
+    on = ((aimed_at[path.flow > 0.0] - bowed.origin_m) @ bowed.axes.T)[:, 0]
     assert on.min() == pytest.approx(-0.5 - STYLE.overspray_m, abs=0.02)
     assert on.max() == pytest.approx(0.5 + STYLE.overspray_m, abs=0.02)
 
@@ -74,7 +74,7 @@ def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
     tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, [one_way] * 3), one_way))
+    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way), one_way))
     on = path.select(path.flow > 0.0)
     ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
@@ -91,7 +91,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
-    passes = plan_passes(bowed, LINES_M, [STYLE] * 3)
+    passes = plan_passes(bowed, LINES_M, STYLE)
     moves = planned_moves(passes, STYLE)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])

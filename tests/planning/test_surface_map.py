@@ -24,21 +24,17 @@ def sheet(height, half_m=0.5, count=41) -> Surface:
 
 def test_axes_of_a_standing_part_seen_from_its_gun():
     surface = sheet(lambda x, z: 0.0 * x)
-    axes = pass_axes(surface)
-    np.testing.assert_allclose(axes.outward, [0.0, -1.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(axes.travel, [1.0, 0.0, 0.0], atol=1e-9)
-    np.testing.assert_allclose(axes.across, [0.0, 0.0, -1.0], atol=1e-9)
-    np.testing.assert_allclose(np.cross(-axes.outward, axes.travel), axes.across, atol=1e-12)
-    vertical = pass_axes(surface, 'vertical')
-    np.testing.assert_allclose(vertical.travel, [0.0, 0.0, -1.0], atol=1e-9)
-    np.testing.assert_allclose(np.cross(-vertical.outward, vertical.travel), vertical.across)
+    level = [[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, -1.0, 0.0]]
+    np.testing.assert_allclose(pass_axes(surface), level, atol=1e-9)
+    vertical = [[0.0, 0.0, -1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]
+    np.testing.assert_allclose(pass_axes(surface, 'vertical'), vertical, atol=1e-9)
 
 
 def test_a_plane_keeps_its_place_and_normal_to_its_edges():
     surface = sheet(lambda x, z: 0.2 * x - 0.1 * z)
     surface_map = SurfaceMap(surface, pass_axes(surface, outward=(0.0, -1.0, 0.0)), 0.1)
     u, v = (grid.ravel() for grid in np.meshgrid(*2 * [np.linspace(-0.45, 0.45, 15)]))
-    places = surface_map.axes.points_m(np.stack([u, v, surface_map.height_m(u, v)], axis=1))
+    places = surface_map.places_m(u, v)
     deviation = places[:, 1] - (0.2 * places[:, 0] - 0.1 * places[:, 2])
     assert np.abs(deviation).max() < 1.5e-3
     expected = np.array([0.2, -1.0, -0.1]) / np.linalg.norm([0.2, -1.0, -0.1])

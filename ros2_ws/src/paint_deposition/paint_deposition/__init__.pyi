@@ -64,8 +64,8 @@ from paint_deposition.inference.readings.readings import Readings as Readings
 from paint_deposition.motion.trajectory import Trajectory as Trajectory
 from paint_deposition.part.surface import Surface as Surface
 from paint_deposition.part.zones import Zones as Zones
+from paint_deposition.planning.faces import PartPlan as PartPlan
 from paint_deposition.planning.improvement import Improvement as Improvement
-from paint_deposition.planning.part_plan import PartPlan as PartPlan
 from paint_deposition.planning.plan import Plan as Plan
 from paint_deposition.planning.recommendation import Recommendation as Recommendation
 from paint_deposition.planning.requests import GunEnvelope as GunEnvelope

@@ -21,11 +21,10 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import WIDEST_RAD
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones, Zones
-from paint_deposition.planning.driving import RobotCell
+from paint_deposition.planning.driving import PartPlaces, RobotCell, part_places
+from paint_deposition.planning.faces import PartPlan
+from paint_deposition.planning.faces import plan_faces as planned_faces
 from paint_deposition.planning.improvement import DEFAULT_TOLERANCE, FilmSummary, Improvement
-from paint_deposition.planning.part_place import PartPlaces, part_places
-from paint_deposition.planning.part_plan import PartPlan
-from paint_deposition.planning.part_plan import plan_faces as planned_faces
 from paint_deposition.planning.plan import Plan, driven, kept_clear, optimise
 from paint_deposition.planning.plan import plan as planned
 from paint_deposition.planning.planned_film import WantedFilm, evenness, simulated
@@ -39,7 +38,7 @@ from paint_deposition.planning.requests import (
     PlanRequest,
 )
 from paint_deposition.planning.retiming import retime_for_evenness
-from paint_deposition.planning.surface_map import painted_side, pass_axes
+from paint_deposition.planning.surface_map import painted_side
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]
@@ -200,8 +199,8 @@ def improve(
     if target_region is None:
         target_region = film_um > COUNTED_ABOVE * film_um.max()
         towards = -seen.path.rotation[seen.path.flow > 0.0][:, :, 2].mean(axis=0)
-        if np.linalg.norm(towards) >= ONE_SIDE:
-            target_region &= painted_side(surface, pass_axes(surface, outward=towards))
+        if (length := np.linalg.norm(towards)) >= ONE_SIDE:
+            target_region &= painted_side(surface, towards / length)
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     if sought.target_um is None:
         mean_um, _ = evenness(film_um[target_region], surface.vertex_areas_m2[target_region])

@@ -13,7 +13,6 @@ from paint_deposition.film.common_film import (
     TOTAL,
     Coats,
     CommonFilm,
-    LayeredFilm,
     require_same_film_effects,
 )
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
@@ -189,8 +188,7 @@ def simulate(
     surface = seen[0].surface
     point_zones = zones.on(surface) if zones else None
     common = _painted(surface.points(), seen, models, surface, 'single', progress)
-    layers = LayeredFilm(common, laid)
-    film_um = layers.film_um()
+    film_um = common.layer_um(laid)
     if film_um.max() < NO_PAINT_UM:
         geometry = seen[0].geometry
         cause = geometry.warnings[0] if geometry.warnings else geometry.sentence
@@ -218,22 +216,23 @@ def simulate(
         each = replace(each, layer=np.array('')) if coats else each
         part = Experiment.of('part', surface, seen[0].path, each)
         at_points = _painted(part.points, seen, models, surface, 'double', progress)
-        at_readings = LayeredFilm(at_points, laid)
         predicted_um = np.empty(len(part))
         for layer, seeing in laid.by_layer(readings.layer).items():
-            predicted_um[seeing] = at_readings.gauge_um(layer)[: len(part)][seeing]
+            predicted_um[seeing] = at_points.layer_gauge_um(laid, layer)[: len(part)][seeing]
         doubts = readings_in_doubt(surface, readings, predicted_um)
     return Film(
         surface, guns, film_um, statistics, readings, predicted_um, common.used, doubts,
-        tuple(_coats(surface, guns, layers)) if coats else (), point_zones,
+        tuple(_coats(surface, guns, common, laid)) if coats else (), point_zones,
     )  # fmt: skip
 
 
-def _coats(surface: Surface, guns: Sequence[GunFilm], layers: LayeredFilm) -> Iterator[CoatFilm]:
+def _coats(
+    surface: Surface, guns: Sequence[GunFilm], common: CommonFilm, coats: Coats
+) -> Iterator[CoatFilm]:
     """What each coat adds."""
-    for name in layers.coats.names:
-        rows = layers.coats.guns_of(name)
-        used, film_um = layers.guns.of_guns(rows).used, layers.film_um(name)
+    for name in coats.names:
+        rows = coats.guns_of(name)
+        used, film_um = common.of_guns(rows).used, common.layer_um(coats, name)
         statistics = film_statistics(film_um, surface.vertex_areas_m2, used.emitted_cm3)
         yield CoatFilm(name, tuple(guns[rows]), film_um, statistics, used)
 

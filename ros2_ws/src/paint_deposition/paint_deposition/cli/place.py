@@ -18,7 +18,7 @@ from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 from paint_deposition.request import MotionOptions
 
 if TYPE_CHECKING:
-    from paint_deposition.planning.part_place import PartPlaces
+    from paint_deposition.planning.driving import PartPlaces
 
 # Below this probability an effect is named as one that the part hardly shows.
 HARDLY = 0.15

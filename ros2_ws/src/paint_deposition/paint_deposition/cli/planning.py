@@ -124,7 +124,7 @@ def plan_command(
 
 
 def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
-    from paint_deposition.film.paint_used import paint_sentence
+    from paint_deposition.film.statistics import paint_sentence
 
     film, whole, gun = result.statistics, result.whole_part, result.envelope
     first = result.unoptimised if isinstance(result, pd.Plan) else None
@@ -137,7 +137,10 @@ def _plan_lines(result: pd.Plan | pd.PartPlan) -> Iterator[str]:
         f'{100 * whole.capture_fraction:.0f} %'
     )
     yield from zone_lines(film.zones, first.statistics.zones if first else {})
-    yield from filter(None, [paint_sentence(result), result.drive and result.drive.sentence])
+    yield from filter(
+        None,
+        [paint_sentence(result.paint, result.statistics), result.drive and result.drive.sentence],
+    )
     if not result.contacts:
         yield (
             f'gun ({2e3 * gun.radius_m:.0f} mm wide, {1e3 * gun.length_m:.0f} mm long) and the '

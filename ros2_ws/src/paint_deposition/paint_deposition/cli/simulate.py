@@ -114,7 +114,7 @@ def simulate_command(
 
 
 def _film_lines(film: pd.Film) -> Iterator[str]:
-    from paint_deposition.film.paint_used import paint_sentence
+    from paint_deposition.film.statistics import paint_sentence
 
     s, counts = film.statistics, film.counts
     laid_cm3 = sum(gun.painted_volume_cm3 for gun in film.guns)
@@ -139,7 +139,7 @@ def _film_lines(film: pd.Film) -> Iterator[str]:
             f'{s.painted_volume_cm3:.2f} of {s.emitted_volume_cm3:.2f} cm3 on the part, '
             f'capture fraction {100 * s.capture_fraction:.0f} %'
         )
-    yield from filter(None, [paint_sentence(film)])
+    yield from filter(None, [paint_sentence(film.paint, film.statistics)])
     yield max((gun.geometry for gun in film.guns), key=lambda of: of.facet_error).facet_sentence
     if counts.rejected or counts.gaps or counts.restarts:
         yield (

@@ -13,7 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError
 from paint_deposition.film.integrator import FilmIntegrator, after_film_effects, gauge_reading_um
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.film.paint_used import PaintUsed
+from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.motion.trajectory import PoseCounts
 
 # What a layer is called that has all coats.
@@ -190,23 +190,17 @@ class CommonFilm:
         """What some of the guns laid."""
         return CommonFilm(self.guns[rows])
 
+    def layer_um(self, coats: Coats, layer: str = TOTAL) -> np.ndarray:
+        """(V,) film of a layer [um], see ``Coats.films_of``.
 
-@dataclass(frozen=True)
-class LayeredFilm:
-    """What guns laid in coats: what acts on the finished film acts on each wet film by itself."""
+        What acts on the finished film acts on each wet film by itself.
+        """
+        return sum_um((sign, self.of_guns(rows).film_um) for sign, rows in coats.films_of(layer))
 
-    guns: CommonFilm
-    coats: Coats
-
-    def film_um(self, layer: str = TOTAL) -> np.ndarray:
-        """(V,) film of a layer [um], see ``Coats.films_of``."""
-        films = self.coats.films_of(layer)
-        return sum_um((sign, self.guns.of_guns(rows).film_um) for sign, rows in films)
-
-    def gauge_um(self, layer: str = TOTAL) -> np.ndarray:
+    def layer_gauge_um(self, coats: Coats, layer: str) -> np.ndarray:
         """(V,) what a gauge shows that sees this layer alone [um]."""
-        first = self.guns.guns[0]
-        return gauge_reading_um(self.film_um(layer), first.model.effects, first.points)
+        effects, points = self.guns[0].model.effects, self.guns[0].points
+        return gauge_reading_um(self.layer_um(coats, layer), effects, points)
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.paint_used import NO_PAINT, PaintUsed, impossible_brushes, paint_figures
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.film.statistics import FilmStatistics
+from paint_deposition.film.statistics import (
+    NO_PAINT,
+    FilmStatistics,
+    PaintUsed,
+    impossible_brushes,
+    paint_figures,
+)
 from paint_deposition.film.tabular import Tabular
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import PoseCounts, Trajectory
@@ -75,7 +80,7 @@ class CoatFilm:
             'name': self.name,
             'atomizers': [gun.name for gun in self.guns],
             **self.statistics.to_dict(),
-            'paint': paint_figures(self),
+            'paint': paint_figures(self.model, self.paint, self.statistics),
         }
 
 
@@ -191,7 +196,7 @@ class Film(Tabular):
             'down': self.surface.down.tolist(),
             'effects': list(dict.fromkeys(e.id for gun in self.guns for e in gun.model.effects)),
             'spraying_time_s': sum(gun.path.spraying_time_s for gun in self.guns),
-            'paint': paint_figures(self),
+            'paint': paint_figures(self.model, self.paint, self.statistics),
             'poses': self.counts.to_dict(),
             'geometry': self.guns[0].geometry.to_dict(),
             'atomizers': [gun.to_dict() for gun in self.guns],

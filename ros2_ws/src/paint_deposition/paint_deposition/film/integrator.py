@@ -6,7 +6,7 @@ come in. The film is the same to the last bit.
 
 import copy
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -15,14 +15,14 @@ from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.layout import (
     LinesOfSight,
-    Sight,
     compiled_laws,
     emission_points_m,
+    free_sight,
     model_constants,
     step_rows,
     term_constants,
 )
-from paint_deposition.film.paint_used import PaintUsed
+from paint_deposition.film.statistics import PaintUsed
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
 from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.motion.path import SprayPath
@@ -43,8 +43,11 @@ class Steps:
     """What the kernel reads of a path."""
 
     rows: np.ndarray  # (M, 16) sub-steps that spray, see ``layout.step_rows``
-    sight: Sight  # what is seen on them
     brush: np.ndarray  # (M,) row among the model's patterns of the one that sprays
+    # What is seen on them, see ``layout.Sight``.
+    seen: np.ndarray
+    first: np.ndarray
+    tracing: np.ndarray
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -52,7 +55,9 @@ class Steps:
     def of_brush(self, row: int) -> 'Steps':
         """The sub-steps on which one of the patterns sprays."""
         chosen = self.brush == row
-        return Steps(self.rows[chosen], self.sight.select(chosen), self.brush[chosen])
+        return replace(
+            self, rows=self.rows[chosen], brush=self.brush[chosen], tracing=self.tracing[chosen]
+        )
 
 
 class FilmIntegrator:
@@ -164,7 +169,7 @@ class FilmIntegrator:
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
         if not (self._lines_of_sight and self._shadowed):
-            return Steps(rows, Sight.free(len(rows), len(self._blocks.spheres)), brush)
+            return Steps(rows, brush, *free_sight(len(rows), len(self._blocks.spheres)))
         constants = model_constants(self.model)
         if reach is not None:
             constants[:, REACH] = reach
@@ -172,7 +177,7 @@ class FilmIntegrator:
             emission_points_m(self.model, path), rows, brush,
             constants.astype(self._real), self._traced_from,
         )  # fmt: skip
-        return Steps(rows, sight, brush)
+        return Steps(rows, brush, *sight)
 
     def _run(
         self, separate_terms: bool, steps: Steps, constants: np.ndarray,
@@ -180,9 +185,9 @@ class FilmIntegrator:
     ) -> None:  # fmt: skip
         blocks = self._blocks
         arguments = (
-            blocks.points, blocks.normals, steps.sight.seen, film, recent, terms, self._done,
-            blocks.spheres, blocks.bounds, steps.rows, steps.sight.first, steps.sight.tracing,
-            steps.brush, constants.astype(self._real), self._parameters,
+            blocks.points, blocks.normals, steps.seen, film, recent, terms, self._done,
+            blocks.spheres, blocks.bounds, steps.rows, steps.first, steps.tracing, steps.brush,
+            constants.astype(self._real), self._parameters,
         )  # fmt: skip
         kernel = compile_kernel(*self._variant, separate_terms)
 

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -127,24 +126,16 @@ SIGHT_STEP_M = 0.01
 RAYS_AT_ONCE = 200_000
 
 
-@dataclass(frozen=True)
-class Sight:
-    """What is seen on the sub-steps of a path."""
+# What is seen on M sub-steps: (N,) uint8, 1 where a point is seen, a run of points for each of S
+# tracings and each block; (S, B) where the run of a tracing and a block begins; and (M,) which
+# tracing holds.
+Sight = tuple[np.ndarray, np.ndarray, np.ndarray]
 
-    # (N,) uint8, 1 where a point is seen, a run of points for each tracing and block.
-    seen: np.ndarray
-    first: np.ndarray  # (S, B) where in ``seen`` the run of a tracing and a block begins
-    tracing: np.ndarray  # (M,) row of ``first`` that holds on each sub-step
 
-    def select(self, steps: np.ndarray) -> 'Sight':
-        """On some of the sub-steps."""
-        return Sight(self.seen, self.first, self.tracing[steps])
-
-    @staticmethod
-    def free(steps: int, blocks: int) -> 'Sight':
-        """Everything is seen on all sub-steps."""
-        run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
-        return Sight(run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64))
+def free_sight(steps: int, blocks: int) -> Sight:
+    """Everything is seen on all sub-steps."""
+    run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
+    return run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64)
 
 
 class LinesOfSight:
@@ -197,7 +188,7 @@ class LinesOfSight:
 
         with ThreadPoolExecutor(THREADS) as threads:
             list(threads.map(trace, _parts(sizes)))
-        return Sight(seen, first, tracing), traced[-1] if len(traced) else last_m
+        return (seen, first, tracing), traced[-1] if len(traced) else last_m
 
 
 def _tracings(origins_m: np.ndarray, last_m: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:

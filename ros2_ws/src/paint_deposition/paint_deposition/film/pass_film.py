@@ -107,34 +107,22 @@ def pass_film_um(
 
     ``velocity_m_per_s`` is negative backwards, ``roll_rad`` the direction of travel in the tool.
     """
-    points = SurfacePoints(x_m[:, None] * ACROSS, np.tile(OUTWARD, (len(x_m), 1)))
-    integrator = FilmIntegrator(points, model, precision='double')
-    integrator.add(_straight_pass(model, velocity_m_per_s, standoff_m, roll_rad, fineness))
-    return integrator.raw_um
-
-
-def _straight_pass(
-    model: DepositionModel,
-    velocity_m_per_s: float,
-    standoff_m: float,
-    roll_rad: float,
-    fineness: float,
-) -> SprayPath:
     along, length = _graded_steps(model, standoff_m, fineness)
-    count = len(along)
-    speed = abs(velocity_m_per_s)
-    way = math.copysign(1.0, velocity_m_per_s)
+    speed, way = abs(velocity_m_per_s), math.copysign(1.0, velocity_m_per_s)
     cos, sin = math.cos(roll_rad), math.sin(roll_rad)
     tool = np.stack([cos * TRAVEL - sin * ACROSS, sin * TRAVEL + cos * ACROSS, -OUTWARD], axis=1)
-    time_s = along / speed
-    return SprayPath.of(
-        stamp_ns=np.round(time_s * 1e9).astype(np.int64),
+    path = SprayPath.of(
+        stamp_ns=np.round(along / speed * 1e9).astype(np.int64),
         dwell_s=length / speed,
-        flow=np.ones(count),
+        flow=np.ones(len(along)),
         position_m=standoff_m * OUTWARD + way * along[:, None] * TRAVEL,
-        rotation=np.tile(tool, (count, 1, 1)),
-        velocity_m_per_s=np.tile(velocity_m_per_s * TRAVEL, (count, 1)),
+        rotation=np.tile(tool, (len(along), 1, 1)),
+        velocity_m_per_s=np.tile(velocity_m_per_s * TRAVEL, (len(along), 1)),
     )
+    points = SurfacePoints(x_m[:, None] * ACROSS, np.tile(OUTWARD, (len(x_m), 1)))
+    integrator = FilmIntegrator(points, model, precision='double')
+    integrator.add(path)
+    return integrator.raw_um
 
 
 def _widening(model: DepositionModel, standoff_m: float) -> float:

@@ -1,197 +1,25 @@
-"""How the gun ran over the part: passes, speed, standoff, lean of its axis, paint beside it."""
+"""How the gun ran over the part, and what the coarseness of its mesh costs the film."""
 
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.facet_error import facet_error
-from paint_deposition.film.gun_view import GunView
+from paint_deposition.film.gun_view import GunView, geometry_warnings
+from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path import SprayPath
-from paint_deposition.part.points import box_extent_m
+from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
-
-# No gun paints from so far away.
-FAR_M = 1.0
-# Part and path that differ so much in size are in different units.
-OTHER_UNIT = 100.0
-# Painters lean the gun, but less than this; an axis within 37 degrees of a direction points there.
-LEANING_DEG, REVERSED_DEG, ALONG_COSINE = 35.0, 135.0, 0.8
-# Standoffs further from the model plane than this share of its distance are odd.
-OFF_PLANE = 0.4
-# Passes lie aside if their middle is this far from the part's, and they run past its edge.
-ASIDE_M, PAST_EDGE_M = 0.2, 0.05
-# A pass with less of its paint over the part misses it.
-LEAST_LANDING = 0.02
-
-
-def geometry_warnings(view: GunView, frame_id: str = '') -> Iterator[str]:
-    """Yield what is odd, a line each with its likely cause; what follows from one is left out."""
-    sprayed_m = view.whole.position_m[view.whole.flow > 0.0]
-    boxes = (
-        f"the poses in frame '{frame_id}' span {_box(sprayed_m)}, the mesh "
-        f'{_box(view.surface.vertices_m)}'
-    )
-    alone = _other_unit(view) or _not_over(view, boxes)
-    if alone:
-        yield alone
-        return
-    aim = _wrong_axis(view, boxes) or _off_model_plane(view, boxes)
-    hitting = [
-        one for one, share in zip(view.passes, view.landing_of_passes, strict=True)
-        if share >= LEAST_LANDING
-    ]  # fmt: skip
-    aside = hitting and _aside(view, hitting) and _aside(view, view.passes)
-    if aim:
-        yield aim
-    if aside:
-        yield aside
-    elif not aim and len(hitting) < len(view.passes):
-        yield _missing(view)
-
-
-def _box(positions_m: np.ndarray) -> str:
-    ends = zip('xyz', positions_m.min(axis=0), positions_m.max(axis=0), strict=True)
-    return ', '.join(f'{axis} {low:.2f} to {high:.2f}' for axis, low, high in ends) + ' m'
-
-
-def _other_unit(view: GunView) -> str:
-    part, way = (
-        float(np.linalg.norm(box_extent_m(positions)))
-        for positions in (view.surface.vertices_m, view.path.position_m)
-    )
-    nominal = view.model.projection.nominal_standoff_m
-    off_plane = abs(float(np.median(view.distance_m)) - nominal) > OFF_PLANE * nominal
-    # No robot paints a part along a shorter path; one that only stands does so before the model
-    # plane.
-    if 0.0 < way < 0.01 and part > OTHER_UNIT * way and off_plane:
-        return (
-            f'the path is {way:.1g} m long, the part {part:.3g} m: the poses look a thousandfold '
-            'too small; leave out --pose-unit, or give the poses in metres'
-        )
-    if way > OTHER_UNIT * part:
-        return (
-            f'the poses look like millimetres: they span {way:.4g} m, the part {part:.3g} m; give '
-            '--pose-unit mm, or the poses in metres'
-        )
-    if way > 0.0 and part > OTHER_UNIT * way and view.distance_m.min() > FAR_M:
-        return (
-            f'the mesh looks like millimetres: it spans {part:.3g} m, the poses {way:.3g} m; use '
-            '--mesh-scale 0.001, or mesh_scale: 0.001 in a campaign'
-        )
-    return ''
-
-
-def _not_over(view: GunView, boxes: str) -> str:
-    if view.over.any():
-        return ''
-    nearest = float(view.distance_m.min())
-    if nearest < FAR_M:
-        return (
-            f'the passes miss the part, the gun runs beside it, {nearest:.2f} m away at the '
-            f"nearest: {boxes}; check the part's pose and the frame of the poses"
-        )
-    return (
-        f'the gun stays {nearest:.3g} m or more from the part, as if the poses were in another '
-        f'frame than the mesh: {boxes}; give the part in the frame of the poses with --part-pose, '
-        'in a campaign part_pose'
-    )
-
-
-def _wrong_axis(view: GunView, boxes: str) -> str:
-    lean = float(np.median(view.off_normal_deg[view.over]))
-    if lean < LEANING_DEG:
-        return ''
-    path = view.path.select(view.over)
-    travel = path.velocity_m_per_s / np.maximum(path.speed_m_per_s, 1e-9)[:, None]
-    along = float(np.median(np.abs(np.einsum('ij,ij->i', path.rotation[:, :, 2], travel))))
-    toward = np.einsum('nij,ni->nj', path.rotation, view.way[view.over]).mean(axis=0)
-    axis = int(np.abs(toward).argmax())
-    remedy = 'z must point from the bell to the surface'
-    known = abs(toward[axis]) > ALONG_COSINE
-    if known:
-        points = f'{"-" if toward[axis] < 0.0 else "+"}{"xyz"[axis]}'
-        remedy += f', where tool {points} points now; say --tool-axis {points.lstrip("+")}'
-    if along > ALONG_COSINE:
-        return f'tool z runs along the travel, {lean:.0f} degrees off the surface normal; {remedy}'
-    if lean > REVERSED_DEG and view.is_behind:
-        return (
-            'the gun is behind the part and looks away from it, as if the poses were shifted '
-            f'through the part, or tool z reversed and the mesh inside out: {boxes}'
-        )
-    if lean > REVERSED_DEG:
-        return f'tool z is reversed, it points away from the part; {remedy}'
-    if known:
-        return f'tool z is {lean:.0f} degrees off the surface normal; {remedy}'
-    return (
-        f'tool z is {lean:.0f} degrees off the surface normal, now this way and now that, as if '
-        f'the poses were in another frame than the mesh: {boxes}; {remedy}'
-    )
-
-
-def _off_model_plane(view: GunView, boxes: str) -> str:
-    nominal = view.model.projection.nominal_standoff_m
-    standoff = float(np.median(view.distance_m[view.over]))
-    if abs(standoff - nominal) < OFF_PLANE * nominal:
-        return ''
-    line = (
-        f'the TCP is {standoff:.2f} m from the surface, where the model plane is {nominal:.2f} m '
-        "from it: check that the TCP is the centre of the bell cup, and the part's pose; if they "
-        'are right, calibrate at this standoff'
-    )
-    return line if standoff < FAR_M else f'{line}; {boxes}'
-
-
-def _aside(view: GunView, passes: list[SprayPath]) -> str:
-    """Passes whose middle is not the part's: across them by their lines, along them by their ends.
-
-    Ends are medians over the passes: a gun without a trigger sprays on its way in and out, too.
-    """
-    outward = view.surface.outward
-    travel = np.concatenate([one.velocity_m_per_s for one in passes])
-    travel = travel - np.outer(travel @ outward, outward)
-    along = np.linalg.eigh(travel.T @ travel)[1][:, -1]
-    across = np.cross(outward, along)
-    lines = [np.median(one.position_m @ across) for one in passes]
-    ends = np.median([np.quantile(one.position_m @ along, [0, 1]) for one in passes], axis=0)
-    shift, past = np.zeros(3), 0.0
-    for way, low, high in ((across, min(lines), max(lines)), (along, *ends)):
-        part = view.surface.vertices_m @ way
-        before, behind = part.min() - low, high - part.max()
-        if abs(behind - before) > 2.0 * ASIDE_M and max(before, behind) > PAST_EDGE_M:
-            shift += 0.5 * (behind - before) * way
-            past = max(past, before, behind)
-    if not past:
-        return ''
-    axis = int(np.abs(shift).argmax())
-    direction = f'{"-" if shift[axis] < 0.0 else "+"}{"xyz"[axis]} of the mesh'
-    return (
-        f'the passes lie {np.linalg.norm(shift):.2f} m aside of the middle of the part, toward '
-        f'{direction}, and run {past:.2f} m past its edge there: unless only some of the '
-        "part was to be painted, the part's pose or the TCP is shifted"
-    )
-
-
-def _missing(view: GunView) -> str:
-    shares = view.landing_of_passes
-    missing = [str(k + 1) for k, share in enumerate(shares) if share < LEAST_LANDING]
-    which = f'pass {missing[0]} of {len(shares)} misses'
-    if len(missing) > 1:
-        which = f'passes {", ".join(missing[:-1])} and {missing[-1]} of {len(shares)} miss'
-    cause = "check the trigger, the part's pose and that the mesh is the whole part"
-    if np.all(view.whole.flow > 0.0):
-        cause = (
-            'no trigger is known, so the gun is taken to spray there, too; name it with '
-            '--state-topic'
-        )
-    return f'{which} the part, next to none of that paint goes over it: {cause}'
-
 
 # Distances from the surface are given without the few of approaches and ends.
 RANGE = (0.05, 0.95)
+# Sub-steps that stand for a longer path, and vertices among which the thickest film is looked for.
+SUB_STEPS, VERTICES = 4000, 2000
+# Where a curve begins the error goes with the edges, elsewhere with their square; by how much it
+# depends on where the first corner lies, so half of what the first says is advised.
+WANTED, SAFETY = 0.01, 0.5
 
 
 @dataclass(frozen=True)
@@ -210,7 +38,7 @@ class SprayGeometry:
     # Share of the spray's straight rays that meet the outward side of the part, 0 to 1.
     paint_over_part: float
     # Worst error of the film from flat facets of a curved part, as a share of the thickest film;
-    # see ``film.facet_error``.
+    # see ``facet_error``.
     facet_error: float
     warnings: tuple[str, ...] = ()  # what is odd, a line each, with its likely cause
 
@@ -246,7 +74,7 @@ def spray_geometry(
 
     Some of the path sprays; of the model, pattern and projection count, effects do not.
     """
-    facets = facet_error(surface, path, model)
+    facets, coarse = facet_error(surface, path, model)
     view = GunView(surface, path, model)
     low, middle, high, lean = [math.nan] * 4
     if view.over.any():
@@ -261,7 +89,67 @@ def spray_geometry(
         standoff_high_m=high,
         off_normal_deg=lean,
         paint_over_part=float(view.landing.mean()),
-        facet_error=facets.share,
+        facet_error=facets,
         # Wrong geometry also makes facets cost more: it is reported alone.
-        warnings=tuple(geometry_warnings(view, frame_id)) or tuple(filter(None, [facets.warning])),
+        warnings=tuple(geometry_warnings(view, frame_id)) or tuple(filter(None, [coarse])),
     )
+
+
+def facet_error(surface: Surface, path: SprayPath, model: DepositionModel) -> tuple[float, str]:
+    """How far the film is off because a curved part was cut into flat facets, and a warning.
+
+    The worst error is a share of the thickest film, 0 on a plane; over 1 % the warning says where
+    it is and what to do, else it is ''.
+
+    In the middle of each edge the film on the mesh is compared with that on a curve through the
+    corners, see ``part.creases``. On circular and on soft folds with radii of 40 to 530 mm, caps
+    and doors, cut into edges of 6 to 50 mm, the estimate was 0.74 to 1.32 times the worst true
+    error of the film, from 0.01 % to 13 % of its peak. Creases count as such and cost nothing.
+
+    The part is turned to the gun; of the model, pattern and projection count, effects do not.
+    """
+    edges = surface.curved_edges
+    if not len(edges):
+        return 0.0, ''
+    some = slice(None, None, 1 + len(surface.vertices_m) // VERTICES)
+    points = SurfacePoints(
+        np.concatenate([edges.middles_m, edges.curved_m, surface.vertices_m[some]]),
+        np.concatenate([edges.normals, edges.curved_normals, surface.normals[some]]),
+    )
+    painted = FilmIntegrator(points, model.model_copy(update={'effects': ()}))
+    painted.add(path.select(slice(None, None, 1 + len(path) // SUB_STEPS)))
+    film_um = painted.raw_um
+    count, peak_um = len(edges), film_um.max()
+    if peak_um == 0.0:
+        return 0.0, ''
+    error_um = np.abs(film_um[count : 2 * count] - film_um[:count])
+    worst = int(error_um.argmax())
+    share, edge_m = float(error_um[worst] / peak_um), float(edges.lengths_m[worst])
+    if share <= WANTED:
+        return share, ''
+    place = ', '.join(f'{value:.3f}' for value in edges.middles_m[worst])
+    return share, (
+        f'the mesh is coarser than its curvature allows: the film is off by up to '
+        f'{100 * share:.1f} % of its peak near ({place}) m, where an edge of '
+        f'{1e3 * edge_m:.0f} mm turns by {np.degrees(edges.turns_rad[worst]):.0f} degrees; export '
+        f'it finer, with edges of about {1e3 * SAFETY * edge_m * WANTED / share:.1g} mm there'
+    )
+
+
+def facet_errors_um(
+    surface: Surface, points: SurfacePoints, path: SprayPath, model: DepositionModel
+) -> np.ndarray:
+    """(P,) film on the curve that a mesh stands for less that on its facets, at points [um]."""
+    off_m, turns = surface.curved_edges.off_at(points.positions_m)
+    if not (off_m.any() or turns.any()):
+        return np.zeros(len(points))
+    normals = points.normals + turns
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    both = SurfacePoints(
+        np.concatenate([points.positions_m, points.positions_m + off_m]),
+        np.concatenate([points.normals, normals]),
+    )
+    painted = FilmIntegrator(both, model.model_copy(update={'effects': ()}))
+    painted.add(path)
+    flat_um, curved_um = np.split(painted.raw_um, 2)
+    return curved_um - flat_um

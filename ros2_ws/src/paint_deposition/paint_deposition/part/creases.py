@@ -1,14 +1,19 @@
-"""Creases, which split normals, and rims and hems, where the surface ends."""
+"""Edges of a mesh that was read: creases, which split normals, rims and hems, and cut curves."""
+
+from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.part.edges import (
+    BLOCK,
     Edges,
     cut_segments,
     half_edges_m,
     join,
     near_pairs,
+    next_half_edge,
     numbered,
     patch_of_vertex,
     without_seams,
@@ -22,11 +27,17 @@ CREASE_RAD = np.radians(30.0)
 RIM_FOLD_RAD = np.radians(60.0)
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
-# Folds that turn more slowly belong to a curved surface.
-WIDEST_STRIP_M = 0.02
+# Folds of less are none, and a strip between two folds of a hem is no wider.
 LEAST_FOLD_RAD = np.radians(4.0)
+WIDEST_STRIP_M = 0.02
+# Pieces of folds that are compared [m]; they lie beside each other if they are this parallel.
 PIECE_M = 0.005
 PARALLEL_COSINE = 0.8
+# Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
+LEAST_ERROR = 5e-4
+GUN_M = 0.3
+# Those that cost the most are kept.
+MOST_EDGES = 5_000
 
 
 def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
@@ -52,14 +63,39 @@ def _folds_rad(vertices, faces, normals, paired):
 def rim_folds(
     vertices_m: np.ndarray, faces: np.ndarray, edges: Edges, folds: np.ndarray
 ) -> np.ndarray:
-    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem."""
+    """(E,) bool: paired edges at which the surface ends by folding back, at once or in a hem.
+
+    A hem is a row of folds that together turn convexly by as much as a rim.
+    """
     rim = folds >= RIM_FOLD_RAD
     rows = np.flatnonzero(folds > LEAST_FOLD_RAD)
-    ends = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
+    ends_m = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
     beside = faces[edges.paired[rows] // 3].reshape(-1, 3)
     area = face_areas_m2(vertices_m, beside).reshape(-1, 2).min(axis=1)
-    width = 2.0 * area / np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-    rim[rows] |= hem_folds(ends, folds[rows], width, RIM_FOLD_RAD)
+    width_m = 2.0 * area / np.linalg.norm(ends_m[:, 1] - ends_m[:, 0], axis=1)
+    # Folds that turn more slowly belong to a curved surface.
+    close = folds[rows] > 20.0 * width_m
+    rows, ends_m = rows[close], ends_m[close]
+    if not len(rows):
+        return rim
+    along = ends_m[:, 1] - ends_m[:, 0]
+    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    along = along / length[:, None]
+    pieces, whose = cut_segments(ends_m, PIECE_M)
+    half = 0.5 * (length / np.bincount(whose))[whose]
+    middle = pieces.mean(axis=1)
+    fold = folds[rows]
+    turn = fold[whose]
+    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
+        i = i + block.start
+        parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
+        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
+        i, j = i[beside], j[beside]
+        ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
+        # Of a fold beside it in several pieces each counts as far as it lies abreast.
+        abreast = 0.5 + (half[j] - ahead) / (2.0 * np.minimum(half[i], half[j]))
+        turn += np.bincount(i, np.clip(abreast, 0.0, 1.0) * fold[whose[j]], minlength=len(turn))
+    rim[rows[np.bincount(whose, turn >= RIM_FOLD_RAD, minlength=len(rows)) > 0]] = True
     return rim
 
 
@@ -100,42 +136,6 @@ def rim_segments_m(
     )
 
 
-def hem_folds(
-    ends_m: np.ndarray, folds_rad: np.ndarray, width_m: np.ndarray, turn_rad: float
-) -> np.ndarray:
-    """(E,) bool: folds of which several in a row turn convexly by at least ``turn_rad``.
-
-    Of each its ends (E, 2, 3), its angle, positive if convex, and the height of the lower
-    triangle.
-    """
-    hem = np.zeros(len(folds_rad), dtype=bool)
-    # Folds that turn more slowly belong to a curved surface.
-    close = (folds_rad > LEAST_FOLD_RAD) & (folds_rad > 20.0 * width_m)
-    rows = np.flatnonzero(close)
-    if not len(rows):
-        return hem
-    along = ends_m[rows, 1] - ends_m[rows, 0]
-    length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
-    along = along / length[:, None]
-    pieces, whose = cut_segments(ends_m[rows], PIECE_M)
-    half = 0.5 * (length / np.bincount(whose))[whose]
-    middle = pieces.mean(axis=1)
-    fold = folds_rad[rows]
-    turn = fold[whose]
-    for block, i, j, _ in near_pairs(middle, middle, REACH_M):
-        i = i + block.start
-        parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
-        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
-        i, j = i[beside], j[beside]
-        ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
-        # Of a fold beside it in several pieces each counts as far as it lies abreast.
-        abreast = 0.5 + (half[j] - ahead) / (2.0 * np.minimum(half[i], half[j]))
-        turn += np.bincount(i, np.clip(abreast, 0.0, 1.0) * fold[whose[j]], minlength=len(turn))
-    rim = np.bincount(whose, turn >= turn_rad, minlength=len(rows)) > 0
-    hem[rows[rim]] = True
-    return hem
-
-
 def strip_vertices(
     vertices_m: np.ndarray, patches: np.ndarray, hem_half_edges: np.ndarray
 ) -> np.ndarray:
@@ -160,3 +160,111 @@ def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarra
         return np.zeros(count, dtype=bool)
     patch = patch_of_vertex(fine, count)
     return np.bincount(patch[: len(flagged)], flagged, minlength=patch.max() + 1)[patch] > 0
+
+
+@dataclass(frozen=True)
+class CurvedEdges:
+    """Middles of the E edges of a mesh at which it is furthest from the curve it stands for.
+
+    Between two corners the refined mesh is straight, and its normals turn evenly. A curve through
+    the corners does neither. Its slope against the edge, averaged along the edge, is zero, since
+    it leaves one corner and arrives at the other. The corners' normals say what the slope is at
+    both ends; with a parabola for the slope in between, which has that average, the curve's middle
+    is known:
+
+        lean = (n_a + n_b) . e / 2           slope that an even turn has, to be taken away
+        normal in the middle:  n - 1.5 lean e
+        point in the middle:   + length turn / 8 along n,   turn = (n_b - n_a) . e
+
+    with e along the edge (Vlachos et al., Curved PN triangles, 2001, for the same parabola). On a
+    plane both are zero. Where the curvature begins or ends, the corners' normals are off
+    themselves, and lean shows that, too.
+    """
+
+    # (E, 3) as the refined mesh has them [m], and outward unit normals.
+    middles_m: np.ndarray
+    normals: np.ndarray
+    # (E, 3) as the curve has them.
+    curved_m: np.ndarray
+    curved_normals: np.ndarray
+    lengths_m: np.ndarray  # (E,) of the edges as they were read [m]
+    turns_rad: np.ndarray  # (E,) by which the normals turn along the edge [rad]
+
+    def __len__(self) -> int:
+        return len(self.lengths_m)
+
+    def turned(self) -> 'CurvedEdges':
+        """The edges as seen from the surface's other side."""
+        return replace(self, normals=-self.normals, curved_normals=-self.curved_normals)
+
+    def off_at(self, positions_m: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """How far the curve is from the mesh at points on it, and by how much the normals turn.
+
+        What an edge's middle has fades toward its ends: at corners both are right. (P, 3) each, to
+        be added to positions [m] and normals.
+        """
+        if not len(self):
+            return np.zeros_like(positions_m), np.zeros_like(positions_m)
+        # A point within a triangle lies near the middles of its sides, and of few others.
+        near = min(8, len(self))
+        away_m, edge = scipy.spatial.cKDTree(self.middles_m).query(positions_m, range(1, near + 1))
+        fading = np.clip(1.0 - (2.0 * away_m / self.lengths_m[edge]) ** 2, 0.0, None) ** 2
+        off_m, turns = self.curved_m - self.middles_m, self.curved_normals - self.normals
+        return (
+            np.einsum('pk,pkx->px', fading, off_m[edge]),
+            np.einsum('pk,pkx->px', fading, turns[edge]),
+        )
+
+    @staticmethod
+    def of(
+        vertices_m: np.ndarray, normals: np.ndarray, faces: np.ndarray, half_edges: np.ndarray
+    ) -> 'CurvedEdges':
+        """Find them on the triangles of a file, whose smooth patches have corners of their own.
+
+        Of each edge one of its half-edges is given, or both.
+
+        Facets that meet at a crease, see CREASE_RAD, have corners and normals of their
+        own there: a crease is no curve. So is a curve that is drawn with facets at such angles.
+        """
+        bent = []
+        for some in np.array_split(half_edges, 1 + len(half_edges) // BLOCK):
+            edges = faces.ravel()[np.stack([some, next_half_edge(some)], axis=1)]
+            bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
+        edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
+        worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
+        edges = edges[worst_first[:MOST_EDGES]]
+        _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
+        start, end = edges.T
+        along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
+        normal = _unit(normals[start] + normals[end])
+        middle = 0.5 * (vertices_m[start] + vertices_m[end])
+        return CurvedEdges(
+            middle,
+            normal,
+            middle + sagitta[:, None] * normal,
+            _unit(normal - 1.5 * lean[:, None] * along),
+            lengths,
+            np.arccos(np.clip(np.einsum('ij,ij->i', normals[start], normals[end]), -1.0, 1.0)),
+        )
+
+
+def _bends(
+    vertices_m: np.ndarray, normals: np.ndarray, edges: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """What edges (E, 2) cost, their lengths, leans and sagittas."""
+    start, end = edges.T
+    along = vertices_m[end] - vertices_m[start]
+    length = np.linalg.norm(along, axis=1)
+    along /= np.maximum(length, 1e-12)[:, None]
+    at_start, at_end = (np.einsum('ij,ij->i', normals[v], along) for v in (start, end))
+    lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
+    cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
+    # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
+    return np.where(length < 0.004, 0.0, cost), length, lean, sagitta
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.maximum(np.linalg.norm(vectors, axis=1, keepdims=True), 1e-12)
+
+
+NO_EDGES = CurvedEdges(*[np.empty((0, 3))] * 4, *[np.empty(0)] * 2)

@@ -183,9 +183,8 @@ def _fill(vertices, faces, first, corner, start, stop, normals):
                 normal[axis] = (normal[axis] - slope) * cosine
 
 
-RADIUS_M = 0.03
-# Surface that has turned so far away from the gun within the radius lies round a rim.
-SAME_PLACE_M = 1e-6
+# Normals within this radius tell the curvature [m]; vertices so close are at one place [m].
+RADIUS_M, SAME_PLACE_M = 0.03, 1e-6
 
 
 def curvature_per_m(

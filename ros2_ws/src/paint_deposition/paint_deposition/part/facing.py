@@ -1,26 +1,13 @@
 """Whether a gun looks at the outward side of the part."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from paint_deposition.part.orientation import CANCELLED, ONE_SIDED, mean_normal
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
-
-
-@dataclass(frozen=True)
-class Facing:
-    """What the axis of the gun meets first, in poses."""
-
-    front: int  # poses that look at the outward side
-    back: int  # poses that look at the other side
-
-
-def facing(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Facing:
-    """Count what the gun looks at from TCPs (N, 3) [m] along its axis, tool z (N, 3)."""
-    return _met(surface, positions_m, z_axes)[0]
 
 
 def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
@@ -32,9 +19,9 @@ def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.nda
     it would stay bare, if most poses that look at it look at its back.
     """
     for positions_m, z_axes in motions:
-        seen, axes = _met(surface, positions_m, z_axes)
+        front, back, axes = facing(surface, positions_m, z_axes)
         if len(axes):
-            return _settled(surface, seen, axes)
+            return _settled(surface, front, back, axes)
     return surface
 
 
@@ -53,11 +40,11 @@ def turned(surface: Surface) -> Surface:
     )
 
 
-def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
+def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surface:
     """The part with the side outward that these poses look at."""
-    if seen.back > seen.front:
+    if back > front:
         note = (
-            f'{seen.back} of {seen.back + seen.front} poses look at the back of the mesh: its '
+            f'{back} of {back + front} poses look at the back of the mesh: its '
             'triangles were turned round'
         )
         surface = replace(turned(surface), notes=(*surface.notes, note))
@@ -72,14 +59,18 @@ def _settled(surface: Surface, seen: Facing, axes: np.ndarray) -> Surface:
     return surface if settled else known
 
 
-def _met(
+def facing(
     surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
-) -> tuple[Facing, np.ndarray]:
-    """What poses look at, and tool z (M, 3) of those that look at the surface."""
+) -> tuple[int, int, np.ndarray]:
+    """What the gun looks at from TCPs (N, 3) [m] along its axis, tool z (N, 3).
+
+    Returned are how many poses look at the outward side and how many at the other, and tool z
+    (M, 3) of both.
+    """
     some = slice(None, None, max(1, len(positions_m) // 2000))  # 2000 poses tell it
     positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
     face = surface.first_faces(positions_m, z_axes)
     met = face >= 0
     normals = face_normals(surface.vertices_m, surface.faces[face[met]])
     front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
-    return Facing(front, len(normals) - front), z_axes[met]
+    return front, len(normals) - front, z_axes[met]

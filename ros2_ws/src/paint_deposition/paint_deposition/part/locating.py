@@ -55,9 +55,11 @@ def locate(
     weights = _barycentric(tree.vertices_m[corners], place)
     outward = np.einsum('nk,nki->ni', weights, vertex_normals[corners])
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
-    distance = np.linalg.norm(points - place, axis=1)
-    angle = _angle(outward, None if normals is None else wanted)
-    return Location(place, outward, distance, angle)
+    angle = np.full(len(points), np.nan)
+    if normals is not None:
+        across = np.linalg.norm(np.cross(outward, wanted), axis=1)
+        angle = np.arctan2(across, np.einsum('ij,ij->i', outward, wanted))
+    return Location(place, outward, np.linalg.norm(points - place, axis=1), angle)
 
 
 @njit(cache=True, nogil=True)
@@ -154,11 +156,3 @@ def _barycentric(corners_m: np.ndarray, points_m: np.ndarray) -> np.ndarray:
     of_c = np.einsum('ij,ij->i', np.cross(b - a, points_m - a), whole) / size2
     weights = np.clip(np.stack([1.0 - of_b - of_c, of_b, of_c], axis=1), 0.0, 1.0)
     return weights / weights.sum(axis=1, keepdims=True)
-
-
-def _angle(outward: np.ndarray, normals: np.ndarray | None) -> np.ndarray:
-    if normals is None:
-        return np.full(len(outward), np.nan)
-    normals = np.asarray(normals, dtype=np.float64)
-    across = np.linalg.norm(np.cross(outward, normals), axis=1)
-    return np.arctan2(across, np.einsum('ij,ij->i', outward, normals))

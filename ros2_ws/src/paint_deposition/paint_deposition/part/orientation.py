@@ -6,7 +6,7 @@ import numpy as np
 CANCELLED = 0.1
 # Parts whose mean normal is longer have their surface on one side, give or take a flange.
 ONE_SIDED = 0.5
-# Surface of the side that the gun paints leans less than this from the side's mean.
+# Rounds in which the mean of the painted side settles, at the most.
 MOST_ROUNDS = 32
 # A part whose mean normal leans less than this from the horizontal plane stands.
 STANDING_COSINE = 0.7

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.kernel.blocks import neighbours_together
+from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.part import creases, derivatives, locating
+from paint_deposition.part.creases import NO_EDGES, CurvedEdges
 from paint_deposition.part.derivatives import surface_normals
 from paint_deposition.part.edges import Edges, edge_distance_m
-from paint_deposition.part.face_tree import FaceTree
-from paint_deposition.part.facets import NO_EDGES, CurvedEdges
+from paint_deposition.part.face_tree import FaceTree, first_hits
 from paint_deposition.part.locating import Location
 from paint_deposition.part.orientation import gravity, outward_side
 from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
@@ -150,7 +151,16 @@ class Surface:
 
     def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        return self.occluder.first_faces(starts_m, directions)
+        tree, met = self._tree, np.empty(len(starts_m), dtype=np.int64)
+        starts = np.ascontiguousarray(starts_m, dtype=np.float64)
+        ways = np.ascontiguousarray(directions, dtype=np.float64)
+
+        def fill(start: int, stop: int) -> None:
+            rays = starts[start:stop], ways[start:stop]
+            first_hits(*rays, tree.vertices_m, tree.faces, tree.nodes, met[start:stop])
+
+        shared_among_threads(len(starts), fill)
+        return np.where(met >= 0, tree.order[met], -1)
 
     def points(self) -> SurfacePoints:
         """The vertices, with their areas; covariates are computed when used."""

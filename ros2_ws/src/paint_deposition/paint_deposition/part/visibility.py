@@ -16,7 +16,6 @@ from paint_deposition.part.face_tree import (
     DEPTH,
     FaceTree,
     box_distance,
-    first_hits,
     leaf_faces,
     support,
     wait,
@@ -172,19 +171,6 @@ class Occluder:
             eyes.reshape(-1, 3), direction.reshape(-1, 3), length.ravel() - CLEARANCE_M
         )
         return ~blocked.reshape(length.shape)
-
-    def first_faces(self, starts_m: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """(N,) the triangle that each ray meets first, from either side, -1 for none."""
-        tree, met = self._tree(), np.empty(len(starts_m), dtype=np.int64)
-        starts = np.ascontiguousarray(starts_m, dtype=np.float64)
-        ways = np.ascontiguousarray(directions, dtype=np.float64)
-
-        def fill(start: int, stop: int) -> None:
-            rays = starts[start:stop], ways[start:stop]
-            first_hits(*rays, tree.vertices_m, tree.faces, tree.nodes, met[start:stop])
-
-        shared_among_threads(len(starts), fill)
-        return np.where(met >= 0, tree.order[met], -1)
 
     def horizon_sines(self, points_m: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(N,) sine of the highest elevation at which a point sees any of the part.

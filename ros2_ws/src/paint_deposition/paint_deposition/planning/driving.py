@@ -1,11 +1,13 @@
-"""A planned motion as a robot can drive it: its joints, and as slow as they need it to be."""
+"""A planned motion as a robot can drive it, and where the part may stand for all of it."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.ndimage import minimum_filter
 from scipy.spatial.transform import Rotation, Slerp
 
 from paint_deposition.errors import PlanError
@@ -17,13 +19,14 @@ from paint_deposition.planning.clearance import rows_apart
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,
+    ROUNDS,
     JointPace,
     PassLimit,
     Start,
-    Ways,
-    follow,
-    settled,
-    starts,
+    fastest_way,
+    rolled,
+    towards,
+    ways_of,
 )
 
 # Joints are looked at this often along the planned motion [s].
@@ -116,9 +119,7 @@ class RobotCell:
             PlanError: the robot does not reach all poses.
         """
         arm, first_ns = self.arm, int(trajectory.stamps_ns[0])
-        times_s = _times(trajectory)
-        positions, turns = self.poses(trajectory, times_s)
-        joints, begun = _joints(arm, positions, turns, times_s, free_roll, begin)
+        times_s, _, joints, begun = self._joints(trajectory, free_roll, begin)
         # A joint of which nothing more is known reaches its full speed in this time [s].
         most = arm.fastest / 0.25
         if self.acceleration is not None:
@@ -132,12 +133,12 @@ class RobotCell:
             later_s = np.interp(1e-9 * (stamps_ns - first_ns), times_s, reached_s)
             return first_ns + np.round(1e9 * later_s).astype(np.int64)
 
-        rolled = Rotation.from_quat(trajectory.quaternions_xyzw) * _roll(begun.roll_rad)
+        turns = Rotation.from_quat(trajectory.quaternions_xyzw) * rolled(begun[1])
         slowed = replace(
             trajectory,
             stamps_ns=slowed_ns(trajectory.stamps_ns),
             trigger_stamps_ns=slowed_ns(trajectory.trigger_stamps_ns),
-            quaternions_xyzw=rolled.as_quat(),
+            quaternions_xyzw=turns.as_quat(),
         )
         values = np.linalg.svd(arm.jacobians(joints)[2], compute_uv=False)
         limits = pace.limits(spray_pass, shares)
@@ -149,9 +150,7 @@ class RobotCell:
         """Travels (N,) along a motion, in the frame of the part, and the speeds (N,) [m/s] there
         at which a joint runs at its greatest speed; and the configuration in which it begins.
         """
-        times_s = _times(trajectory)
-        positions, turns = self.poses(trajectory, times_s)
-        joints, begun = _joints(self.arm, positions, turns, times_s, False)
+        _, positions, joints, begun = self._joints(trajectory, False)
         steps_m = np.linalg.norm(np.diff(positions, axis=0), axis=1)
         share = np.abs(np.diff(joints, axis=0)) / (1.0 - MARGIN) / self.arm.fastest
         speed = steps_m / np.maximum(share.max(axis=1), 1e-9)
@@ -167,12 +166,49 @@ class RobotCell:
         """
         times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
         positions, turns = self.poses(trajectory, times_s)
-        _, ways = _ways(self.arm, positions, turns, free_roll)
-        if not len(ways.whole):
-            return float(ways.reached.max(initial=0)) / TRIED, 0.0, 0.0
-        joints = ways.joints[_best(self.arm, ways, times_s)]
+        _, ways, reached = ways_of(self.arm, positions, turns, free_roll)
+        if not (reached == TRIED).any():
+            return float(reached.max(initial=0)) / TRIED, 0.0, 0.0
+        joints = ways[fastest_way(self.arm, ways, reached, times_s)]
         speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
         return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
+
+    def _joints(
+        self, trajectory: Trajectory, free_roll: bool, begin: Start | None = None
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Start]:
+        """Follow a motion by the way that is driven the fastest.
+
+        Returned are times (N,) [s], positions (N, 3) [m] in the robot's base, joints (N, J), and
+        the configuration in which they begin.
+        """
+        count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
+        times_s = np.linspace(0.0, trajectory.duration_s, count)
+        positions_m, turns = self.poses(trajectory, times_s)
+        rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
+        some_s, some_m = times_s[rows], positions_m[rows]
+        begins, ways, reached = ways_of(self.arm, some_m, turns[rows], free_roll, begin)
+        if not begins:
+            raise PlanError(
+                f'the robot does not reach the first pose, {_words(some_m[0])} m in its base; '
+                'check --part-pose, or let paint place look where the part may stand'
+            )
+        far = int(reached.max())
+        if far < len(rows):
+            raise PlanError(
+                f'the robot follows the motion to {some_s[far]:.1f} of {some_s[-1]:.1f} s and not '
+                f'beyond {_words(some_m[far])} m in its base, in none of {len(begins)} '
+                'configurations; let paint place look where the part may stand'
+            )
+        best = fastest_way(self.arm, ways, reached, some_s)
+        axes = (turns * rolled(begins[best][1])).as_matrix()
+        near = PchipInterpolator(some_s, ways[best])(times_s)
+        joints, error = towards(self.arm, near, positions_m, axes, ROUNDS)
+        if error.max() > REACHED:
+            raise PlanError(
+                f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m '
+                'in its base; let the part stand elsewhere, paint place shows where'
+            )
+        return times_s, positions_m, joints, begins[best]
 
     def poses(self, trajectory: Trajectory, times_s: np.ndarray) -> tuple[np.ndarray, Rotation]:
         """Positions (N, 3) and turns of the tool in the robot's base at times (N,)."""
@@ -180,88 +216,6 @@ class RobotCell:
         clock_s = 1e-9 * (in_base.stamps_ns - in_base.stamps_ns[0])
         turns = Slerp(clock_s, Rotation.from_quat(in_base.quaternions_xyzw))
         return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
-
-
-def _joints(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    times_s: np.ndarray,
-    free_roll: bool,
-    begin: Start | None = None,
-) -> tuple[np.ndarray, Start]:
-    """Joints (N, J) for poses in the robot's base, and the configuration in which they begin."""
-    rows = rows_apart(positions_m, turns, 0.02, math.radians(3.0))
-    way, begun = _best_way(arm, positions_m[rows], turns[rows], times_s[rows], free_roll, begin)
-    axes = (turns * _roll(begun.roll_rad)).as_matrix()
-    joints, error = settled(arm, PchipInterpolator(times_s[rows], way)(times_s), positions_m, axes)
-    if error.max() > REACHED:
-        raise PlanError(
-            f'the robot stands in a singularity near {_words(positions_m[error.argmax()])} m in '
-            'its base; let the part stand elsewhere, paint place shows where'
-        )
-    return joints, begun
-
-
-def _roll(roll_rad: float) -> Rotation:
-    return Rotation.from_rotvec([0.0, 0.0, roll_rad])
-
-
-def _best_way(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    times_s: np.ndarray,
-    free_roll: bool,
-    begin: Start | None,
-) -> tuple[np.ndarray, Start]:
-    """(N, J), of all ways through the poses the one that is driven the fastest, and its begin."""
-    begins, ways = _ways(arm, positions_m, turns, free_roll, begin)
-    if not begins:
-        raise PlanError(
-            f'the robot does not reach the first pose, {_words(positions_m[0])} m in its base; '
-            'check --part-pose, or let paint place look where the part may stand'
-        )
-    if not len(ways.whole):
-        far = int(ways.reached.max())
-        raise PlanError(
-            f'the robot follows the motion to {times_s[far]:.1f} of {times_s[-1]:.1f} s and not '
-            f'beyond {_words(positions_m[far])} m in its base, in none of {len(begins)} '
-            'configurations; let paint place look where the part may stand'
-        )
-    best = _best(arm, ways, times_s)
-    return ways.joints[best], begins[best]
-
-
-def _ways(
-    arm: Arm,
-    positions_m: np.ndarray,
-    turns: Rotation,
-    free_roll: bool,
-    chosen: Start | None = None,
-) -> tuple[list[Start], Ways]:
-    begin = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
-    axes = np.reshape([(turns * _roll(one.roll_rad)).as_matrix() for one in begin],
-                      (len(begin), len(positions_m), 3, 3))  # fmt: skip
-    joints = np.reshape([one.joints for one in begin], (len(begin), len(arm)))
-    positions = np.broadcast_to(positions_m, (len(begin), *positions_m.shape))
-    return begin, follow(arm, joints, positions, axes)
-
-
-def _best(arm: Arm, ways: Ways, times_s: np.ndarray) -> int:
-    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
-    joints = ways.joints[ways.whole]
-    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
-    late = np.maximum(speeds.max(axis=2), 1.0)
-    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
-    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
-    return int(ways.whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
-
-
-def _times(trajectory: Trajectory) -> np.ndarray:
-    """(N,) times at which the joints are looked at [s]."""
-    count = max(4, math.ceil(trajectory.duration_s / STEP_S) + 1)
-    return np.linspace(0.0, trajectory.duration_s, count)
 
 
 def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
@@ -278,3 +232,109 @@ def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
 
 def _words(place_m: np.ndarray) -> str:
     return '(' + ', '.join(f'{value:.2f}' for value in place_m) + ')'
+
+
+@dataclass(frozen=True)
+class PartPlaces:
+    """What a robot can do with the part at each place of a grid, all poses alike but for x and y.
+
+    Attributes:
+        cell: the robot, with the part where it was said to stand.
+        x_m, y_m: (X,) and (Y,) places of the part in the robot's base.
+        reached: (Y, X) share of the motion that is followed.
+        speed: (Y, X) share of the planned speed at the slowest moment; 0 where not all is reached.
+        room: (Y, X) least distance of a joint from its limits, as a share of its range.
+    """
+
+    cell: RobotCell
+    x_m: np.ndarray
+    y_m: np.ndarray
+    reached: np.ndarray
+    speed: np.ndarray
+    room: np.ndarray
+
+    @property
+    def good(self) -> np.ndarray:
+        """(Y, X) bool, places from which the robot is as fast as it can be from any."""
+        return self.speed >= min(1.0, self.speed.max())
+
+    @property
+    def amid(self) -> np.ndarray:
+        """(Y, X) bool, those all of whose neighbours were tried and are good too."""
+        return minimum_filter(self.good, 3, mode='constant', cval=False)
+
+    @property
+    def best(self) -> tuple[int, int]:
+        """Row and column of the place to choose: amid good ones if it can, with most room."""
+        score = np.where(self.amid if self.amid.any() else self.good, self.room, -1.0)
+        return divmod(int(score.argmax()), len(self.x_m))
+
+    @property
+    def part_pose(self) -> tuple[float, ...]:
+        """Pose of the part at the best place: x y z [m] and qx qy qz qw."""
+        row, column = self.best
+        return _placed(self.cell.part, self.x_m[column], self.y_m[row]).values
+
+    @property
+    def sentence(self) -> str:
+        """The answer in a sentence."""
+        whole, count = int((self.reached == 1.0).sum()), self.reached.size
+        if not whole:
+            row, column = divmod(int(self.reached.argmax()), len(self.x_m))
+            return (
+                f'from none of {count} places the robot drives the whole motion; from '
+                f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it follows '
+                f'{100 * self.reached.max():.0f} % of it'
+            )
+        row, column = self.best
+        return (
+            f'from {whole} of {count} places the robot drives the whole motion, from '
+            f'{int((self.speed == 1.0).sum())} of them as fast as planned; at '
+            f'({self.x_m[column]:.2f}, {self.y_m[row]:.2f}) m it keeps '
+            f"{100 * self.room[row, column]:.0f} % of a joint's range from the limits"
+            + (
+                ''
+                if self.amid[row, column]
+                else '; not all places beside it were tried and are as good'
+            )
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """The figures by name."""
+        arrays = ('x_m', 'y_m', 'reached', 'speed', 'room')
+        return {
+            'sentence': self.sentence,
+            'part_pose': self.part_pose if self.speed.max() > 0.0 else None,
+            **{name: getattr(self, name).tolist() for name in arrays},
+        }
+
+
+def part_places(
+    trajectory: Trajectory,
+    cell: RobotCell,
+    x_m: np.ndarray,
+    y_m: np.ndarray,
+    free_roll: bool = False,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+) -> PartPlaces:
+    """Try a motion, in the part's frame, with the part at each place of a grid.
+
+    ``cell.part`` gives the height and the turn of the part.
+
+    Raises:
+        PlanError: the grid is empty.
+    """
+    if not len(x_m) or not len(y_m):
+        raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
+    shape = len(y_m), len(x_m)
+    reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    for number, (row, column) in enumerate(np.ndindex(shape)):
+        progress('places', number / reached.size)
+        part = _placed(cell.part, x_m[column], y_m[row])
+        tried = replace(cell, part=part).reachability(trajectory, free_roll)
+        reached[row, column], speed[row, column], room[row, column] = tried
+    return PartPlaces(cell, x_m, y_m, reached, speed, room)
+
+
+def _placed(part: Rigid, x_m: float, y_m: float) -> Rigid:
+    return replace(part, translation_m=np.array([x_m, y_m, part.translation_m[2]]))

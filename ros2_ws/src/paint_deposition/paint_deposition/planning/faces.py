@@ -1,4 +1,4 @@
-"""The faces of a part: blending at their seams, their order, and the motion from face to face.
+"""Passes for a part that one raster does not cover: its faces one by one, and from face to face.
 
 The faces overlap at their seams, because the spray of each reaches beyond it. Two things even
 that out on the film of all faces together: how far from its seams each face is sprayed, found by
@@ -9,18 +9,22 @@ least squares, since the film is linear in it.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.optimize import lsq_linear
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.part.sprayable_faces import Face
+from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
+from paint_deposition.part.zones import PointZones
+from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.passes import (
     PassStyle,
     PlannedPass,
@@ -28,10 +32,11 @@ from paint_deposition.planning.passes import (
     planned_moves,
     trajectory_of,
 )
-from paint_deposition.planning.plan import plan
-from paint_deposition.planning.planned_film import WantedFilm, evenness
-from paint_deposition.planning.requests import PlanRequest
-from paint_deposition.planning.surface_map import SurfaceMap
+from paint_deposition.planning.plan import Plan, plan
+from paint_deposition.planning.planned_film import PlannedFilm, WantedFilm, evenness, predicted
+from paint_deposition.planning.programme import Programme, moves_of
+from paint_deposition.planning.requests import GunEnvelope, PlanRequest
+from paint_deposition.planning.retiming import retime_for_evenness
 
 # Margins along the seams that are tried, as shares of the overspray.
 MARGINS = (0.0, 0.35, 0.7, 1.0)
@@ -49,98 +54,189 @@ class FacePasses:
         return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
 
 
-@dataclass(frozen=True)
-class _FaceFilms:
-    """Passes on every face for one margin, and the film of each pass on the whole part."""
+@dataclass(frozen=True, kw_only=True, repr=False)
+class PartPlan(PlannedFilm):
+    """Passes on all faces of a part, with the film that the model predicts.
 
+    Attributes:
+        faces: sprayed, the largest first.
+        margin_m: by how much each face is sprayed less far than its seams.
+        sigma_n_unblended: sigma_n without margins, each face for itself.
+    """
+
+    faces: tuple[Face, ...]
     margin_m: float
-    faces: tuple[FacePasses, ...]
-    maps: tuple[SurfaceMap, ...]
-    films_um: np.ndarray
+    sigma_n_unblended: float
+
+    @property
+    def sentence(self) -> str:
+        """The plan in a sentence."""
+        speeds = self.sprayed_speeds_m_per_s
+        return (
+            f'{self._faces}, {len(self.passes)} {self.request.direction} passes at '
+            f'{min(speeds):.3g} to {max(speeds):.3g} m/s: {super().sentence}'
+        )
+
+    @property
+    def _faces(self) -> str:
+        return '1 face' if len(self.faces) == 1 else f'{len(self.faces)} faces'
+
+    @property
+    def comparison(self) -> str:
+        """What blending is worth, in a sentence."""
+        return (
+            f'{self._faces} without blending {100 * self.sigma_n_unblended:.1f} %, '
+            f'sprayed {1e3 * self.margin_m:.0f} mm less far at the seams and with '
+            f'{"speeds along" if self.request.optimise else "a time for"} each pass '
+            f'{100 * self.sigma_n:.1f} %'
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Figures of the plan."""
+        return super().to_dict() | {
+            'faces': [
+                {'area_m2': face.surface.area_m2, 'outward': face.surface.outward.tolist()}
+                for face in self.faces
+            ],
+            'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
+            'margin_m': self.margin_m,
+            'sigma_n_unblended': self.sigma_n_unblended,
+        }  # fmt: skip
 
 
-def blend(
+def plan_faces(
+    surface: Surface,
+    model: DepositionModel,
+    request: PlanRequest,
+    frame_id: str = '',
+    widest_rad: float = WIDEST_RAD,
+    envelope: GunEnvelope | None = None,
+    progress: Callable[[str, float], None] = lambda what, share: None,
+    zones: PointZones | None = None,
+) -> PartPlan:
+    """Split a part into faces, plan each, blend them, and order them for least travel.
+
+    What faces away from ``request.outward``, if given, stays bare. To optimise is to choose the
+    speeds along all passes, and where the gun opens and closes, for an even film on all faces
+    together. Normals of a face turn from its mean by ``widest_rad`` at the most.
+
+    Raises:
+        PlanError: a face has no passes, or the film is less even than the tolerance.
+    """
+    envelope = envelope or GunEnvelope()
+    faces = _facing_gun(sprayable_faces(surface, widest_rad), request)
+    painted = np.zeros(len(surface.vertices_m), dtype=bool)
+    painted[np.concatenate([face.vertices for face in faces])] = True
+    wanted = WantedFilm.of(surface, painted, request.target_um, zones)
+    # One film for all: the zones are left to the speeds along the passes.
+    each = request.model_copy(
+        update={'outward': None, 'tolerance': None, 'target_um': wanted.target_um}
+    )
+    margin_m, laid, unblended = _blended(surface, model, each, faces, wanted, progress)
+    running = order_faces(laid)
+    progress('motion', 0.0)
+    trajectory, moves = join_motions(
+        running, frame_id, lambda way: not contacts(surface, way, envelope)
+    )
+    if request.optimise:
+        asked = request.improvement(running[0].style.overspray_m, request.target_um)
+        retimed = retime_for_evenness(
+            surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
+        ).programme
+        trajectory, moves = retimed.trajectory(), tuple(moves_of(retimed, asked))
+    found = predicted(surface, model, request, wanted, trajectory)
+    sigma_n = found['sigma_n']
+    if request.tolerance is not None and sigma_n > request.tolerance:
+        raise PlanError(
+            f'no passes on {len(faces)} face(s) keep sigma_n within '
+            f'{100 * request.tolerance:g} %; the closest is {100 * sigma_n:.2f} %: '
+            'allow that much, or narrower faces (--face-angle-deg)'
+        )
+    return PartPlan(
+        **found, passes=tuple(planned for face in running for planned in face.passes),
+        moves=moves, faces=faces, margin_m=margin_m,
+        sigma_n_unblended=unblended,
+    )  # fmt: skip
+
+
+def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ...]:
+    """Without those on the back, if the direction to the gun is given."""
+    if request.outward is None:
+        return faces
+    side = np.asarray(request.outward) / np.linalg.norm(request.outward)
+    # Faces that turn further from the side of the gun are its back.
+    kept = tuple(face for face in faces if face.surface.outward @ side > -0.1)
+    if not kept:
+        raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
+    return kept
+
+
+def _blended(
     surface: Surface,
     model: DepositionModel,
     request: PlanRequest,
     faces: tuple[Face, ...],
     wanted: WantedFilm,
     progress: Callable[[str, float], None],
-) -> tuple[float, tuple[FacePasses, ...], float]:
+) -> tuple[float, list[FacePasses], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
     Even is the film over its own target, where one is wanted. Returned are the margin, by how much
     each face is sprayed less far than its seams [m], the passes of the faces, each at its speed,
     and sigma_n without margin, each face for itself.
     """
-    overspray_m, tried = 0.0, []
-    for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
-        progress('faces', number / len(MARGINS))
-        tried.append(_lay_faces(surface, model, request, faces, share * overspray_m, wanted))
-        overspray_m = tried[0].faces[0].style.overspray_m
     area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
     target = request.target_um if request.speed_m_per_s is None else None
-    dwells = [_dwell(trial, area_m2, target) for trial in tried]
-    sigmas = [
-        evenness(dwell @ trial.films_um, area_m2)[1]
-        for dwell, trial in zip(dwells, tried, strict=True)
-    ]
-    best = int(np.argmin(sigmas))
-    _, before = evenness(tried[0].films_um.sum(axis=0), area_m2)
-    return tried[best].margin_m, _with_dwell(tried[best], dwells[best], request), before
-
-
-def _lay_faces(
-    surface: Surface,
-    model: DepositionModel,
-    request: PlanRequest,
-    faces: tuple[Face, ...],
-    margin_m: float,
-    wanted: WantedFilm,
-) -> _FaceFilms:
-    passes, maps, films = [], [], []
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
-    for face in faces:
-        planned = plan(face.without_margin(margin_m).surface, model, request)
-        passes.append(FacePasses(planned.passes, planned.style))
-        maps.append(planned.line_films.surface_map)
-        for one in planned.passes:
-            path, _ = spray_path(trajectory_of((one,), planned.style), max_step_m=model.max_step_m)
-            integrator.reset()
-            integrator.add(path)
-            films.append(integrator.raw_um / wanted.share)
-    return _FaceFilms(margin_m, tuple(passes), tuple(maps), np.array(films))
+    overspray_m, unblended, tried = 0.0, math.nan, []
+    for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
+        progress('faces', number / len(MARGINS))
+        margin_m, films = share * overspray_m, []
+        plans = [plan(face.without_margin(margin_m).surface, model, request) for face in faces]
+        for face in plans:
+            for one in face.passes:
+                path, _ = spray_path(
+                    trajectory_of((one,), face.style), max_step_m=model.max_step_m
+                )
+                integrator.reset()
+                integrator.add(path)
+                films.append(integrator.raw_um / wanted.share)
+        films_um = np.array(films)
+        dwell = _dwell(films_um, area_m2, target)
+        tried.append((evenness(dwell @ films_um, area_m2)[1], margin_m, plans, dwell))
+        if not number:
+            overspray_m = plans[0].style.overspray_m
+            _, unblended = evenness(films_um.sum(axis=0), area_m2)
+    _, margin_m, plans, dwell = min(tried, key=lambda one: one[0])
+    return margin_m, _with_dwell(plans, dwell, request), unblended
 
 
-def _dwell(trial: _FaceFilms, area: np.ndarray, target_um: float | None) -> np.ndarray:
+def _dwell(films_um: np.ndarray, area: np.ndarray, target_um: float | None) -> np.ndarray:
     """(n,) time on each pass, over what it is on its face alone, for an even film of all."""
     weight = area / area.sum()
-    films = trial.films_um
-    wanted = target_um or float(weight @ films.sum(axis=0))
-    rows = np.sqrt(weight)[:, np.newaxis] * films.T / wanted
+    wanted = target_um or float(weight @ films_um.sum(axis=0))
+    rows = np.sqrt(weight)[:, np.newaxis] * films_um.T / wanted
     # The times stay within half and twice those for evenness on each face alone, and near them.
-    ridge = 0.02 * np.eye(len(films)) / math.sqrt(len(films))
+    ridge = 0.02 * np.eye(len(films_um)) / math.sqrt(len(films_um))
     return lsq_linear(
         np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), (0.5, 2.0)
     ).x
 
 
 def _with_dwell(
-    trial: _FaceFilms, dwell: np.ndarray, request: PlanRequest
-) -> tuple[FacePasses, ...]:
+    plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest
+) -> list[FacePasses]:
     """The passes at their new speeds, with a lead-in to match."""
-    found, first = [], 0
-    for face, surface_map in zip(trial.faces, trial.maps, strict=True):
+    found, shares = [], iter(dwell.tolist())
+    for face in plans:
         passes = []
         for number, planned in enumerate(face.passes):
-            style = replace(
-                face.style, speed_m_per_s=planned.speed_m_per_s / float(dwell[first + number])
-            )
+            style = replace(face.style, speed_m_per_s=planned.speed_m_per_s / next(shares))
             backwards = bool(number % 2) and not request.one_way
+            surface_map = face.line_films.surface_map
             passes.append(plan_pass(surface_map, planned.across_m, style, backwards))
-        first += len(passes)
         found.append(FacePasses(tuple(passes), face.style))
-    return tuple(found)
+    return found
 
 
 # --- order, and the way from face to face
@@ -213,28 +309,23 @@ def _between(
 
 
 def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
-    """One motion after the other; each begins where the one before ends."""
-    clock, shifts = 0, []
+    """One motion after the other; where one ends and the next begins there is one pose."""
+    clock_ns = 0
+    pieces: list[tuple[np.ndarray, ...]] = []
     for part in parts:
-        shifts.append(clock - int(part.stamps_ns[0]))
-        clock += int(part.stamps_ns[-1] - part.stamps_ns[0])
-
-    def rows(name: str, number: int) -> np.ndarray:
-        # Where one ends and the next begins there is one pose.
-        return getattr(parts[number], name)[1 if number else 0 :]
-
-    numbers = range(len(parts))
-    return Trajectory(
-        np.concatenate([rows('stamps_ns', k) + shifts[k] for k in numbers]),
-        np.concatenate([rows('positions_m', k) for k in numbers]),
-        np.concatenate([rows('quaternions_xyzw', k) for k in numbers]),
-        frame_id=frame_id,
-        trigger_stamps_ns=np.concatenate(
-            [parts[k].trigger_stamps_ns + shifts[k] for k in numbers]
-        ),
-        trigger_flow=np.concatenate([part.trigger_flow for part in parts]),
-        trigger_brush=np.concatenate([part.trigger_brush for part in parts]),
+        shift_ns, rows = clock_ns - int(part.stamps_ns[0]), slice(1 if pieces else 0, None)
+        pieces.append((
+            part.stamps_ns[rows] + shift_ns, part.positions_m[rows], part.quaternions_xyzw[rows],
+            part.trigger_stamps_ns + shift_ns, part.trigger_flow, part.trigger_brush,
+        ))  # fmt: skip
+        clock_ns += int(part.stamps_ns[-1] - part.stamps_ns[0])
+    stamps, positions, quaternions, switched, flow, brush = map(
+        np.concatenate, zip(*pieces, strict=True)
     )
+    return Trajectory(
+        stamps, positions, quaternions, frame_id=frame_id,
+        trigger_stamps_ns=switched, trigger_flow=flow, trigger_brush=brush,
+    )  # fmt: skip
 
 
 def _reversed(planned: PlannedPass) -> PlannedPass:

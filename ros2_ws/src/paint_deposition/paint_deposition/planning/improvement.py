@@ -18,12 +18,7 @@ from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
 from paint_deposition.planning.planned_film import WantedFilm, evenness
-from paint_deposition.planning.programme import (
-    STANDING_M,
-    Programme,
-    Strokes,
-    speed_along,
-)
+from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
 from paint_deposition.planning.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
@@ -65,8 +60,7 @@ class FilmSummary:
         region = wanted.region
         film, area = film_um[region], surface.vertex_areas_m2[region]
         path, _ = spray_path(trajectory)
-        low, high = (limit[region] for limit in wanted.limits_um(target_um, tolerance))
-        good = (film >= low) & (film <= high)
+        good = wanted.accepted(film_um, target_um, tolerance)[region]
         zones = wanted.zones
         elsewhere_um = (wanted.elsewhere_um or 0.0) if zones else target_um
         return FilmSummary(
@@ -215,8 +209,36 @@ class Improvement:
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
-        """What changes, pass by pass."""
-        return changes(self.retiming.original, self.retiming.programme)
+        """What changes, pass by pass, numbered as a simulation of the improved programme does."""
+        original, improved = self.retiming.original, self.retiming.programme
+        ends_m, numbers, begins_pass = strokes_of(improved)
+        given = Programme.of(self.original).openings
+        opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
+        pairs = list(zip(original.openings, improved.openings, strict=True))
+        found: list[PassChange] = []
+        for (begin, end), number in zip(ends_m[begins_pass], numbers[begins_pass], strict=True):
+            own = [
+                (before, after) for before, after in pairs
+                if min(after.off_m, end) - max(after.on_m, begin) > 0.05
+            ]  # fmt: skip
+            if not own:
+                continue
+            (first_before, first), (last_before, last) = own[0], own[-1]
+            on, off = max(first.on_m, begin), min(last.off_m, end)
+            inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
+            # A turn that is sprayed through has no trigger that could be earlier or later.
+            opens = on == first.on_m and first_before.on_m in opened_m
+            closes = off == last.off_m and last_before.off_m in closed_m
+            earlier = first_before.on_m - on if opens else 0.0
+            later = off - last_before.off_m if closes else 0.0
+            old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
+            speed = speed_along(improved, np.linspace(*inside, 61))
+            found.append(PassChange(
+                int(number) + 1, (on, off), (old, new), float(speed.min()), float(speed.max()),
+                earlier, later, earlier / float(speed[0]), later / float(speed[-1]),
+                (first_before.flow, first.flow),
+            ))  # fmt: skip
+        return tuple(found)
 
     @cached_property
     def paths(self) -> tuple[SprayPath, SprayPath]:
@@ -336,42 +358,3 @@ class Improvement:
             'robot': self.drive and self.drive.to_dict(),
             'warnings': list(self.warnings),
         }
-
-
-def changes(original: Programme, improved: Programme) -> tuple[PassChange, ...]:
-    """The changes of all passes, numbered as a simulation of the improved programme does."""
-    strokes = Strokes.of(improved)
-    passes = np.flatnonzero(strokes.begins_pass)
-    given = Programme.of(original.original).openings
-    opened_m, closed_m = {one.on_m for one in given}, {one.off_m for one in given}
-    pairs = list(zip(original.openings, improved.openings, strict=True))
-    found: list[PassChange] = []
-    for begin, end, number in zip(
-        strokes.ends_m[passes], strokes.ends_m[passes + 1], strokes.spray_pass[passes], strict=True
-    ):
-        own = [
-            (before, after) for before, after in pairs
-            if min(after.off_m, end) - max(after.on_m, begin) > 0.05
-        ]  # fmt: skip
-        if not own:
-            continue
-        (first_before, first), (last_before, last) = own[0], own[-1]
-        on, off = max(first.on_m, begin), min(last.off_m, end)
-        inside = on + STANDING_M, off - STANDING_M  # without a stay at either end
-        # A turn that the programme sprays through has no trigger that could be earlier or later.
-        opens = on == first.on_m and first_before.on_m in opened_m
-        closes = off == last.off_m and last_before.off_m in closed_m
-        earlier = first_before.on_m - on if opens else 0.0
-        later = off - last_before.off_m if closes else 0.0
-        old, new = (float(speed_along(p, np.array(inside))[0]) for p in (original, improved))
-        speed = speed_along(improved, np.linspace(*inside, 61))
-        found.append(
-            PassChange(
-                int(number) + 1, (on, off),
-                (old, new),
-                float(speed.min()), float(speed.max()), earlier, later,
-                earlier / float(speed[0]), later / float(speed[-1]),
-                (first_before.flow, first.flow),
-            )
-        )  # fmt: skip
-    return tuple(found)

@@ -1,7 +1,4 @@
-"""Parallel passes over a plane: how the gun runs along them, their evenness over the index.
-
-Minima of the curve, how many passes cover a width, and how long they take.
-"""
+"""Parallel passes over a plane: their evenness over the index, and how many cover a width."""
 
 import math
 from dataclasses import dataclass
@@ -15,6 +12,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
+from paint_deposition.planning.requests import IndexRequest
 
 # Passes that differ by less than this share of their peak are taken for the same.
 ALIKE = 1e-9
@@ -25,53 +23,29 @@ PRECISION_M = 1e-7
 SEARCHED = 0.25
 
 
-@dataclass(frozen=True)
-class PassSetup:
-    """Square to a plane, in parallel passes.
+def parallel_passes(
+    model: DepositionModel, request: IndexRequest, speed_m_per_s: float, fineness: float = 1.0
+) -> ParallelPasses:
+    """Endlessly many passes square to a plane at a speed [m/s]; fineness as for their collapse.
 
     A gun that keeps its orientation lays one profile whichever way it travels, so alternating
     passes are as good as one-way ones. Turned by half a turn for every way back it lays the
     mirrored profile, and an asymmetric pattern makes an uneven pair.
     """
-
-    standoff_m: float  # TCP to plane [m]
-    # Direction of the first pass in the tool's x-y frame, from x to y [rad].
-    travel_rad: float = 0.0
-    one_way: bool = False  # every pass runs in the direction of the first; else they alternate
-    gun_turns: bool = False  # on the way back the gun is turned by half a turn about its axis
-
-    @property
-    def travel(self) -> str:
-        """'one_way' or 'alternating'."""
-        return 'one_way' if self.one_way else 'alternating'
-
-    @property
-    def assumption(self) -> str:
-        """What is assumed about the gun, in words."""
-        if self.one_way:
-            return 'all passes run the same way with the gun held alike'
-        if self.gun_turns:
-            return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
-        return 'passes alternate and the gun keeps its orientation: all lay the same profile'
-
-    def parallel_passes(
-        self, model: DepositionModel, speed_m_per_s: float, fineness: float = 1.0
-    ) -> ParallelPasses:
-        """Endlessly many of these passes at a speed [m/s]; fineness as for their collapse."""
-        options: dict[str, Any] = {
-            'standoff_m': self.standoff_m, 'travel_rad': self.travel_rad, 'fineness': fineness,
-        }  # fmt: skip
-        first = sampled_collapse(model, speed_m_per_s, **options)
-        # An effect may depend on the way: forth or back, up or down.
-        if self.one_way or not (self.gun_turns or model.effects):
-            return ParallelPasses.one_way(first)
-        second = sampled_collapse(
-            model, speed_m_per_s, backwards=True, turned=self.gun_turns, **options
-        )
-        difference = np.abs(second.film_um - first.film_um).max()
-        if difference <= ALIKE * first.film_um.max():
-            return ParallelPasses.one_way(first)
-        return ParallelPasses(first, second)
+    options: dict[str, Any] = {
+        'standoff_m': request.standoff_m, 'travel_rad': request.travel_rad, 'fineness': fineness,
+    }  # fmt: skip
+    first = sampled_collapse(model, speed_m_per_s, **options)
+    # An effect may depend on the way: forth or back, up or down.
+    if request.one_way or not (request.gun_turns or model.effects):
+        return ParallelPasses.one_way(first)
+    second = sampled_collapse(
+        model, speed_m_per_s, backwards=True, turned=request.gun_turns, **options
+    )
+    difference = np.abs(second.film_um - first.film_um).max()
+    if difference <= ALIKE * first.film_um.max():
+        return ParallelPasses.one_way(first)
+    return ParallelPasses(first, second)
 
 
 def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) -> int:
@@ -93,14 +67,6 @@ def passes_to_cover(parallel: ParallelPasses, index_m: float, width_m: float) ->
         if film.min() >= enough:
             return count
     return most
-
-
-def cycle_time_s(
-    passes: int, length_m: float, index_m: float, speed_m_per_s: float, one_way: bool
-) -> float:
-    """Time from the first opening of the gun to its last closing, at an even speed [s]."""
-    between = math.hypot(length_m, index_m) if one_way else index_m
-    return (passes * length_m + (passes - 1) * between) / speed_m_per_s
 
 
 @dataclass(frozen=True)

@@ -30,30 +30,8 @@ MARGIN = 0.03
 SLOWEST = 0.01
 
 
-@dataclass(frozen=True)
-class Start:
-    """A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad]."""
-
-    joints: np.ndarray
-    roll_rad: float
-
-
-@dataclass(frozen=True)
-class Ways:
-    """S ways to follow N poses.
-
-    Attributes:
-        joints: (S, N, J), NaN behind the last pose that is reached.
-        reached: (S,) number of poses that each reaches within the limits.
-    """
-
-    joints: np.ndarray
-    reached: np.ndarray
-
-    @property
-    def whole(self) -> np.ndarray:
-        """Rows of the ways that reach all poses."""
-        return np.flatnonzero(self.reached == self.joints.shape[1])
+# A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad].
+Start = tuple[np.ndarray, float]
 
 
 def starts(
@@ -67,10 +45,9 @@ def starts(
     lower = np.where(np.isfinite(arm.lower), arm.lower, -UNLIMITED)
     upper = np.where(np.isfinite(arm.upper), arm.upper, UNLIMITED)
     roll_rad = rng.uniform(-np.pi, np.pi, STARTS) if free_roll else np.zeros(STARTS)
-    joints, error = rng.uniform(lower, upper, (STARTS, len(arm))), np.full(STARTS, np.inf)
     wanted = axes @ Rotation.from_rotvec(np.outer(roll_rad, (0, 0, 1))).as_matrix()
-    for _ in range(START_ROUNDS):
-        joints, error = towards(arm, joints, position_m, wanted)
+    joints = rng.uniform(lower, upper, (STARTS, len(arm)))
+    joints, error = towards(arm, joints, position_m, wanted, START_ROUNDS)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     turns = np.round((joints - middle) / (2.0 * np.pi))
     joints = np.where(arm.slides, joints, joints - 2.0 * np.pi * turns)
@@ -78,63 +55,85 @@ def starts(
     found: list[Start] = []
     for row in good[np.argsort(np.abs((joints - middle) / half).max(axis=1)[good])]:
         # Configurations that differ by less are one [rad or m].
-        if all(np.abs(joints[row] - other.joints).max() > 0.1 for other in found):
-            found.append(Start(joints[row], float(roll_rad[row])))
+        if all(np.abs(joints[row] - other).max() > 0.1 for other, _ in found):
+            found.append((joints[row], float(roll_rad[row])))
     return found[:FOLLOWED]
 
 
-def follow(arm: Arm, begin: np.ndarray, positions_m: np.ndarray, axes: np.ndarray) -> Ways:
-    """Follow poses (S, N, 3) [m] and (S, N, 3, 3) from configurations (S, J) at the first ones."""
-    joints = np.full((*positions_m.shape[:2], len(arm)), np.nan)
-    reached = np.full(len(begin), joints.shape[1])
-    now, left = begin, np.arange(len(begin))
-    for n in range(joints.shape[1]):
-        for _ in range(ROUNDS):
-            now, error = towards(arm, now, positions_m[left, n], axes[left, n])
-            if (error < REACHED).all():
-                break
-        good = (error < REACHED) & within(arm, now)
-        reached[left[~good]] = n
-        now, left = now[good], left[good]
-        joints[left, n] = now
-        if not len(left):
-            break
-    return Ways(joints, reached)
-
-
-def settled(
-    arm: Arm, joints: np.ndarray, positions_m: np.ndarray, axes: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Joints (N, J) near given ones that hold poses (N, 3) and (N, 3, 3), and the error (N,)."""
-    error = np.full(len(joints), np.inf)
-    for _ in range(ROUNDS):
-        joints, error = towards(arm, joints, positions_m, axes)
-    return joints, error
-
-
 def towards(
-    arm: Arm, joints: np.ndarray, positions_m: np.ndarray, axes: np.ndarray
+    arm: Arm, joints: np.ndarray, positions_m: np.ndarray, axes: np.ndarray, rounds: int = 1
 ) -> tuple[np.ndarray, np.ndarray]:
-    """A step of joints (..., J) towards poses, positions (..., 3) and axes (..., 3, 3).
+    """Steps of joints (..., J) towards poses, positions (..., 3) and axes (..., 3, 3).
 
-    Returns the new joints and the error (...) before the step [m and rad].
+    Returns the new joints and the error (...) before the last step [m and rad].
     """
-    position, tip, jacobian = arm.jacobians(joints)
-    turn = 0.5 * np.cross(tip, axes, axis=-2).sum(axis=-1)
-    error = np.concatenate([positions_m - position, turn], axis=-1)
-    # No step turns a joint further [rad or m]; near a singularity steps are damped.
-    square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-3**2 * np.eye(6)
-    step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, error[..., np.newaxis])
-    step = step[..., 0]
-    longest = np.abs(step).max(axis=-1, keepdims=True)
-    step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-12))
-    return joints + step, np.linalg.norm(error, axis=-1)
+    for _ in range(rounds):
+        position, tip, jacobian = arm.jacobians(joints)
+        turn = 0.5 * np.cross(tip, axes, axis=-2).sum(axis=-1)
+        error = np.concatenate([positions_m - position, turn], axis=-1)
+        # No step turns a joint further [rad or m]; near a singularity steps are damped.
+        square = jacobian @ jacobian.swapaxes(-1, -2) + 1e-3**2 * np.eye(6)
+        step = jacobian.swapaxes(-1, -2) @ np.linalg.solve(square, error[..., np.newaxis])
+        step = step[..., 0]
+        longest = np.abs(step).max(axis=-1, keepdims=True)
+        step *= np.minimum(1.0, 0.5 / np.maximum(longest, 1e-12))
+        joints = joints + step
+    return joints, np.linalg.norm(error, axis=-1)
 
 
 def within(arm: Arm, joints: np.ndarray) -> np.ndarray:
     """(...) whether joints (..., J) keep their limits."""
     outside = (joints < arm.lower) | (joints > arm.upper)
     return np.logical_not(outside.any(axis=-1))
+
+
+def rolled(roll_rad: float) -> Rotation:
+    """The turn of a tool that is rolled about its own axis."""
+    return Rotation.from_rotvec([0.0, 0.0, roll_rad])
+
+
+def ways_of(
+    arm: Arm,
+    positions_m: np.ndarray,
+    turns: Rotation,
+    free_roll: bool,
+    chosen: Start | None = None,
+) -> tuple[list[Start], np.ndarray, np.ndarray]:
+    """Follow poses (N, 3) [m] with their turns (N,) from all starts, or from the chosen one.
+
+    Returned are the S starts; joints (S, N, J), NaN behind the last pose that is reached; and (S,)
+    how many poses are reached from each within the limits.
+    """
+    begins = [chosen] if chosen else starts(arm, positions_m[0], turns[0].as_matrix(), free_roll)
+    axes = np.reshape([(turns * rolled(roll_rad)).as_matrix() for _, roll_rad in begins],
+                      (len(begins), len(positions_m), 3, 3))  # fmt: skip
+    ways = np.full((len(begins), len(positions_m), len(arm)), np.nan)
+    reached = np.full(len(begins), len(positions_m))
+    now = np.reshape([joints for joints, _ in begins], (len(begins), len(arm)))
+    left = np.arange(len(begins))
+    for n, position_m in enumerate(positions_m):
+        for _ in range(ROUNDS):
+            now, error = towards(arm, now, position_m, axes[left, n])
+            if (error < REACHED).all():
+                break
+        good = (error < REACHED) & within(arm, now)
+        reached[left[~good]] = n
+        now, left = now[good], left[good]
+        ways[left, n] = now
+        if not len(left):
+            break
+    return begins, ways, reached
+
+
+def fastest_way(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) -> int:
+    """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
+    whole = np.flatnonzero(reached == len(times_s))
+    joints = ways[whole]
+    speeds = np.abs(np.diff(joints, axis=1)) / np.diff(times_s)[:, np.newaxis] / arm.fastest
+    late = np.maximum(speeds.max(axis=2), 1.0)
+    # Ways that come nearer to the limit of a joint than this share of its range are avoided.
+    near = np.maximum(1.0 - arm.room(joints).min(axis=(1, 2)) / 0.05, 0.0)
+    return int(whole[np.argmin(late.mean(axis=1) + near + speeds.mean(axis=(1, 2)))])
 
 
 @dataclass(frozen=True)

@@ -119,9 +119,7 @@ def speed_bounds(
     and closes, no faster than can be reached from its way there and slowed down on its way on.
     """
     places, at, length = nodes.travel_m, programme.positions_at_m, programme.travel_m[-1]
-    low, high = np.maximum(places - BEND_M, 0.0), np.minimum(places + BEND_M, length)
-    seconds = programme.seconds_at(high) - programme.seconds_at(low)
-    programmed = (high - low) / np.maximum(seconds, 1e-9)
+    programmed = programme.speed_about(places, BEND_M)
     inner = np.clip(places, BEND_M, length - BEND_M)
     bend = at(inner + BEND_M) - 2.0 * at(inner) + at(inner - BEND_M)
     curvature = np.linalg.norm(bend, axis=1) / BEND_M**2
@@ -149,10 +147,7 @@ def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: L
     if count < 2:
         return math.inf
     places = np.linspace(end_m, far_m, count + 1)
-    low = np.maximum(places - STEADY_M, 0.0)
-    high = np.minimum(places + STEADY_M, programme.travel_m[-1])
-    seconds = programme.seconds_at(high) - programme.seconds_at(low)
-    speed = (high - low) / np.maximum(seconds, 1e-9)
+    speed = programme.speed_about(places, STEADY_M)
     # A place much slower than the opening of the gun sets how fast that can be.
     if speed.min() > 0.8 * speed[0]:
         return math.inf

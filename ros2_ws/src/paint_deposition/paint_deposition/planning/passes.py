@@ -1,7 +1,7 @@
 """Planned passes: lines over the smoothed surface, the timed motion along them, and its moves."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -97,12 +97,9 @@ def tool_poses(
     surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
 ) -> tuple[np.ndarray, np.ndarray]:
     """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
-    axes = surface_map.axes
-    normals = surface_map.normals(travel_m, across_m)
-    height = surface_map.height_m(travel_m, across_m)
-    on_surface = axes.points_m(np.stack([travel_m, across_m, height], axis=1))
-    tool_z = -normals
-    way = axes.travel - (tool_z @ axes.travel)[:, np.newaxis] * tool_z
+    on_surface = surface_map.places_m(travel_m, across_m)
+    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[0]
+    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
     way /= np.linalg.norm(way, axis=1, keepdims=True)
     side = np.cross(tool_z, way)
     cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
@@ -111,17 +108,14 @@ def tool_poses(
 
 
 def plan_passes(
-    surface_map: SurfaceMap, lines_m: np.ndarray, styles: Sequence[PassStyle]
+    surface_map: SurfaceMap, lines_m: np.ndarray, style: PassStyle
 ) -> tuple[PlannedPass, ...]:
-    """Passes along lines in this order, each in its style.
-
-    Every other one runs backwards, unless all run one way.
-    """
+    """Passes along lines in this order; every other one runs backwards, unless all run one way."""
     return tuple(
         plan_pass(
             surface_map, float(across), style, backwards=bool(number % 2) and not style.one_way
         )
-        for number, (across, style) in enumerate(zip(lines_m, styles, strict=True))
+        for number, across in enumerate(lines_m)
     )
 
 
@@ -143,12 +137,13 @@ def trajectory_of(
             between, duration_s = _transfer(clock, passes[number - 1], planned, style, rate_hz)
             legs.append(between)
             clock += duration_s
-        ramp = _Ramp(float(planned.along_m[-1]), planned.speed_m_per_s, style)
-        triggers += [clock + ramp.time_at_m(planned.on_m), clock + ramp.time_at_m(planned.off_m)]
-        times = _sample_times(ramp.duration_s, rate_hz)
-        poses = _poses_at(planned, ramp.travel_at_s(times))
-        legs.append((clock + times, *poses))
-        clock += ramp.duration_s
+        duration_s, travel_m, reached_s = _ramp(
+            float(planned.along_m[-1]), planned.speed_m_per_s, style
+        )
+        triggers += [clock + reached_s(planned.on_m), clock + reached_s(planned.off_m)]
+        times = _sample_times(duration_s, rate_hz)
+        legs.append((clock + times, *_poses_at(planned, travel_m(times))))
+        clock += duration_s
     stamps_s, positions_m, quaternions = map(np.concatenate, zip(*legs, strict=True))
     stamps_ns = np.round(stamps_s * 1e9).astype(np.int64)
     forward = np.append(True, np.diff(stamps_ns) > 0)
@@ -178,35 +173,35 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
     return moves
 
 
-class _Ramp:
-    """Trapezoidal speed over a length of travel, from rest to rest."""
+def _ramp(
+    length_m: float, speed_m_per_s: float, style: PassStyle
+) -> tuple[float, Callable[[np.ndarray], np.ndarray], Callable[[float], float]]:
+    """Trapezoidal speed over a length of travel, from rest to rest.
 
-    def __init__(self, length_m: float, speed_m_per_s: float, style: PassStyle) -> None:
-        self.length = length_m
-        self.acceleration = style.acceleration_m_per_s2
-        # A short travel does not reach full speed: the trapezoid is a triangle.
-        self.speed = min(speed_m_per_s, math.sqrt(length_m * self.acceleration))
-        self.rise_s = self.speed / self.acceleration
-        self.duration_s = length_m / self.speed + self.rise_s if length_m > 0.0 else 0.0
+    Returned are how long it takes, the travel at times from the start, and the time at a travel.
+    """
+    acceleration = style.acceleration_m_per_s2
+    # A short travel does not reach full speed: the trapezoid is a triangle.
+    speed = min(speed_m_per_s, math.sqrt(length_m * acceleration))
+    rise_s = speed / acceleration
+    duration_s = length_m / speed + rise_s if length_m > 0.0 else 0.0
+    rise_m = 0.5 * speed * rise_s
 
-    def travel_at_s(self, time_s: np.ndarray) -> np.ndarray:
-        """Travel at times from the start."""
-        t = np.clip(time_s, 0.0, self.duration_s)
-        left = self.duration_s - t
-        even = self.speed * (t - 0.5 * self.rise_s)
-        rising, falling = 0.5 * self.acceleration * t**2, 0.5 * self.acceleration * left**2
-        return np.select(
-            [t < self.rise_s, left < self.rise_s], [rising, self.length - falling], even
-        )
+    def travel_m(time_s: np.ndarray) -> np.ndarray:
+        t = np.clip(time_s, 0.0, duration_s)
+        left = duration_s - t
+        rising, falling = 0.5 * acceleration * t**2, 0.5 * acceleration * left**2
+        even = speed * (t - 0.5 * rise_s)
+        return np.select([t < rise_s, left < rise_s], [rising, length_m - falling], even)
 
-    def time_at_m(self, way_m: float) -> float:
-        """When a travel is reached."""
-        rise_m = 0.5 * self.speed * self.rise_s
+    def reached_s(way_m: float) -> float:
         if way_m < rise_m:
-            return math.sqrt(2.0 * way_m / self.acceleration)
-        if way_m > self.length - rise_m:
-            return self.duration_s - math.sqrt(2.0 * (self.length - way_m) / self.acceleration)
-        return 0.5 * self.rise_s + way_m / self.speed
+            return math.sqrt(2.0 * way_m / acceleration)
+        if way_m > length_m - rise_m:
+            return duration_s - math.sqrt(2.0 * (length_m - way_m) / acceleration)
+        return 0.5 * rise_s + way_m / speed
+
+    return duration_s, travel_m, reached_s
 
 
 def _transfer(
@@ -220,15 +215,15 @@ def _transfer(
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
     angle = float((turn[0].inv() * turn[1]).magnitude())
     length = float(np.linalg.norm(end - start))
-    ramp = _Ramp(length, style.transfer_speed_m_per_s, style)
+    ramp_s, travel_m, _ = _ramp(length, style.transfer_speed_m_per_s, style)
     # Turn of the tool between passes is no faster than this.
-    duration = max(ramp.duration_s, angle / math.radians(90.0))
+    duration = max(ramp_s, angle / math.radians(90.0))
     if duration == 0.0:
         return (np.empty(0), np.empty((0, 3)), np.empty((0, 4))), 0.0
     times = _sample_times(duration, rate_hz)
     share = times / duration
     if length > 0.0:
-        share = ramp.travel_at_s(share * ramp.duration_s) / length
+        share = travel_m(share * ramp_s) / length
     positions = start + share[:, np.newaxis] * (end - start)
     quaternions = Slerp([0.0, 1.0], turn)(share).as_quat()
     return (start_s + times, positions, quaternions), duration

@@ -163,7 +163,7 @@ def plan(
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     target = None if request.speed_m_per_s else wanted.target_um
     for round_ in range(TARGET_ROUNDS):
-        passes = plan_passes(surface_map, lines, [style] * len(lines))
+        passes = plan_passes(surface_map, lines, style)
         found = predicted(
             surface, model, request, wanted,
             trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
@@ -182,14 +182,14 @@ def plan(
 def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> PassStyle:
     overspray = request.overspray_m
     if overspray is None:
-        distance = plane.setup.standoff_m + model.projection.emission_offset_m
+        distance = plane.standoff_m + model.projection.emission_offset_m
         widening = distance / model.projection.model_plane_m
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
         # The gun opens where 90 % of the pattern's volume begin to reach the part.
         overspray = widening * float(np.interp(0.9, enclosed, radii))
     return PassStyle(
-        standoff_m=plane.setup.standoff_m,
+        standoff_m=plane.standoff_m,
         speed_m_per_s=plane.speed_m_per_s,
         acceleration_m_per_s2=request.acceleration_m_per_s2,
         overspray_m=overspray,
@@ -255,7 +255,7 @@ def _timed_plan(
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     passes = tuple(
         replace(planned, style=replace(style, speed_m_per_s=speed))
-        for planned in plan_passes(unoptimised.line_films.surface_map, lines, [style] * len(lines))
+        for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
     programme = Programme.of(trajectory_of(passes, style, unoptimised.trajectory.frame_id))
     start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)

@@ -6,15 +6,19 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.film.paint_used import PaintUsed, paint_figures
-from paint_deposition.film.statistics import FilmStatistics, film_statistics
+from paint_deposition.film.statistics import (
+    FilmStatistics,
+    PaintUsed,
+    film_statistics,
+    paint_figures,
+)
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
@@ -30,12 +34,9 @@ from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 NEAR = 0.01
 
 
-class Band(NamedTuple):
-    """What film is accepted at some of V points."""
-
-    points: np.ndarray  # (V,) bool
-    target_um: float  # film wanted
-    tolerance: float | None  # accepted share of it either way; None: any film
+# Some of V points, (V,) bool, the film wanted there [um], and the share of it that is accepted
+# either way; None: any film.
+Band = tuple[np.ndarray, float, float | None]
 
 
 @dataclass(frozen=True)
@@ -109,20 +110,22 @@ class WantedFilm:
     def bands(self, rows: np.ndarray, target_um: float, tolerance: float | None) -> list[Band]:
         """Films accepted at vertices (V,), outside of zones by the target and tolerance given."""
         if self.zones is None:
-            return [Band(np.ones(len(rows), dtype=bool), target_um, tolerance)]
+            return [(np.ones(len(rows), dtype=bool), target_um, tolerance)]
         here = self.zones.select(rows)
-        found = [Band(own, z.target_um, z.tolerance_um / z.target_um) for z, own in here]
+        found: list[Band] = [
+            (own, zone.target_um, zone.tolerance_um / zone.target_um) for zone, own in here
+        ]
         if self.elsewhere_um is not None:
-            found.append(Band(here.number < 0, self.elsewhere_um, tolerance))
+            found.append((here.number < 0, self.elsewhere_um, tolerance))
         return found
 
-    def limits_um(self, target_um: float, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-        """Least and greatest film (V,) accepted [um]; the rest as for ``bands``."""
-        low, high = np.full((2, len(self.region)), np.nan)
-        for band in self.bands(np.arange(len(low)), target_um, tolerance):
-            low[band.points] = band.target_um * (1.0 - (band.tolerance or 0.0))
-            high[band.points] = band.target_um * (1.0 + (band.tolerance or 0.0))
-        return low, high
+    def accepted(self, film_um: np.ndarray, target_um: float, tolerance: float) -> np.ndarray:
+        """(V,) bool, where a film (V,) [um] is within its band; the rest as for ``bands``."""
+        good = np.zeros(len(film_um), dtype=bool)
+        for points, target, off in self.bands(np.arange(len(good)), target_um, tolerance):
+            least, most = target * (1.0 - (off or 0.0)), target * (1.0 + (off or 0.0))
+            good |= points & (film_um >= least) & (film_um <= most)
+        return good
 
 
 def simulated(
@@ -266,7 +269,7 @@ class PlannedFilm:
             'region': self.region,
             'film': self.statistics.to_dict(),
             'whole_part': self.whole_part.to_dict(),
-            'paint': paint_figures(self),
+            'paint': paint_figures(self.model, self.paint, self.statistics),
             'gun': self.envelope.model_dump(),
             'contacts': [contact.to_dict() for contact in self.contacts],
             'warnings': list(self.warnings),

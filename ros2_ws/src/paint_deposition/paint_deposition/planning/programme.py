@@ -112,6 +112,12 @@ class Programme:
         columns = [np.interp(travel_m, self._rising_m, column) for column in self.positions_m.T]
         return np.stack(columns, axis=1)
 
+    def speed_about(self, travel_m: np.ndarray, half_m: float) -> np.ndarray:
+        """(n,) mean speed [m/s] within ``half_m`` of lengths of travel (n,)."""
+        low, high = travel_m - half_m, travel_m + half_m
+        low, high = np.maximum(low, 0.0), np.minimum(high, self.travel_m[-1])
+        return (high - low) / np.maximum(self.seconds_at(high) - self.seconds_at(low), 1e-9)
+
     def turns_at_s(self, seconds: np.ndarray) -> Rotation:
         """Turns (n,) of the tool at times (n,) from the first pose."""
         return Slerp(self.clock_s, Rotation.from_quat(self.quaternions_xyzw))(seconds)
@@ -191,26 +197,22 @@ class Programme:
         )
 
 
-@dataclass(frozen=True)
-class Strokes:
-    """The straight stretches of a programme from turn to turn, and the passes among them."""
+def strokes_of(programme: Programme) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The straight stretches from turn to turn, numbered as a simulation of the programme does.
 
-    ends_m: np.ndarray  # (k + 1,) travel at which they begin and the last one ends
-    spray_pass: np.ndarray  # (k,) number of the pass that runs or ran last, from 0, -1 before any
-    begins_pass: np.ndarray  # (k,) bool, whether a pass begins there; others are links
-
-    @staticmethod
-    def of(programme: Programme) -> 'Strokes':
-        """Number strokes and passes as a simulation of the timed programme does."""
-        path, _ = spray_path(programme.trajectory())
-        begins = 1 + np.flatnonzero(np.diff(path.stroke))
-        travel_m = programme.travel_at_m(path.stamp_ns)
-        turns_m = travel_m[begins] - path.from_turn_m[begins]
-        ends_m = np.concatenate([[0.0], turns_m, programme.travel_m[-1:]])
-        # Turns and passes show a little behind their begin, and not both at once.
-        middle = np.searchsorted(travel_m, 0.5 * (ends_m[1:] + ends_m[:-1]))
-        number = path.spray_pass[np.minimum(middle, len(path) - 1)]
-        return Strokes(ends_m, number, np.diff(number, prepend=-1) > 0)
+    Returned are (k, 2) the travel at which each begins and ends, (k,) the number of the pass that
+    runs there or ran last, from 0, -1 before any, and (k,) bool whether a pass begins there:
+    others are links.
+    """
+    path, _ = spray_path(programme.trajectory())
+    begins = 1 + np.flatnonzero(np.diff(path.stroke))
+    travel_m = programme.travel_at_m(path.stamp_ns)
+    turns_m = travel_m[begins] - path.from_turn_m[begins]
+    ends_m = np.concatenate([[0.0], turns_m, programme.travel_m[-1:]])
+    # Turns and passes show a little behind their begin, and not both at once.
+    middle = np.searchsorted(travel_m, 0.5 * (ends_m[1:] + ends_m[:-1]))
+    number = path.spray_pass[np.minimum(middle, len(path) - 1)]
+    return np.stack([ends_m[:-1], ends_m[1:]], axis=1), number, np.diff(number, prepend=-1) > 0
 
 
 def closed_beside(programme: Programme, surface: Surface) -> Programme:
@@ -218,9 +220,9 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
 
     Beside it is a link along which the tool's axis meets the part nowhere.
     """
-    strokes = Strokes.of(programme)
+    ends_m, _, begins_pass = strokes_of(programme)
     openings = programme.openings
-    for begin, end in strokes.ends_m[np.flatnonzero(~strokes.begins_pass)[:, None] + [0, 1]]:
+    for begin, end in ends_m[~begins_pass]:
         # Whether a link meets the part is looked at this often along it [m].
         places = np.linspace(begin, end, math.ceil((end - begin) / 0.01) + 2)[1:-1]
         axes = programme.turns_at_s(programme.seconds_at(places)).as_matrix()[:, :, 2]

@@ -8,20 +8,13 @@ tangent keeps to the limit.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import clarabel
 import numpy as np
 from scipy.sparse import csc_matrix, csr_matrix, diags, identity, vstack
 
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.nodes import (
-    BEND,
-    JOINT,
-    LEAD,
-    ROBOT,
-    Nodes,
-)
+from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT, Nodes
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
 
@@ -46,12 +39,8 @@ LIMIT_NAMES = {
 }
 
 
-class Constraint(NamedTuple):
-    """Constraints ``matrix @ x <= limit`` of one kind."""
-
-    name: str
-    matrix: csr_matrix
-    limit: float | np.ndarray = 0.0
+# Names (R,), matrix (R, size) and limits (R,) of constraints ``matrix @ x <= limit``.
+Constraints = tuple[np.ndarray, csr_matrix, np.ndarray]
 
 
 @dataclass(frozen=True)
@@ -87,6 +76,10 @@ class Problem:
     def size(self) -> int:
         """Number of unknowns: densities, and a flow for each opening."""
         return len(self.nodes) + len(self.nodes.openings)
+
+    def films_um(self, found: Density) -> list[np.ndarray]:
+        """(V,) film of each model for a density [um]."""
+        return [found.density @ films for films in self.films]
 
     def relaxed(self) -> 'Problem':
         """Without weights and limits, except that on the flow: for evenness alone."""
@@ -128,11 +121,12 @@ def _step(problem: Problem, now: Density) -> Density:
     count = len(problem.nodes)
     # A multiplier times a density is what its limit costs, in the units of the objective.
     costs = multipliers * float(values[:count].mean())
-    names = np.repeat(
-        [rows.name for rows in constraints], [r.matrix.shape[0] for r in constraints]
-    )
     # A constraint that costs more than this, in units of sigma_n squared, binds.
-    binding = [name for name in dict.fromkeys(names[costs > 1e-6].tolist()) if name in LIMIT_NAMES]
+    binding = [
+        name
+        for name in dict.fromkeys(constraints[0][costs > 1e-6].tolist())
+        if name in LIMIT_NAMES
+    ]
     flow = values[count:]
     least, most = problem.request.flow
     if least >= most:
@@ -196,20 +190,21 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     return [hinge for hinge in found if hinge[0].any()]
 
 
-def _constraints(problem: Problem, now: Density) -> list[Constraint]:
+def _constraints(problem: Problem, now: Density) -> Constraints:
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
     unit = identity(problem.size, format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
-    greatest, limit = problem.bounds
+    greatest, limited_by = problem.bounds
+    none = np.zeros(1)
     least = np.minimum(limits.speed_min_m_per_s, 0.999 * greatest)
-    rows = [
-        Constraint('slowest', y - diags(1.0 / least) @ f),
-        Constraint('positive', -y[closable]),
+    rows: list[tuple[str, csr_matrix, np.ndarray]] = [
+        ('slowest', y - diags(1.0 / least) @ f, none),
+        ('positive', -y[closable], none),
     ]
     for name in (ROBOT, BEND, LEAD, JOINT):  # y >= f / v
-        some = np.flatnonzero((limit == name) & ~closable)
-        rows.append(Constraint(name, diags(1.0 / greatest[some]) @ f[some] - y[some]))
+        some = np.flatnonzero((limited_by == name) & ~closable)
+        rows.append((name, diags(1.0 / greatest[some]) @ f[some] - y[some], none))
     # Nodes from which the gun sprays on to the next one for certain.
     pairs = nodes.followed
     pairs = pairs[~closable[pairs] & ~closable[pairs + 1]]
@@ -219,7 +214,7 @@ def _constraints(problem: Problem, now: Density) -> list[Constraint]:
         # y^3 / f^2 about (y0, f0) is 3 (y0/f0)^2 y - 2 (y0/f0)^3 f.
         ratio = now.slowness(nodes)[node]
         most = diags(3.0 * reach * ratio**2) @ y[node] - diags(2.0 * reach * ratio**3) @ f[pairs]
-        rows += [Constraint('acceleration', rise - most), Constraint('acceleration', -rise - most)]
+        rows += [('acceleration', rise - most, none), ('acceleration', -rise - most, none)]
     # y^4 / f^3, for the change of slowness by the jerk alone.
     inner = pairs[:-1][np.diff(pairs) == 1] + 1
     reach = (
@@ -228,39 +223,40 @@ def _constraints(problem: Problem, now: Density) -> list[Constraint]:
     ratio = now.slowness(nodes)[inner]
     bend = y[inner + 1] - 2.0 * y[inner] + y[inner - 1]
     most = diags(4.0 * reach * ratio**3) @ y[inner] - diags(3.0 * reach * ratio**4) @ f[inner]
-    rows += [Constraint('jerk', bend - most), Constraint('jerk', -bend - most)]
+    rows += [('jerk', bend - most, none), ('jerk', -bend - most, none)]
     given = np.array([opening.flow for opening in nodes.openings])
-    rows.append(Constraint('flow', unit[count:], limits.flow[1] * given))
-    rows.append(Constraint('flow', -unit[count:], -limits.flow[0] * given))
-    return [row for row in rows if row.matrix.shape[0] and row.name not in problem.left_out]
+    rows.append(('flow', unit[count:], limits.flow[1] * given))
+    rows.append(('flow', -unit[count:], -limits.flow[0] * given))
+    names, matrices, ends = zip(
+        *(row for row in rows if row[1].shape[0] and row[0] not in problem.left_out), strict=True
+    )
+    counts = [matrix.shape[0] for matrix in matrices]
+    limit = [np.broadcast_to(end, n) for end, n in zip(ends, counts, strict=True)]
+    return np.repeat(names, counts), vstack(matrices, format='csr'), np.concatenate(limit)
 
 
 def _minimise(
-    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Constraint]
+    matrix: np.ndarray, linear: np.ndarray, constraints: Constraints
 ) -> tuple[np.ndarray, np.ndarray] | None:
     """The solution and the multipliers of all constraints, or None if infeasible."""
     settings = clarabel.DefaultSettings()
     settings.verbose = False
-    limit = np.concatenate(
-        [np.broadcast_to(rows.limit, rows.matrix.shape[0]) for rows in constraints]
-    )
+    _, rows, limit = constraints
     solver = clarabel.DefaultSolver(
-        csc_matrix(np.triu(matrix)), linear,
-        csc_matrix(vstack([rows.matrix for rows in constraints])), limit,
+        csc_matrix(np.triu(matrix)), linear, csc_matrix(rows), limit,
         [clarabel.NonnegativeConeT(len(limit))], settings,
     )  # fmt: skip
     answer = solver.solve()
-    good = (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved)
-    if answer.status not in good:
+    if answer.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
     return np.array(answer.x), np.array(answer.z)
 
 
-def _infeasible_limit(
-    matrix: np.ndarray, linear: np.ndarray, constraints: Sequence[Constraint]
-) -> str:
-    for name in dict.fromkeys(rows.name for rows in constraints):
-        others = [rows for rows in constraints if rows.name != name]
-        if name in LIMIT_NAMES and _minimise(matrix, linear, others) is not None:
+def _infeasible_limit(matrix: np.ndarray, linear: np.ndarray, constraints: Constraints) -> str:
+    names, rows, limit = constraints
+    for name in dict.fromkeys(names.tolist()):
+        others = names != name
+        without = names[others], rows[others], limit[others]
+        if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
             return f'{LIMIT_NAMES[name]} with the other limits; allow more'
     return 'the limits; allow more'

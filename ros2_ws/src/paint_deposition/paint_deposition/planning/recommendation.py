@@ -1,5 +1,6 @@
 """Which index lays an even film: a search over eq. (5) for the model's own collapse."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -13,9 +14,8 @@ from paint_deposition.planning.index_search import (
     SEARCHED,
     IndexCurve,
     Minimum,
-    PassSetup,
     choose_index,
-    cycle_time_s,
+    parallel_passes,
     passes_to_cover,
 )
 from paint_deposition.planning.requests import IndexRequest
@@ -40,7 +40,7 @@ class Recommendation:
             opening of the gun to its last closing, transfers between passes included.
         width_m, length_m: what they were counted for.
         curve: sigma_n over the range.
-        setup: how gun and passes were assumed.
+        standoff_m: TCP to plane. request: how the passes run.
         half_width_m: SB50 of one pass.
         index_drift_m: least and largest index that keep to the tolerance, or None.
         standoff_drift_m: least and largest change of standoff that do, negative is nearer; None
@@ -62,7 +62,8 @@ class Recommendation:
     width_m: float | None
     length_m: float | None
     curve: IndexCurve
-    setup: PassSetup
+    standoff_m: float
+    request: IndexRequest
     half_width_m: float
     index_drift_m: tuple[float, float] | None
     standoff_drift_m: tuple[float, float] | None
@@ -71,7 +72,7 @@ class Recommendation:
     @property
     def travel(self) -> str:
         """'alternating' or 'one_way'."""
-        return self.setup.travel
+        return self.request.travel
 
     @property
     def collapse(self) -> Collapse:
@@ -94,11 +95,11 @@ class Recommendation:
 
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
-        figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'setup')}
-        assumed = ('travel', 'gun_turns', 'travel_rad', 'standoff_m', 'assumption')
+        figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'request')}
+        assumed = ('travel', 'gun_turns', 'travel_rad', 'assumption')
         return {
             **figures,
-            **{name: getattr(self.setup, name) for name in assumed},
+            **{name: getattr(self.request, name) for name in assumed},
             'minima': [vars(minimum) for minimum in self.minima],
             'curve': {
                 'index_m': self.curve.index_m.tolist(),
@@ -124,11 +125,11 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         raise PlanError(
             f'the model plane lies {standoff:g} m before the TCP; give standoff_m above 0'
         )
-    setup = PassSetup(standoff, request.travel_rad, request.one_way, request.gun_turns)
+    request = request.model_copy(update={'standoff_m': standoff})
     speed = request.speed_m_per_s or 0.2
     # A speed that is only a guess is replaced at the end.
     guessed = request.speed_m_per_s is None and bool(model.effects)
-    parallel = setup.parallel_passes(model, speed, SEARCHED if guessed else 1.0)
+    parallel = parallel_passes(model, request, speed, SEARCHED if guessed else 1.0)
     width = half_width_m(parallel.first)
     searched = request.index_range_m(width)
     if request.speed_m_per_s is None:
@@ -137,14 +138,14 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     best = choose_index(curve, request.tolerance)
     _refuse_stripes(parallel, best, width)
     if request.speed_m_per_s is None:
-        curve, best, speed = _at_target(model, setup, request, curve, best, speed)
+        curve, best, speed = _at_target(model, request, curve, best, speed)
     tolerance = request.tolerance
     windows = curve.windows_m(tolerance) if tolerance is not None else []
     index_drift = standoff_drift = None
     if windows:
         index_drift = next(w for w in windows if w[0] - NEAR <= best.index_m <= w[1] + NEAR)
         standoff_drift = _standoff_drift_m(model, standoff, best.index_m, index_drift)
-    notes = _notes(model, setup, request, curve, best, speed)
+    notes = _notes(model, request, curve, best, speed)
     if searched != request.index_range_m(width):
         notes.append(
             f'the index is searched from {searched[0]:.3g} to {searched[1]:.3g} m only: beyond, '
@@ -154,7 +155,8 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
     length = request.width_m and (request.length_m or request.width_m)
     if request.width_m is not None and length is not None:
         passes = passes_to_cover(curve.parallel, best.index_m, request.width_m)
-        cycle_time = cycle_time_s(passes, length, best.index_m, speed, request.one_way)
+        between = math.hypot(length, best.index_m) if request.one_way else best.index_m
+        cycle_time = (passes * length + (passes - 1) * between) / speed
     return Recommendation(
         index_m=best.index_m,
         sigma_n=best.sigma_n,
@@ -170,7 +172,8 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         width_m=request.width_m,
         length_m=length,
         curve=curve,
-        setup=setup,
+        standoff_m=standoff,
+        request=request,
         half_width_m=width,
         index_drift_m=index_drift,
         standoff_drift_m=standoff_drift,
@@ -227,12 +230,7 @@ def _within_speeds(
 
 
 def _at_target(
-    model: DepositionModel,
-    setup: PassSetup,
-    request: IndexRequest,
-    curve: IndexCurve,
-    best: Minimum,
-    speed: float,
+    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: Minimum, speed: float
 ) -> tuple[IndexCurve, Minimum, float]:
     """Choose the speed: film goes as 1 / speed, unless an effect depends on the speed."""
     assert request.target_um is not None
@@ -245,25 +243,22 @@ def _at_target(
             second = first if parallel.alike else parallel.second.scaled(speed / wanted)
             return replace(curve, parallel=ParallelPasses(first, second)), best, wanted
         speed = wanted
-        curve = IndexCurve.of(setup.parallel_passes(model, speed), low, high)
+        curve = IndexCurve.of(parallel_passes(model, request, speed), low, high)
         best = choose_index(curve, request.tolerance)
     return curve, best, speed
 
 
 def _notes(
-    model: DepositionModel,
-    setup: PassSetup,
-    request: IndexRequest,
-    curve: IndexCurve,
-    best: Minimum,
-    speed: float,
+    model: DepositionModel, request: IndexRequest, curve: IndexCurve, best: Minimum, speed: float
 ) -> list[str]:
-    notes = [setup.assumption]
-    if not setup.one_way:
-        otherwise = replace(setup, gun_turns=not setup.gun_turns)
-        there = otherwise.parallel_passes(model, speed, SEARCHED).sigma_n(best.index_m)
+    notes = [request.assumption]
+    if not request.one_way:
+        otherwise = request.model_copy(update={'gun_turns': not request.gun_turns})
+        there = parallel_passes(model, otherwise, speed, SEARCHED).sigma_n(best.index_m)
         if abs(there - best.sigma_n) > 1e-4:
-            how = ('turned by 180 deg every way back', 'keeping its orientation')[setup.gun_turns]
+            how = 'turned by 180 deg every way back'
+            if request.gun_turns:
+                how = 'keeping its orientation'
             notes.append(f'with the gun {how} sigma_n there would be {100 * there:.2f} %')
     end = curve.best_end
     if best not in curve.minima:

@@ -49,12 +49,6 @@ class PassRequest(FilmBuild):
         0.0, "Direction of the first pass in the tool's x-y frame, from x to y."
     )
 
-    @model_validator(mode='after')
-    def _has_speed_or_target(self) -> 'PassRequest':
-        if self.speed_m_per_s is None and self.target_um is None:
-            raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
-        return self
-
 
 class SpeedLimits(Request):
     """How fast and how slow the gun may go."""
@@ -90,6 +84,26 @@ class IndexRequest(SpeedLimits, PassRequest):
         False,
         'The gun is turned by 180 deg for every way back; default: it keeps its orientation.',
     )
+
+    @model_validator(mode='after')
+    def _has_speed_or_target(self) -> 'IndexRequest':
+        if self.speed_m_per_s is None and self.target_um is None:
+            raise PlanError('neither speed_m_per_s nor target_um is given; give one of them')
+        return self
+
+    @property
+    def travel(self) -> str:
+        """'one_way' or 'alternating'."""
+        return 'one_way' if self.one_way else 'alternating'
+
+    @property
+    def assumption(self) -> str:
+        """What is assumed about the gun, in words."""
+        if self.one_way:
+            return 'all passes run the same way with the gun held alike'
+        if self.gun_turns:
+            return 'passes alternate and the gun turns by 180 deg with them: every other mirrored'
+        return 'passes alternate and the gun keeps its orientation: all lay the same profile'
 
     def index_range_m(self, half_width_m: float) -> tuple[float, float]:
         """Range to search for a pass of this SB50 [m]. Raises PlanError: it is empty."""
@@ -161,10 +175,6 @@ class PlanRequest(Limits, PassRequest):
         if self.outward is not None and not any(self.outward):
             raise PlanError('outward is 0 0 0; give a direction, 0 -1 0 say')
         return self
-
-    @model_validator(mode='after')
-    def _has_speed_or_target(self) -> 'PlanRequest':
-        return self  # zones have targets, too; that a plane has one is asked in ``for_plane``
 
     def improvement(
         self, overspray_m: float, target_um: float | None, **weights: float

@@ -94,28 +94,23 @@ class _Search:
     def retiming(self, explain: bool) -> Retiming:
         """Choose where the gun opens; then solve and simulate in turn until both films agree."""
         self.progress('triggers', 0.0)
-        wide = replace(self.original, openings=widened(self.original, self.request))
-        nodes = Nodes.of(wide.openings, self.spacing_m)
-        open_ends = _may_be_closed(nodes, self.original.openings, self.request)
-        programme, relaxed = self.original, None
+        openings, relaxed = self.original.openings, None
+        nodes = Nodes.of(widened(self.original, self.request), self.spacing_m)
+        open_ends = _may_be_closed(nodes, openings, self.request)
         if open_ends.any():
-            relaxed, density = self._problem(wide, nodes, None, open_ends)
+            relaxed, density = self._problem(nodes, None, open_ends)
             density = solve(relaxed, density, ROUGH_ROUNDS)
-            chosen = _openings(
-                nodes, density.density, open_ends, relaxed.bounds[0], self.original.openings,
-                self.request,
-            )  # fmt: skip
-            programme = replace(programme, openings=chosen)
-        nodes = Nodes.of(programme.openings, self.spacing_m)
+            openings = _openings(relaxed, density.density, openings)
+        nodes = Nodes.of(openings, self.spacing_m)
         closed = np.zeros(len(nodes), dtype=bool)
         found: Density | None = None
         for round_ in range(ROUNDS):
             self.progress('speeds', round_ / ROUNDS)
-            problem, start = self._problem(programme, nodes, found, closed)
+            problem, start = self._problem(nodes, found, closed)
             found = solve(problem, start)
-            timed = self._timed(programme, nodes, found)
+            timed = self._timed(nodes, found)
             laid = [one.film_um(timed) for one in self.films]
-            expected = [found.density @ films for films in problem.films]
+            expected = problem.films_um(found)
             off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
             if off <= FILM_AGREEMENT * self.target_um:
                 break
@@ -132,18 +127,17 @@ class _Search:
         return Retiming(self.original, timed, self.target_um, names, limits, of_path)
 
     def _problem(
-        self, programme: Programme, nodes: Nodes, density: Density | None, open_ends: np.ndarray
+        self, nodes: Nodes, density: Density | None, open_ends: np.ndarray
     ) -> tuple[Problem, Density]:
         """The problem about a density; without one, about even speeds."""
         original = self.original
-        bounds = speed_bounds(replace(original, openings=programme.openings), nodes, self.request)
+        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, self.request)
         now = density or self._mean_density(nodes)
-        timed = self._timed(programme, nodes, now)
+        timed = self._timed(nodes, now)
         films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
         flow = np.array([opening.flow for opening in original.openings])
-        sprayed_s = self.target_over_mean * float(
-            flow @ np.diff(original.seconds_at(original.ends_m))[:, 0]
-        )
+        seconds = np.diff(original.seconds_at(original.ends_m))[:, 0]
+        sprayed_s = self.target_over_mean * float(flow @ seconds)
         return Problem(
             films, self.target_um, self.bands, nodes, bounds, self.request, sprayed_s, open_ends
         ), now
@@ -160,13 +154,11 @@ class _Search:
         )
         return Density((flow * slowness)[nodes.opening], flow)
 
-    def _timed(self, programme: Programme, nodes: Nodes, density: Density) -> Programme:
-        openings = tuple(
-            replace(opening, flow=float(flow))
-            for opening, flow in zip(nodes.openings, density.flow, strict=True)
-        )
-        slowness = density.slowness(nodes)
-        return retime(replace(programme, openings=openings), nodes, slowness, self.request)
+    def _timed(self, nodes: Nodes, density: Density) -> Programme:
+        flows = zip(nodes.openings, density.flow.tolist(), strict=True)
+        openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
+        programme = replace(self.original, openings=openings)
+        return retime(programme, nodes, density.slowness(nodes), self.request)
 
     def _binding_limits(
         self, problem: Problem, found: Density, sigma_n: float
@@ -182,8 +174,7 @@ class _Search:
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
-    density = solve(problem, start, ROUGH_ROUNDS).density
-    return _sigma_n([density @ films for films in problem.films])
+    return _sigma_n(problem.films_um(solve(problem, start, ROUGH_ROUNDS)))
 
 
 def _sigma_n(films_um: Sequence[np.ndarray]) -> float:
@@ -239,40 +230,35 @@ def _may_be_closed(
         return near
     for number, opening in enumerate(original):
         rows = nodes.rows(number)
-        cut = _most_cut_m(opening, request)
-        place = nodes.travel_m[rows]
-        near[rows] = (place < opening.on_m + cut) | (place > opening.off_m - cut)
+        place, (first, last) = nodes.travel_m[rows], _kept_m(opening, request)
+        near[rows] = (place < first) | (place > last)
     return near
 
 
+def _kept_m(opening: Opening, request: ImproveRequest) -> tuple[float, float]:
+    """Latest place at which an opening may begin, and earliest at which it may end."""
+    # An opening is not cut to less than 30 % of its length.
+    cut = min(request.trigger_cut_m, 0.35 * (opening.off_m - opening.on_m))
+    return opening.on_m + cut, opening.off_m - cut
+
+
 def _openings(
-    nodes: Nodes,
-    density: np.ndarray,
-    open_ends: np.ndarray,
-    greatest_m_per_s: np.ndarray,
-    original: tuple[Opening, ...],
-    request: ImproveRequest,
+    relaxed: Problem, density: np.ndarray, original: tuple[Opening, ...]
 ) -> tuple[Opening, ...]:
     """Openings that begin and end where the relaxed density reaches half of the least possible."""
-    found = []
+    found, nodes = [], relaxed.nodes
     for number, opening in enumerate(nodes.openings):
         rows = nodes.rows(number)
         place = nodes.travel_m[rows]
-        least = opening.flow / greatest_m_per_s[rows]
+        least = opening.flow / relaxed.bounds[0][rows]
         worth = (density[rows] - 0.5 * least) / least
-        cut = _most_cut_m(original[number], request)
-        kept = np.flatnonzero(~open_ends[rows] | (worth > 0.0))
+        kept = np.flatnonzero(~relaxed.open_ends[rows] | (worth > 0.0))
         first, last = int(kept[0]), int(kept[-1])
-        on = min(_crossing_m(place, worth, first, first - 1), original[number].on_m + cut)
-        off = max(_crossing_m(place, worth, last, last + 1), original[number].off_m - cut)
+        latest, earliest = _kept_m(original[number], relaxed.request)
+        on = min(_crossing_m(place, worth, first, first - 1), latest)
+        off = max(_crossing_m(place, worth, last, last + 1), earliest)
         found.append(replace(opening, on_m=on, off_m=off))
     return tuple(found)
-
-
-def _most_cut_m(opening: Opening, request: ImproveRequest) -> float:
-    length = opening.off_m - opening.on_m
-    # An opening is not cut to less than 30 % of its length.
-    return min(request.trigger_cut_m, 0.35 * length)
 
 
 def _crossing_m(place_m: np.ndarray, worth: np.ndarray, inside: int, outside: int) -> float:

@@ -1,7 +1,6 @@
 """The part's surface as a taught path sees it: a smooth height over a plane before the part."""
 
 import math
-from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -14,36 +13,14 @@ from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 
 
-@dataclass(frozen=True)
-class PassAxes:
-    """Axes in which passes are laid, seen from the gun's side."""
-
-    origin_m: np.ndarray  # (3,) middle of the part
-    travel: np.ndarray  # (3,) unit vector of the first pass's direction
-    # (3,) unit vector, tool z times travel: to the right of travel as the gun sees it.
-    across: np.ndarray
-    outward: np.ndarray  # (3,) unit vector from the part to the gun
-
-    def coordinates_m(self, points_m: np.ndarray) -> np.ndarray:
-        """(N, 3) distances along travel, across and outward [m]."""
-        return (points_m - self.origin_m) @ self.matrix
-
-    def points_m(self, coordinates_m: np.ndarray) -> np.ndarray:
-        """(N, 3) places of such coordinates [m]."""
-        return self.origin_m + coordinates_m @ self.matrix.T
-
-    @property
-    def matrix(self) -> np.ndarray:
-        """(3, 3) travel, across and outward as columns."""
-        return np.stack([self.travel, self.across, self.outward], axis=1)
-
-
 def pass_axes(
     surface: Surface, direction: str = 'horizontal', outward: ArrayLike | None = None
-) -> PassAxes:
-    """Axes for horizontal passes, to the right as the gun sees it, or vertical ones, downward.
+) -> np.ndarray:
+    """(3, 3) unit vectors along which passes are laid, a row each: travel, across and outward.
 
-    ``outward`` leads from the part to the gun, any length; default: the mean normal.
+    Horizontal passes run to the right as the gun sees it, vertical ones down; ``across`` lies to
+    the right of that. ``outward`` leads from the part to the gun, any length; default: the mean
+    normal.
 
     Raises:
         PlanError: the part has no side to paint from.
@@ -60,24 +37,24 @@ def pass_axes(
     side = side / np.linalg.norm(side)
     toward = across_axis if direction == 'horizontal' else downhill_axis
     travel = toward(side, surface.down)
-    return PassAxes(surface.centre_m, travel, np.cross(-side, travel), side)
+    return np.stack([travel, np.cross(-side, travel), side])
 
 
 class SurfaceMap:
     """Smoothed height and slope of the painted side over (travel, across).
 
-    About each place a plane is fitted to the surface with Gaussian weights of half the radius [m].
+    The axes are those of ``pass_axes``, from the middle of the part. About each place a plane is
+    fitted to the surface with Gaussian weights of half the radius [m].
     Past the part's edges height and slope go over to what they are at the edge.
     """
 
-    def __init__(self, surface: Surface, axes: PassAxes, radius_m: float) -> None:
-        self.axes = axes
-        self.radius_m = radius_m
-        facing = surface.normals @ axes.outward
-        self.painted = painted_side(surface, axes)
+    def __init__(self, surface: Surface, axes: np.ndarray, radius_m: float) -> None:
+        self.axes, self.radius_m, self.origin_m = axes, radius_m, surface.centre_m
+        self.painted = painted_side(surface, axes[2])
         if not self.painted.any():
             raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
-        self.surface_m = axes.coordinates_m(surface.vertices_m[self.painted])
+        self.surface_m = (surface.vertices_m[self.painted] - self.origin_m) @ axes.T
+        facing = surface.normals @ axes[2]
         weight = surface.vertex_areas_m2[self.painted] * facing[self.painted]
         cell = min(max(radius_m / 5.0, 0.004), 0.02)
         cell = max(cell, surface.longest_edge_m)
@@ -101,7 +78,12 @@ class SurfaceMap:
         """(N, 3) unit normals of the smoothed surface, in the part's frame."""
         slopes = [spline.ev(travel_m, across_m) for spline in self._splines[1:]]
         normals = np.stack([-slopes[0], -slopes[1], np.ones(len(slopes[0]))], axis=1)
-        return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes.matrix.T
+        return normals / np.linalg.norm(normals, axis=1, keepdims=True) @ self.axes
+
+    def places_m(self, travel_m: np.ndarray, across_m: np.ndarray) -> np.ndarray:
+        """(N, 3) places on the smoothed surface, in the part's frame [m]."""
+        height_m = self.height_m(travel_m, across_m)
+        return self.origin_m + np.stack([travel_m, across_m, height_m], axis=1) @ self.axes
 
     @cached_property
     def extent_m(self) -> np.ndarray:
@@ -160,10 +142,10 @@ class SurfaceMap:
         return share * held + (1.0 - share) * blended
 
 
-def painted_side(surface: Surface, axes: PassAxes) -> np.ndarray:
-    """(V,) bool, vertices that face the gun with nothing of the part before them."""
-    starts = surface.vertices_m + 1e-3 * axes.outward
-    directions = np.ascontiguousarray(np.broadcast_to(axes.outward, starts.shape))
+def painted_side(surface: Surface, outward: np.ndarray) -> np.ndarray:
+    """(V,) bool, vertices that face a gun that is ``outward`` (3,), with nothing before them."""
+    starts = surface.vertices_m + 1e-3 * outward
+    directions = np.ascontiguousarray(np.broadcast_to(outward, starts.shape))
     in_front = surface.first_faces(starts, directions) < 0
     # Surface that leans further from the gun's side than this is not painted from it.
-    return (surface.normals @ axes.outward > math.cos(math.radians(75.0))) & in_front
+    return (surface.normals @ outward > math.cos(math.radians(75.0))) & in_front

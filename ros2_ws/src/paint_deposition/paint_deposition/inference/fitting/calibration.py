@@ -15,8 +15,8 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
-from paint_deposition.film.paint_used import efficiency, impossible_brushes
 from paint_deposition.film.spray_geometry import SprayGeometry
+from paint_deposition.film.statistics import efficiency, impossible_brushes
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.estimates import (
     Correlation,

@@ -10,7 +10,7 @@ from scipy.cluster.vq import kmeans2
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.facet_error import facet_errors_um
+from paint_deposition.film.spray_geometry import facet_errors_um
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, fit_at, fit_readings
 from paint_deposition.inference.fitting.outliers import Outlier

@@ -105,8 +105,8 @@ class OutwardSide:
             if poses is None:
                 continue
             positions, axes = poses.finite_axes()
-            seen = facing(surface, positions, axes)
-            pointing = seen.front + seen.back
+            front, back, _ = facing(surface, positions, axes)
+            pointing = front + back
             # So many that point at the part, or so many in all, have decided.
             decided = pointing >= 50 or len(poses) >= POSES_CONSIDERED
             if decided:

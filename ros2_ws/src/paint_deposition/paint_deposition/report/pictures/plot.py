@@ -9,7 +9,7 @@ from paint_deposition.inference.comparison.comparison import Comparison
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.calibration import Calibration
-from paint_deposition.planning.part_plan import PartPlan
+from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import draw_film
