@@ -171,7 +171,7 @@ def test_what_is_not_known_with_effects_is_left_out_and_named():
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'speed_m_per_s': -0.2}, 'speed_m_per_s is -0.2'),
-        ({'speed_m_per_s': 200.0}, 'a number 0.005 to 3: Speed of the passes'),
+        ({'speed_m_per_s': 200.0}, 'a number 0.005 to 3: speed of the passes'),
         ({'speed_m_per_s': None, 'target_um': 2e4}, 'the closest is'),
         ({'tolerance': 1e-5}, r'the closest is 0\.\d+ %'),
         ({'index_min_m': 0.9}, 'is empty'),
