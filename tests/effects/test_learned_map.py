@@ -48,20 +48,16 @@ def test_places_are_to_the_right_of_the_centre_and_above_it_as_the_gun_sees_the_
 
 
 @pytest.mark.parametrize('kind', ['factor', 'addition'])
-def test_the_film_changes_by_the_map_where_the_part_is_its_own(kind):
+def test_the_film_changes_by_the_map_on_its_part_and_on_no_other(kind):
     law = on_part(kind=kind)
     film_um = np.linspace(5.0, 30.0, len(PANEL))
     h = grid_on(PANEL).weights(places_m(PANEL)) @ GRID.ravel()
     expected = film_um * (1.0 + h) if kind == 'factor' else film_um + h
     np.testing.assert_allclose(law.on_film(film_um, PANEL), expected, rtol=1e-12)
     assert np.ptp(h) > 0.4
-
-
-@pytest.mark.parametrize('surface', [door(), panel(0.25)], ids=['door', 'smaller panel'])
-def test_another_part_is_left_alone(surface):
-    points = surface.points()
-    film_um = np.ones(len(points))
-    assert on_part().on_film(film_um, points) is film_um
+    for other in (door(), panel(0.25)):
+        film_um = np.ones(len(other.points()))
+        assert law.on_film(film_um, other.points()) is film_um
 
 
 @pytest.mark.parametrize(('kind', 'count'), [('factor', 1), ('addition', 60)])

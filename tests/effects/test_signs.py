@@ -5,20 +5,23 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from booth import door, painted, panel, panel_with_screen, path_of, serpentine, spot
+from booth import (
+    centroid_m,
+    door,
+    painted,
+    panel,
+    panel_with_screen,
+    path_of,
+    serpentine,
+    spot,
+    spread_m,
+    volume_cm3,
+)
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.part.points import SurfacePoints
 
 X, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 Figure = Callable[[np.ndarray, SurfacePoints], float]
-
-
-def volume(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return float(film_um @ points.area_m2)
-
-
-def centroid_m(film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-    return (film_um * points.area_m2) @ points.positions_m / volume(film_um, points)
 
 
 def along(axis: np.ndarray) -> Figure:
@@ -29,11 +32,6 @@ def negative(figure: Figure) -> Figure:
     return lambda film_um, points: -figure(film_um, points)
 
 
-def width(film_um: np.ndarray, points: SurfacePoints) -> float:
-    offsets = points.positions_m - centroid_m(film_um, points)
-    return float((film_um * points.area_m2) @ (offsets**2).sum(axis=1) / volume(film_um, points))
-
-
 def on_ridges(film_um: np.ndarray, points: SurfacePoints) -> float:
     return float(film_um[points.curvature_per_m < -1.0].sum())
 
@@ -42,6 +40,7 @@ def off_valleys(film_um: np.ndarray, points: SurfacePoints) -> float:
     return -float(film_um[points.curvature_per_m > 1.0].sum())
 
 
+volume, width = volume_cm3, spread_m
 rightward, leftward, upward, downward = along(X), along(-X), along(UP), along(-UP)
 narrowness, loss = negative(width), negative(volume)
 FAR, NEAR = spot(standoff_m=0.32), spot(standoff_m=0.2)

@@ -10,6 +10,7 @@ import pytest
 from numba import njit
 
 from booth import SAMPLES, painted, panel, path_of, serpentine
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
@@ -118,6 +119,16 @@ def test_places_are_tried_out(own, place, body, message):
     with np.errstate(all='ignore'), pytest.raises(ModelError) as refused:
         load_effect_file(path)
     assert message in str(refused.value)
+
+
+def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
+    text = (repository / 'docs/own_effect.md').read_text(encoding='utf-8')
+    assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
+    for name in Ray._fields:
+        assert f'`{name}`' in text
+    for place in ('flux_factor', 'pattern_scale', 'on_path', 'on_film', 'on_gauge'):
+        assert f'`{place}(' in text
+        assert hasattr(Effect, place)
 
 
 def test_a_missing_file_is_named(tmp_path: Path):
