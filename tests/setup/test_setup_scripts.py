@@ -24,40 +24,35 @@ def prerequisites(repository, tmp_path):
     return run
 
 
+COMPLETE = ('g++', 'cmake', 'make')
+
+
 def test_complete_machine_names_its_python(prerequisites):
-    done = prerequisites(['g++', 'cmake', 'make'])
+    done = prerequisites(COMPLETE)
     assert (done.returncode, done.stderr) == (0, '')
     assert os.path.samefile(done.stdout.strip(), sys._base_executable)
 
 
-def test_everything_missing_is_named_with_one_line(prerequisites):
-    done = prerequisites(['make'])
+@pytest.mark.parametrize(
+    ('tools', 'variables', 'said'),
+    [
+        (['make'], {}, ['Missing: g++, cmake.', 'sudo apt install g++ cmake']),
+        (COMPLETE, {'PYTHON': '/nowhere/python3'},
+         ['Python 3.10 to 3.13', 'sudo apt install python3 python3-venv python3-dev']),
+        (COMPLETE, {'ROS_DISTRO': 'humble', 'ROS_VERSION': '2'}, ['Jazzy or newer']),
+    ],
+    ids=['tools', 'python', 'old ros'],
+)  # fmt: skip
+def test_what_is_missing_is_named_once_with_its_remedy(prerequisites, tools, variables, said):
+    done = prerequisites(tools, **variables)
     assert done.returncode == 1
-    assert 'Missing: g++, cmake.' in done.stderr
-    assert done.stderr.count('sudo apt install g++ cmake') == 1
+    assert [done.stderr.count(words) for words in said] == [1] * len(said), done.stderr
 
 
-def test_missing_python_is_named(prerequisites):
-    done = prerequisites(['g++', 'cmake', 'make'], PYTHON='/nowhere/python3')
-    assert done.returncode == 1
-    assert 'Python 3.10 to 3.13' in done.stderr
-    assert 'sudo apt install python3 python3-venv python3-dev' in done.stderr
-
-
-def test_old_ros_is_refused(prerequisites):
-    done = prerequisites(['g++', 'cmake', 'make'], ROS_DISTRO='humble', ROS_VERSION='2')
-    assert done.returncode == 1
-    assert 'Jazzy or newer' in done.stderr
-
-
-def test_environment_can_be_sourced_twice(repository):
+def test_paint_is_a_command_once_the_environment_is_sourced_and_twice_is_once(repository):
     source = '. setup/environment.sh'
-    script = f'set -eu; {source}; first=$PATH; {source}; [ "$PATH" = "$first" ]'
-    subprocess.run(['bash', '-c', script], cwd=repository, check=True)
-
-
-def test_paint_is_a_command_once_the_environment_is_sourced(repository):
-    script = '. setup/environment.sh; command -v paint bag_player'
+    script = f'set -eu; {source}; first=$PATH; {source}; [ "$PATH" = "$first" ]; '
+    script += 'command -v paint bag_player'
     done = subprocess.run(
         ['bash', '-c', script], cwd=repository, check=True, capture_output=True, text=True
     )
