@@ -31,12 +31,8 @@ def film(panel):
 
 
 @pytest.fixture(scope='module')
-def campaign():
-    return pd.read_campaign(SAMPLES / 'measured_door/unseen.yaml')
-
-
-@pytest.fixture(scope='module')
-def comparison(campaign):
+def comparison():
+    campaign = pd.read_campaign(SAMPLES / 'measured_door/unseen.yaml')
     return pd.compare(campaign, pd.DepositionModel())
 
 
@@ -91,11 +87,10 @@ def test_results_show_and_tell_themselves(name, request, tmp_path, undrawn):
     assert told == figures
 
 
-def test_what_is_no_result_is_refused(tmp_path):
+@pytest.mark.parametrize('take', [pd.plot, pd.write])
+def test_what_is_no_result_is_refused(take, tmp_path):
     with pytest.raises(TypeError, match='str is not a result'):
-        pd.plot('film', ax=Figure().subplots())
-    with pytest.raises(TypeError, match='str is not a result'):
-        pd.write('film', tmp_path)
+        take('film', tmp_path)
 
 
 @pytest.mark.slow
