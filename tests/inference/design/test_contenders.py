@@ -1,5 +1,6 @@
 """How much further readings tell between explanations, against draws of these readings."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -48,36 +49,30 @@ def test_the_log_odds_are_those_of_readings_that_are_drawn():
 
 def test_nothing_tells_between_explanations_that_say_the_same():
     told = forecast()
-    same = Forecast(
-        told.contenders, np.zeros(3), np.tile(told.means[0], (3, 1)),
-        np.tile(told.factors[0], (3, 1, 1)),
-    )  # fmt: skip
+    same = replace(
+        told,
+        log_weight=np.zeros(3),
+        means=np.tile(told.means[0], (3, 1)),
+        factors=np.tile(told.factors[0], (3, 1, 1)),
+    )
     assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
     assert same.chance == 0.0
 
 
-def test_equal_errors_leave_the_distance_of_the_means():
-    told = forecast(spread=0.0)
-    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
-    away = float(np.linalg.norm(told.means[1] - told.means[0]))
-    assert two.separations == pytest.approx((0.0, away))
-
-
-def test_single_readings_add_up_to_all_of_them():
-    told = forecast(spread=0.0)
+@pytest.mark.parametrize(('spread', 'tolerance'), [(0.0, 1e-6), (0.5, 0.15)])
+def test_single_readings_add_up_to_all_of_them(spread, tolerance):
+    """With errors that differ the mean of what is read so far goes on: about as much."""
+    told = forecast(spread)
     placement = Placement(told)
     for reading in range(READINGS):
         placement.take(reading)
-    pair = placement.nearest()
-    assert placement.separation(pair) == pytest.approx(told.separations[1])
-    # With errors that differ the mean of what is read so far goes on: about as much.
-    told = forecast(spread=0.5)
-    placement = Placement(told)
-    for reading in range(READINGS):
-        placement.take(reading)
-    assert placement.separation(placement.nearest()) == pytest.approx(
-        told.separations[1], rel=0.15
-    )
+    found = placement.separation(placement.nearest())
+    assert found == pytest.approx(told.separations[1], rel=tolerance)
+    if not spread:
+        # Equal errors leave the distance of the means.
+        two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+        away = float(np.linalg.norm(told.means[1] - told.means[0]))
+        assert two.separations == pytest.approx((0.0, away))
 
 
 def test_some_readings_are_predicted_from_others():

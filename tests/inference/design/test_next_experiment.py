@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.inference.design.contenders import contenders_of
 from paint_deposition.inference.design.next_experiment import (
     EDGE_MARGIN_M,
@@ -21,8 +20,6 @@ from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass,
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.readings import Readings
 
 BY_KEY = {change.key: change for change in MENU}
 
@@ -31,12 +28,12 @@ BY_KEY = {change.key: change for change in MENU}
 def study(repository):
     """One panel of a sample study."""
     folder = repository / 'ros2_ws/src/paint_deposition/samples/panel_study'
-    return Study.of(Campaign(read_campaign(folder / 'campaign.yaml').experiments[:1]))
+    return Study.of(pd.Campaign(pd.read_campaign(folder / 'campaign.yaml').experiments[:1]))
 
 
 @pytest.fixture(scope='module')
 def fit(study):
-    return study.fit(FreeParameters.of(DepositionModel()), starts=3)
+    return study.fit(FreeParameters.of(pd.DepositionModel()), starts=3)
 
 
 @pytest.fixture(scope='module')
@@ -47,8 +44,8 @@ def drifting(study, fit):
     film_um = Forward(study.campaign, drifting.effects).predict_um(drifting)
     noise_um = study.gauge_um * np.random.default_rng(2).normal(size=len(film_um))
     places_m = panel.measured_points.positions_m
-    readings = Readings.of(places_m, film_um + noise_um, sigma_um=study.gauge_um)
-    return Study.of(Campaign((panel.with_readings(readings),)), drifting.effects)
+    readings = pd.Readings.of(places_m, film_um + noise_um, sigma_um=study.gauge_um)
+    return Study.of(pd.Campaign((panel.with_readings(readings),)), drifting.effects)
 
 
 @pytest.fixture(scope='module')
@@ -59,35 +56,27 @@ def drift_or_tool(drifting, fit):
     return propose(drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS))
 
 
-def best_of(sprays, key):
-    """The spray with this change alone."""
-    return next(spray for spray in sprays if spray.changes == (key,))
-
-
 @pytest.mark.slow
-def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drift_or_tool):
+def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_tool):
     """The air drifts in the booth, the tool is off in its own frame."""
-    _, sprays = drift_or_tool
-    rolled = best_of(sprays, 'roll_180')
+    by_changes = {spray.changes: spray for spray in drift_or_tool[1]}
+    rolled = by_changes['roll_180',]
     assert rolled.separates == ('air_drift', 'tcp_offset', 'footprint')
     assert rolled.separation > 2.0 * rolled.now
     # Half a turn of the part in the booth does to the air what half a turn of the gun does to it.
-    assert best_of(sprays, 'upside_down').separation > 0.8 * rolled.separation
+    assert by_changes['upside_down',].separation > 0.8 * rolled.separation
     assert rolled.chance > 0.7
     # The order of the passes tells nothing of it: it is not among the best.
-    assert all(spray.changes != ('reverse_order',) for spray in sprays)
-
-
-@pytest.mark.slow
-def test_a_rolled_gun_on_one_spot_tells_the_air_from_the_tool(drifting, drift_or_tool):
-    points = drifting.campaign.experiments[0].measured_points
-    spot = next(s for s in drift_or_tool[1] if s.changes == ('standing', 'roll_180'))
+    assert ('reverse_order',) not in by_changes
+    # One spot will do.
+    spot = by_changes['standing', 'roll_180']
     assert spot.separation > 2.0 * spot.now
     told = spot.to_dict()['stand']
     assert told['dwell_s'] > 0.5
     assert f'{told["dwell_s"]:.1f} s' in spot.what
     assert told['peak_um'] <= drifting.measured_um.max()
     at = np.array([told['x_m'], told['y_m'], told['z_m']])
+    points = drifting.campaign.experiments[0].measured_points
     (row,) = np.flatnonzero((points.positions_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
 
@@ -103,16 +92,19 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
     apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
     assert (apart + np.eye(len(places)) > SPACING_M).all()
     assert 'air_drift' in places[0].why
+    told = places[0].to_dict()
+    assert [told[axis] for axis in ('x_m', 'y_m', 'z_m')] == positions[0].tolist()
+    assert (told['experiment'], told['why']) == (places[0].experiment, places[0].why)
     film_um = np.array([place.film_um for place in places])
     assert 0.2 * study.measured_um.mean() < film_um.min() < film_um.max() < 100.0
 
 
 def test_without_voltage_what_needs_it_is_gone(study):
     experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
-    model = DepositionModel(effects=(EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)))
-    left = model.without(experiment.switched_off)
+    edge, drift = EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)
+    left = pd.DepositionModel(effects=(edge, drift)).without(experiment.switched_off)
     assert left.effect('edge_build').is_neutral
-    assert left.effect('air_drift') == AirDrift(shift_down_m=0.03)
+    assert left.effect('air_drift') == drift
 
 
 @pytest.mark.parametrize('change', MENU, ids=lambda change: change.key)
@@ -168,12 +160,3 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
         assert contenders_of(diagnosis, EFFECTS) == ()
         assert with_proposals(diagnosis, EFFECTS).proposals == ((), ())
     assert contenders_of(diagnosed(study, fit, group), {}) == ()
-
-
-def test_all_errors_of_the_figures_are_of_one_residual(study, fit):
-    step = Step.of(study, '', fit)
-    found = replace(diagnosed(study, fit), history=(step,)).to_dict()
-    errors = {'rmse_before_um': step.rmse_um, 'rmse_after_um': step.rmse_um}
-    assert found['experiments'] == [{'name': study.campaign.experiments[0].name} | errors]
-    assert found['rmse_um']['before'] == step.rmse_um
-    assert found['rmse_um']['left_out'] in ('experiments', 'points')

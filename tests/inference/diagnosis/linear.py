@@ -42,14 +42,7 @@ def linear_fit(
     data: np.ndarray | None = None,
     parameters: FreeParameters = PARAMETERS,
 ) -> Fit:
-    """Most probable values of a linear model with the parameters' prior and noise 1.
-
-    Args:
-        random: draws the model, and data from it if none are given.
-        count: of the readings.
-        data: (count,) readings.
-        parameters: whose prior is taken.
-    """
+    """A fit of readings (count,), drawn if not given, of a linear model with noise 1."""
     prior = parameters.prior
     jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening
     if data is None:
@@ -81,13 +74,7 @@ def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
 
 
 def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
-    """Curves of unit size over a covariate, for readings of which each has one value.
-
-    Args:
-        place: (P,) values, in knots from the first on.
-        knots: of the curve.
-        length: of correlation, in standard deviations of the values.
-    """
+    """Curves of unit size over a covariate of which each reading has one value, in knots (P,)."""
     spread = float(np.std(place))
     at = np.arange(knots)[:, np.newaxis] / spread
     basis = Basis(CURVES['height_fraction'], {}, hat_weights(place, knots), at, 1.0 / spread)

@@ -7,13 +7,7 @@ import pytest
 from scipy.integrate import dblquad
 from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
-from inference.diagnosis.linear import (
-    KNOWN,
-    PARAMETERS,
-    deviation,
-    linear_fit,
-    null_of,
-)
+from inference.diagnosis.linear import KNOWN, PARAMETERS, deviation, linear_fit, null_of
 from inference.diagnosis.linear import prior_covariance as covariance_of
 from paint_deposition.inference.diagnosis.gaussian import (
     NullModel,
@@ -72,10 +66,9 @@ def test_the_null_model_has_the_covariance_of_pattern_nuisance_and_discrepancy(
 @pytest.mark.parametrize('freedom', [np.inf, 9.0])
 def test_log_evidence_is_the_log_density_up_to_a_constant(fit, columns, discrepancy, freedom):
     """So that null models of the same readings can be compared."""
-    nulls = [NullModel.around(fit, columns, discrepancy=size * discrepancy) for size in (0.1, 1.0)]
-    data = np.random.default_rng(5).normal(size=(READINGS, 4))
-    differences = []
-    for null in nulls:
+    data, differences = np.random.default_rng(5).normal(size=(READINGS, 4)), []
+    for size in (0.1, 1.0):
+        null = NullModel.around(fit, columns, discrepancy=size * discrepancy)
         density = log_density(data.T, null.lower @ null.lower.T, freedom)
         differences.append(density - null.log_evidence(null.whiten(data), freedom))
     assert np.ptp(differences) == pytest.approx(0.0, abs=1e-9)

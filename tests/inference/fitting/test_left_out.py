@@ -6,34 +6,26 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from inference.fitting.panels import gauged
-from paint_deposition.effects.deposition_model import DepositionModel
+from inference.fitting.panels import gauged, reading
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.inference.diagnosis.verdict import Step
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.readings import root_mean_square
 
-BASE = DepositionModel()
+BASE = pd.DepositionModel()
 # Heights of the passes on each panel [m], and how much more paint it got than the model says.
 PASSES_M = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8))
 LEVELS = (1.03, 0.97, 1.04)
 MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
 
 
-def levelled(truth: DepositionModel) -> Campaign:
+def levelled(truth: pd.DepositionModel) -> pd.Campaign:
     """Panels, each with passes of its own and more or less paint than the others."""
-    found = []
     panels = gauged(truth, seed=4, orders=PASSES_M).experiments
-    for panel, level in zip(panels, LEVELS, strict=True):
-        readings = replace(panel.readings, thickness_um=level * panel.readings.thickness_um)
-        found.append(panel.with_readings(readings))
-    return Campaign(tuple(found))
-
-
-def without(campaign: Campaign, number: int) -> Campaign:
-    kept = [one for k, one in enumerate(campaign.experiments) if k != number]
-    return Campaign(tuple(kept))
+    return pd.Campaign(tuple(
+        reading(panel, level * panel.readings.thickness_um)
+        for panel, level in zip(panels, LEVELS, strict=True)
+    ))  # fmt: skip
 
 
 @pytest.mark.slow
@@ -47,17 +39,17 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
     for number, part in enumerate(campaign.experiments):
         out = owner == number
         left_um = (study.measured_um - study.predicted_without_um(fit, out))[out]
-        model = pd.refit(without(campaign, number), None, BASE).model
-        other_um = pd.compare(Campaign((part,)), model).points.residual_um
+        others = pd.Campaign(tuple(one for one in campaign.experiments if one is not part))
+        model = pd.refit(others, None, BASE).model
+        other_um = pd.compare(pd.Campaign((part,)), model).points.residual_um
         assert root_mean_square(left_um) == pytest.approx(root_mean_square(other_um), rel=0.03)
         found_um.append(left_um)
         anew_um.append(other_um)
     step = Step.of(study, '', fit)
     assert np.array_equal(study.folds(), owner)
-    assert step.holdout_rmse_um == pytest.approx(root_mean_square(np.concatenate(found_um)))
-    assert step.holdout_rmse_um == pytest.approx(
-        root_mean_square(np.concatenate(anew_um)), rel=0.02
-    )
+    found, anew = (root_mean_square(np.concatenate(each)) for each in (found_um, anew_um))
+    assert step.holdout_rmse_um == pytest.approx(found)
+    assert step.holdout_rmse_um == pytest.approx(anew, rel=0.02)
     # The level of a part is not known beforehand.
     assert step.holdout_rmse_um > step.rmse_um
 
@@ -71,14 +63,12 @@ def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
     """However wrong they are: neither by themselves nor by the level of their part."""
     study, fit = study_and_fit
     out = study.campaign.experiment_of == 1
-    part = study.campaign.experiments[1]
-    wrong = replace(part.readings, thickness_um=part.readings.thickness_um + 100.0)
-    experiments = [*study.campaign.experiments]
-    experiments[1] = part.with_readings(wrong)
-    other = replace(study, campaign=Campaign(tuple(experiments)))
+    first, part, last = study.campaign.experiments
+    wrong = reading(part, part.readings.thickness_um + 100.0)
+    other = replace(study, campaign=pd.Campaign((first, wrong, last)))
     assert (other.measured_um[out] > study.measured_um[out] + 99.0).all()
-    first, second = (one.predicted_without_um(fit, out) for one in (study, other))
-    assert second == pytest.approx(first, rel=1e-4, abs=1e-3)
+    before, after = (one.predicted_without_um(fit, out) for one in (study, other))
+    assert after == pytest.approx(before, rel=1e-4, abs=1e-3)
 
 
 def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):

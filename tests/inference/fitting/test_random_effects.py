@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from inference.diagnosis.linear import fit_linear
 from inference.fitting.panels import grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.fitting.random_effects import (
     LEVEL_SHARE,
     OTHER_LEVEL_SHARE,
@@ -17,15 +17,21 @@ from paint_deposition.inference.fitting.random_effects import (
     random_effects,
 )
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN
 
 
-def part(name: str, session: str = '') -> Experiment:
+def part(name: str, session: str | np.ndarray = '') -> Experiment:
     """Read from the middle of the pass to where hardly any paint arrives."""
-    one = painted_by(DepositionModel(), passes([1.0]), grid_m(4, 10, 1.0, 1.5))
-    readings = replace(one.readings, session=np.full(len(one.readings), session))
-    return Experiment.of(name, one.surface, one.path, readings)
+    places = grid_m(4, 10, 1.0, 1.5)
+    one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
+    return one.with_readings(
+        replace(one.readings, session=np.broadcast_to(session, len(one.readings)))
+    )
+
+
+def study_of(*parts: Experiment) -> Study:
+    return Study.of(pd.Campaign(parts))
 
 
 def estimated(study: Study, change_um: np.ndarray) -> dict:
@@ -37,7 +43,7 @@ def estimated(study: Study, change_um: np.ndarray) -> dict:
 
 
 def test_a_level_and_a_zero_come_back_with_their_uncertainty():
-    study = Study.of(Campaign((part('left'), part('right'))))
+    study = study_of(part('left'), part('right'))
     left = study.campaign.experiment_of == 0
     sign = np.where(left, 1.0, -1.0)
     found = estimated(study, sign * (0.03 * study.measured_um + 0.4))
@@ -51,20 +57,16 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert 0.0 < level.sd < 100.0 * LEVEL_SHARE / np.sqrt(2.0)
     assert 0.0 < zero.sd < SESSION_UM / np.sqrt(2.0)
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
-
-
-def test_the_one_residual_is_beside_the_levels_of_the_parts():
-    study = Study.of(Campaign((part('left'), part('right'))))
+    # The one residual is beside these levels; what all parts have in common is the model's.
     film_um = study.measured_um
-    off_um = np.where(study.campaign.experiment_of == 0, 0.03, -0.03) * film_um
-    left = study.residuals(film_um - off_um).rmse_um
-    assert left < 0.2 * np.sqrt(np.mean(off_um**2))
-    # What all parts have in common is the model's.
+    assert study.residuals((1.0 - 0.03 * sign) * film_um).rmse_um < 0.006 * np.sqrt(
+        np.mean(film_um**2)
+    )
     assert study.residuals(0.97 * film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
 def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
-    study = Study.of(Campaign((part('left', 'Monday'), part('right', 'Monday'), part('roof'))))
+    study = study_of(part('left', 'Monday'), part('right', 'Monday'), part('roof'))
     level, zero = study.random_effects
     assert level.names == ('left', 'right', 'roof')
     assert zero.names == ('Monday', 'roof')
@@ -72,9 +74,7 @@ def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
 
 
 def test_a_part_without_voltage_has_a_level_of_its_own():
-    usual = part('usual')
-    off = replace(part('off'), switched_off=frozenset(['voltage']))
-    study = Study.of(Campaign((usual, off)))
+    study = study_of(part('usual'), replace(part('off'), switched_off=frozenset(['voltage'])))
     level, _ = study.random_effects
     first, other = level.columns.T
     assert not first.any()  # there is no other part that it could differ from
@@ -88,7 +88,7 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
 
 
 def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
-    study = Study.of(Campaign((part('left'), part('roof'), part('right'))))
+    study = study_of(part('left'), part('roof'), part('right'))
     owner = study.campaign.experiment_of
     level, zero = random_effects(study.campaign, study.measured_um, study.sigma_um, owner != 1)
     others = np.array([[0.5, 0.0, -0.5], [0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]])
@@ -101,11 +101,8 @@ def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
 
 
 def test_two_sessions_on_one_part_differ_by_their_zero():
-    one = part('door')
-    evening = np.arange(len(one)) % 2 == 0
-    session = np.where(evening, 'evening', 'noon')[one.means.owner]
-    readings = replace(one.readings, session=session)
-    study = Study.of(Campaign((Experiment.of('door', one.surface, one.path, readings),)))
+    evening = np.arange(40) % 2 == 0
+    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
     (zero,) = study.random_effects
     assert zero.kind == 'gauge zero'
     found = estimated(study, np.where(evening, 0.5, -0.5))
