@@ -7,7 +7,6 @@ import sys
 from functools import partial
 
 import matplotlib
-import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
@@ -57,14 +56,6 @@ def test_the_import_loads_nothing_else():
     )
     done = subprocess.run([sys.executable, '-c', program], capture_output=True, text=True)
     assert done.stdout == f'[] {pd.__version__}\n', done.stderr
-
-
-def test_a_film_has_arrays_and_figures(film, panel):
-    assert film.film_um.shape == (len(panel.vertices_m),)
-    assert film.predicted_um.shape == (len(film.readings),)
-    assert film.statistics.mean_um == pytest.approx(
-        np.average(film.film_um, weights=panel.vertex_areas_m2), rel=0.2
-    )
 
 
 @pytest.mark.slow

@@ -1,7 +1,12 @@
-"""Scores of results made by hand, whose answers are known."""
+"""What benchmarks compute, print and score, on results made by hand."""
+
+import re
+from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.live import ages_s
+from benchmarks.page import page_of, with_output
 from benchmarks.scores import (
     Row,
     expected_calibration_error,
@@ -15,6 +20,38 @@ from benchmarks.scores import (
     table,
     wrong,
 )
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def test_a_pose_is_as_old_as_the_first_statistics_that_know_it():
+    ms = 1_000_000
+    stamps = ms * np.array([0, 100, 200, 300])
+    # Stamp of the newest pose in the statistics, and when they arrived.
+    arrived = [(50 * ms, 60 * ms), (200 * ms, 230 * ms), (200 * ms, 400 * ms)]
+    np.testing.assert_allclose(ages_s(stamps, arrived), [0.06, 0.13, 0.03, np.inf])
+
+
+def test_only_the_place_of_the_benchmark_changes():
+    text = (
+        'before\n<!-- measured: a -->\nold\n<!-- end -->\n'
+        'between\n<!-- measured: b -->\nkept\n<!-- end -->\n'
+    )
+    new = with_output(text, 'a', r'a \1 line' + '\n', 'a.py, today')
+    assert new.startswith('before\n<!-- measured: a -->\n\n```\na.py, today\na \\1 line\n```\n')
+    assert new.endswith('between\n<!-- measured: b -->\nkept\n<!-- end -->\n')
+
+
+def test_every_place_has_a_benchmark_that_fills_it(tmp_path):
+    pages = ''.join(page.read_text(encoding='utf-8') for page in (ROOT / 'docs').glob('*.md'))
+    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+    names = re.findall('<!-- measured: (.+?) -->', pages)
+    assert names
+    for name in names:
+        assert (ROOT / f'benchmarks/{name}.py').is_file(), name
+        assert f'benchmarks.page {name} ' in makefile, name
+    with pytest.raises(SystemExit, match='0 pages'):
+        page_of('a', tmp_path)
 
 
 def result(case, **fields):
@@ -90,14 +127,6 @@ def test_what_is_stated_is_compared_with_what_is_observed():
     error, count = expected_calibration_error(every)
     assert count == 6
     assert error == pytest.approx((0.9 + 0.3 + 0.5 + 2 * 0.375 + 0.97) / 6)
-
-
-def test_more_values_of_one_campaign_do_not_narrow_an_interval():
-    once = [(str(k), float(k % 3 == 0)) for k in range(30)]
-    often = [value for value in once for _ in range(20)]
-    np.testing.assert_allclose(interval(once), interval(often), atol=0.06)
-    apart = [(f'{case} {k}', value) for k, (case, value) in enumerate(often)]
-    assert np.ptp(interval(apart)) < 0.35 * np.ptp(interval(once))
 
 
 def test_an_interval_covers_as_often_as_it_says():

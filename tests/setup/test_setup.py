@@ -1,9 +1,12 @@
 """The set-up's scripts as a user meets them: what is missing is named, what is done stays done."""
 
+import importlib.util
 import os
 import shutil
 import subprocess
 import sys
+import sysconfig
+from pathlib import Path
 
 import pytest
 
@@ -76,3 +79,36 @@ def test_commands_start_in_a_folder_with_spaces(repository, tmp_path):
     subprocess.run(['bash', '-c', script, '-', root], check=True)
     done = subprocess.run([command, 'a b', '$c'], capture_output=True, text=True)
     assert done.stdout == "['a b', '$c']\n", done.stderr
+
+
+HERE = f'"{sysconfig.get_path("include")};{sysconfig.get_path("purelib")}/numpy/_core/include"'
+
+
+@pytest.fixture(scope='module')
+def repair():
+    path = Path(__file__).parents[2] / 'setup' / 'repair_cmake_exports.py'
+    spec = importlib.util.spec_from_file_location('repair_cmake_exports', path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+@pytest.mark.parametrize('elsewhere', ['/opt/python/cp311-cp311', '/home/somebody/.venv'])
+def test_foreign_paths_become_ours_and_relative_ones_stay(repair, elsewhere):
+    foreign = (
+        f'"{elsewhere}/include/python3.11;'
+        f'{elsewhere}/lib/python3.11/site-packages/numpy/_core/include"'
+    )
+    relative = '"${_IMPORT_PREFIX}/include/python3.11;${_IMPORT_PREFIX}/lib/libpaint.so"'
+    assert repair.repaired(foreign) == HERE
+    for text in (HERE, relative):
+        assert repair.repaired(text) == text
+
+
+def test_a_hard_link_elsewhere_keeps_its_text(repair, tmp_path):
+    cached, installed = tmp_path / 'cached', tmp_path / 'installed'
+    cached.write_text('as built')
+    installed.hardlink_to(cached)
+    repair.replace(installed, 'repaired')
+    assert (installed.read_text(), cached.read_text()) == ('repaired', 'as built')
+    assert sorted(tmp_path.iterdir()) == [cached, installed]
