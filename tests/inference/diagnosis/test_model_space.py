@@ -7,14 +7,7 @@ import pytest
 from scipy.special import logsumexp
 from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
-from inference.diagnosis.linear import (
-    explanation_of,
-    footprint_law,
-    linear_fit,
-    no_discrepancy,
-    null_of,
-    unknown,
-)
+from inference.diagnosis import linear
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis import model_space, testability
 from paint_deposition.inference.diagnosis.discrepancy import (
@@ -25,18 +18,7 @@ from paint_deposition.inference.diagnosis.discrepancy import (
 )
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel, simulated
-from paint_deposition.inference.diagnosis.model_space import (
-    LEAST_SHARE,
-    MOST_SIZES,
-    PRIOR_EFFECT,
-    PRIOR_UNKNOWN,
-    SIZES,
-    EffectEvidence,
-    ModelSpace,
-    WeightedNull,
-    log_odds,
-    probable_hyperparameters,
-)
+from paint_deposition.inference.diagnosis.model_space import ModelSpace, WeightedNull
 from paint_deposition.inference.fitting.random_effects import smooth
 
 READINGS, NULL_RUNS, POWER_RUNS = 60, 300, 200
@@ -58,7 +40,7 @@ SHARES = (0.1, 0.3, 1.0)
 def law(name: str, *columns: np.ndarray, side: int = 1, share: float = 1.0, **shape):
     """An effect of the library by what its first amplitudes do to the readings."""
     effect = EFFECTS[name](**shape)
-    return explanation_of(effect, *columns, sides=(side,) * len(columns), share=share)
+    return linear.explanation_of(effect, *columns, sides=(side,) * len(columns), share=share)
 
 
 @pytest.fixture
@@ -67,11 +49,11 @@ def discrepancy() -> ModelDiscrepancy:
     away = np.abs(np.subtract.outer(PLACE, PLACE))
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
     return replace(
-        no_discrepancy(READINGS),
+        linear.no_discrepancy(READINGS),
         settings=tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0)),
         footprint=Footprints(
             tuple(size * footprint for size in SHARES),
-            tuple(footprint_law(size * 0.1 * np.eye(1)) for size in SHARES),
+            tuple(linear.footprint_law(size * 0.1 * np.eye(1)) for size in SHARES),
             radius_m=np.zeros(1),
             flux=np.ones(1),
         ),
@@ -81,7 +63,7 @@ def discrepancy() -> ModelDiscrepancy:
 @pytest.fixture
 def plain() -> NullModel:
     """Readings of noise alone, with the seven parameters of the pattern fitted."""
-    return null_of(linear_fit(np.random.default_rng(8), READINGS))
+    return linear.null_of(linear.linear_fit(np.random.default_rng(8), READINGS))
 
 
 @pytest.fixture
@@ -100,7 +82,7 @@ def found() -> list[Explanation]:
         ),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
-        *(unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
+        *(linear.unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
     ]
 
 
@@ -175,7 +157,7 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes_and_shapes(
 ):
     """What differs by more than nature's settings do counts as unknown."""
     shapes = [law('edge_build', c, side=0, share=0.5) for c in (JAGGED, JAGGED + WAVE)]
-    shapeless = unknown(np.stack([WAVE, JAGGED], axis=1))
+    shapeless = linear.unknown(np.stack([WAVE, JAGGED], axis=1))
     there = shifted(plain, 0.5 * JAGGED)
     sizes = [replace(SMALL, log_prior=-1.0), replace(LARGE, log_prior=-0.5), BEYOND]
     space = space_of(there, [*shapes, shapeless], discrepancy, *sizes, freedom=freedom)
@@ -194,13 +176,13 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes_and_shapes(
 
     def odds(*explanations: Explanation) -> float:
         averaged = [
-            np.log(e.share / len(SIZES)) + density(one, s * e.columns)
-            for e in explanations for one in sizes[:2] for s in SIZES
+            np.log(e.share / len(model_space.SIZES)) + density(one, s * e.columns)
+            for e in explanations for one in sizes[:2] for s in model_space.SIZES
         ]  # fmt: skip
         return logsumexp(averaged) - nothing
 
-    half = log_odds(PRIOR_UNKNOWN) - np.log(2.0)
-    of_edge = odds(*shapes) + log_odds(PRIOR_EFFECT)
+    half = model_space.log_odds(model_space.PRIOR_UNKNOWN) - np.log(2.0)
+    of_edge = odds(*shapes) + model_space.log_odds(model_space.PRIOR_EFFECT)
     of_unknown = np.logaddexp(odds(shapeless), density(BEYOND, none) - nothing) + half
     assert space.alone == pytest.approx({'edge_build': of_edge, UNKNOWN: of_unknown})
 
@@ -241,7 +223,7 @@ def test_the_size_that_made_the_readings_is_found(plain, discrepancy):
         assert space.share[[SMALL, LARGE].index(true)] > 0.9
         assert space.central.null.lower == pytest.approx(null.lower)
         assert abs(space.figures.setting_share - true.setting) < 0.1 * LARGE.setting
-        kept = probable_hyperparameters(there, discrepancy, [], np.inf)
+        kept = model_space.probable_hyperparameters(there, discrepancy, [], np.inf)
         shares = [size.setting for size in kept if not size.is_beyond_nature]
         assert true.setting in shares
         assert other.setting not in shares
@@ -264,17 +246,17 @@ def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, discrepancy):
     """A strong effect that is smooth looks like a large discrepancy as long as it is missing."""
     there, edge = shifted(plain, 6.0 * WAVE), law('edge_build', 6.0 * WAVE)
     without, with_it = (
-        probable_hyperparameters(there, discrepancy, e, np.inf) for e in ([], [edge])
+        model_space.probable_hyperparameters(there, discrepancy, e, np.inf) for e in ([], [edge])
     )
     for kept in (without, with_it):
         beyond = [size.is_beyond_nature for size in kept]
         assert {size.footprint for size in kept} == set(range(len(SHARES)))
-        assert beyond.count(False) <= MOST_SIZES * len(SHARES)
+        assert beyond.count(False) <= model_space.MOST_SIZES * len(SHARES)
         assert beyond.count(True) == len(SHARES)
     assert min(s.setting for s in with_it) < min(s.setting for s in without)
     usual = [size for size in without if not size.is_beyond_nature]
     weights = [WeightedNull.of(there, discrepancy, s, np.inf).log_weight for s in usual]
-    assert min(np.exp(weights - logsumexp(weights))) > LEAST_SHARE
+    assert min(np.exp(weights - logsumexp(weights))) > model_space.LEAST_SHARE
 
 
 @pytest.mark.slow
@@ -282,7 +264,7 @@ def test_sizes_that_matter_only_beside_an_effect_are_kept(plain, discrepancy):
 def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, plain, found, monkeypatch):
     """Through the test that the diagnosis makes, on readings that the effect has moved."""
     monkeypatch.setattr(model_space, 'DRAWS', 500)
-    space = EffectEvidence(plain, found, freedom)
+    space = model_space.EffectEvidence(plain, found, freedom)
     _, detectable = testability.testability(space, seed=3)
     limit = np.quantile(space.evidence(space.null_draws(3)), 1.0 - testability.LEVEL)
     noise = simulated(READINGS, freedom, POWER_RUNS, seed=6)
@@ -297,7 +279,8 @@ def test_a_detectable_amplitude_is_detected_nine_times_in_ten(freedom, plain, fo
 
 def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain, found):
     def detectable_gain(null: NullModel) -> float:
-        _, detectable = testability.testability(EffectEvidence(null, found, np.inf), seed=3)
+        space = model_space.EffectEvidence(null, found, np.inf)
+        _, detectable = testability.testability(space, seed=3)
         return detectable['edge_build']['gain']
 
     along = found[4].columns
@@ -305,5 +288,5 @@ def test_what_nature_leaves_over_or_hides_in_the_pattern_is_less_testable(plain,
     assert detectable_gain(beside) > 1.3 * detectable_gain(plain)
     # A direction that the pattern takes up whole shows nothing, however strong.
     hidden = plain.columns[:, 0] / np.linalg.norm(plain.columns[:, 0])
-    space = EffectEvidence(plain, [law('edge_build', hidden)], np.inf)
+    space = model_space.EffectEvidence(plain, [law('edge_build', hidden)], np.inf)
     assert testability.testability(space, seed=0) == (('edge_build',), {})
