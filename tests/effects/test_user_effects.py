@@ -68,6 +68,11 @@ def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
     assert pickle.loads(pickle.dumps(effect.typical())) == effect.typical()
 
 
+def with_place(head: str, body: str) -> list[tuple[str, str]]:
+    method = f'    def {head}:\n        {body}\n\n'
+    return [('    @staticmethod', f'{method}    @staticmethod')]
+
+
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
@@ -89,11 +94,19 @@ def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
         ([('return exp', 'return -exp')], 'a factor is 0 or more'),
         ([('return exp', 'retrun exp')], 'SyntaxError'),
         ([('kernel.fast_math', 'kernel.fast_maths')], 'line 7: ModuleNotFoundError'),
+        # Its other places are tried out.
+        (with_place('on_film(self, film_um, points)', 'return film_um[:2]'),
+         'not return a finite film'),
+        (with_place('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0'),
+         'not return a finite'),
+        (with_place('on_film(self, film_um, points)', 'return points.no_such'),
+         'fails (AttributeError'),
+        (with_place('on_path(self, path, context)', 'return None'), 'return path.with_(...)'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line_with_its_remedy(own, changes, message):
     path = own(*changes)
-    with pytest.raises(ModelError) as refused:
+    with np.errstate(all='ignore'), pytest.raises(ModelError) as refused:
         load_effect_file(path)
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(path))
@@ -105,22 +118,6 @@ def test_two_effects_in_a_file_are_refused(own):
     path.write_text(SAMPLE + '\n\nclass Other(WakeLoss):\n    id = "other"\n')
     with pytest.raises(ModelError, match=r'has several effects \(WakeLoss, Other\)'):
         load_effect_file(path)
-
-
-@pytest.mark.parametrize(
-    ('place', 'body', 'message'),
-    [
-        ('on_film(self, film_um, points)', 'return film_um[:2]', 'not return a finite film'),
-        ('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0', 'not return a finite'),
-        ('on_film(self, film_um, points)', 'return points.no_such', 'fails (AttributeError'),
-        ('on_path(self, path, context)', 'return None', 'return path.with_(...)'),
-    ],
-)
-def test_places_are_tried_out(own, place, body, message):
-    path = own(('    @staticmethod', f'    def {place}:\n        {body}\n\n    @staticmethod'))
-    with np.errstate(all='ignore'), pytest.raises(ModelError) as refused:
-        load_effect_file(path)
-    assert message in str(refused.value)
 
 
 def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
