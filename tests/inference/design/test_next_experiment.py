@@ -216,20 +216,24 @@ def test_nothing_tells_between_explanations_that_say_the_same():
     assert same.chance == 0.0
 
 
-@pytest.mark.parametrize(('spread', 'tolerance'), [(0.0, 1e-6), (0.5, 0.15)])
-def test_single_readings_add_up_to_all_of_them(spread, tolerance):
+@pytest.mark.parametrize(('spread', 'alike', 'tolerance'), [(1.0, True, 1e-6), (0.5, False, 0.15)])
+def test_single_readings_add_up_to_all_of_them(spread, alike, tolerance):
     """With errors that differ the mean of what is read so far goes on: about as much."""
     told = forecast(spread)
+    if alike:
+        told = replace(told, factors=np.tile(told.factors[0], (3, 1, 1)))
     placement = Placement(told)
     for reading in range(READINGS):
         placement.take(reading)
     found = placement.separation(placement.nearest())
     assert found == pytest.approx(told.separations[1], rel=tolerance)
-    if not spread:
-        # Equal errors leave the distance of the means.
-        two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
-        away = float(np.linalg.norm(told.means[1] - told.means[0]))
-        assert two.separations == pytest.approx((0.0, away))
+
+
+def test_equal_errors_leave_the_distance_of_the_means():
+    told = forecast(spread=0.0)
+    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+    away = float(np.linalg.norm(told.means[1] - told.means[0]))
+    assert two.separations == pytest.approx((0.0, away))
 
 
 def test_some_readings_are_predicted_from_others():

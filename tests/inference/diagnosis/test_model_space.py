@@ -202,6 +202,17 @@ def test_a_planted_effect_is_proposed_with_its_shape_and_amplitude(plain, found,
     assert effect.gain / typical == pytest.approx(1.5, abs=0.35)
 
 
+def test_a_setting_that_differs_by_more_than_natures_do_is_unknown(plain, discrepancy):
+    """Even if nothing is looked for."""
+    random = np.random.default_rng(3).normal(size=READINGS)
+    beyond = np.linalg.cholesky(discrepancy.settings[1] + 1e-6 * np.eye(READINGS)) @ random
+    there = shifted(plain, PRIOR.beyond_nature * beyond)
+    space, nothing = (space_of(null, [], discrepancy, SMALL, BEYOND) for null in (there, plain))
+    assert probability(space, UNKNOWN) > 0.95
+    assert space.p_value(seed=0) < 0.01
+    assert probability(nothing, UNKNOWN) < 0.05
+
+
 @pytest.mark.parametrize(('form', 'hidden'), [(WAVE, True), (JAGGED, False)], ids=['wave', 'not'])
 def test_what_nature_may_leave_over_is_no_effect(plain, discrepancy, form, hidden):
     """A large discrepancy swallows a smooth change, and none that neighbours do not share."""
