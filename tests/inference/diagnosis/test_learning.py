@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from inference.diagnosis.linear import linear_fit, null_of, smooth_curves
+from inference.diagnosis.linear import linear_fit, null_of
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
+from paint_deposition.effects.learned.law import hat_weights
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
 from paint_deposition.inference.diagnosis.gaussian import NullModel
@@ -22,13 +23,18 @@ from paint_deposition.inference.diagnosis.learning import (
 )
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.inference.diagnosis.search import Search, SearchStage
+from paint_deposition.inference.diagnosis.smooth_laws import Basis
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.readings import root_mean_square
 
 POINTS, KNOTS = 80, 8
 WAVE = 3.0 * np.sin(np.linspace(0.0, 7.0, POINTS))
-CURVE = smooth_curves(np.linspace(0.0, KNOTS - 1.0, POINTS), KNOTS, 0.5)
+# Curves of unit size over a covariate that goes evenly from the first knot to the last.
+ALONG = hat_weights(np.linspace(0.0, KNOTS - 1.0, POINTS), KNOTS)
+STEP = np.sqrt(12.0) / (KNOTS - 1.0)
+CURVE = Basis(LEARNED['height_fraction'], {}, ALONG, STEP * np.arange(KNOTS)[:, np.newaxis], STEP)
+CURVE = CURVE.random(1.0, 0.5)
 CHANGE = CURVE.change_um
 WAVY = Explanation(UNKNOWN, CHANGE, np.zeros(CHANGE.shape[1]), 1.0, random=CURVE)
 

@@ -8,12 +8,11 @@ from scipy.special import logsumexp
 from scipy.stats import binom, kstest, multivariate_normal, multivariate_t
 
 from inference.diagnosis import linear
-from paint_deposition.effects.catalogue import EFFECTS
+from inference.diagnosis.linear import law, unknown
 from paint_deposition.inference.diagnosis import model_space, testability
 from paint_deposition.inference.diagnosis.discrepancy import (
     PRIOR,
     DiscrepancyHyperparameters,
-    Footprints,
     ModelDiscrepancy,
 )
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation
@@ -37,27 +36,13 @@ JAGGED = 0.7 * np.random.default_rng(2).normal(size=READINGS)
 SHARES = (0.1, 0.3, 1.0)
 
 
-def law(name: str, *columns: np.ndarray, side: int = 1, share: float = 1.0, **shape):
-    """An effect of the library by what its first amplitudes do to the readings."""
-    effect = EFFECTS[name](**shape)
-    return linear.explanation_of(effect, *columns, sides=(side,) * len(columns), share=share)
-
-
 @pytest.fixture
 def discrepancy() -> ModelDiscrepancy:
     """Smooth fields along the part, and one deviation of the footprint."""
     away = np.abs(np.subtract.outer(PLACE, PLACE))
+    fields = [FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0)]
     footprint = np.random.default_rng(6).normal(size=(READINGS, 1))
-    return replace(
-        linear.no_discrepancy(READINGS),
-        settings=tuple(FILM**2 * smooth(away / length) for length in (0.1, 0.5, 1.0)),
-        footprint=Footprints(
-            tuple(size * footprint for size in SHARES),
-            tuple(linear.footprint_law(size * 0.1 * np.eye(1)) for size in SHARES),
-            radius_m=np.zeros(1),
-            flux=np.ones(1),
-        ),
-    )
+    return linear.discrepancy_of(fields, footprint, SHARES)
 
 
 @pytest.fixture
@@ -82,7 +67,7 @@ def found() -> list[Explanation]:
         ),
         law('edge_build', direction(0.7)),
         law('faraday_shielding', direction(1.2)),
-        *(linear.unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
+        *(unknown(0.3 * random.normal(size=(READINGS, 6)), 0.5) for _ in range(2)),
     ]
 
 
@@ -157,7 +142,7 @@ def test_odds_are_those_of_densities_averaged_over_all_sizes_and_shapes(
 ):
     """What differs by more than nature's settings do counts as unknown."""
     shapes = [law('edge_build', c, side=0, share=0.5) for c in (JAGGED, JAGGED + WAVE)]
-    shapeless = linear.unknown(np.stack([WAVE, JAGGED], axis=1))
+    shapeless = unknown(np.stack([WAVE, JAGGED], axis=1))
     there = shifted(plain, 0.5 * JAGGED)
     sizes = [replace(SMALL, log_prior=-1.0), replace(LARGE, log_prior=-0.5), BEYOND]
     space = space_of(there, [*shapes, shapeless], discrepancy, *sizes, freedom=freedom)
