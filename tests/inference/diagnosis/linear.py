@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedFootprint
 from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
@@ -16,7 +16,7 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.posterior import Posterior
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 PARAMETERS = FreeParameters.of(MODEL)
 
 

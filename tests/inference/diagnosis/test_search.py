@@ -92,9 +92,14 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=1.5)
 
 
-def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
-    trial, groups = search.groups(stages[-1].here)
-    assert trial.names == groups.keys() == {*PLANTED}
+def test_each_effect_of_the_set_is_sure_and_one_that_does_not_stand_is_taken_out(search, stages):
+    best = stages[-1].here
+    one_more = search.with_effect(best, 'air_drift')
+    assert one_more.names == {*PLANTED, 'air_drift'}
+    assert one_more.log_weight < best.log_weight
+    for found in (one_more, best):
+        trial, groups = search.groups(found)
+        assert trial.names == groups.keys() == {*PLANTED}
     for name, (members, probability) in groups.items():
         assert members == (name,)
         assert probability > SURE
@@ -119,14 +124,6 @@ def test_effects_that_look_alike_share_one_group():
     assert probability > SURE
 
 
-def test_an_effect_that_does_not_stand_is_taken_out_of_the_set(search, stages):
-    one_more = search.with_effect(stages[-1].here, 'air_drift')
-    assert one_more.names == {*PLANTED, 'air_drift'}
-    assert one_more.log_weight < stages[-1].here.log_weight
-    trial, groups = search.groups(one_more)
-    assert trial.names == groups.keys() == {*PLANTED}
-
-
 def test_nothing_is_added_where_nothing_acts(clean):
     (stage,) = clean.stages()
     assert stage.here is clean.nothing
@@ -134,16 +131,12 @@ def test_nothing_is_added_where_nothing_acts(clean):
     # The readings left over by a fold do not call for more either.
     rows = np.arange(len(clean.state.study)) % 4 > 0
     assert stage.chosen(rows) is stage.here
-
-
-def test_what_only_led_to_a_better_pattern_is_no_effect(clean):
-    """Beside a wrong pattern any effect helps whose refit finds the right one."""
-    good = clean.nothing
-    wrong = good.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
-    state = clean.state
-    fit = at_model(state.study, good.fit.model.model_copy(update={'planar': wrong}))
-    search = Search(replace(state, fit=fit))
-    assert search.nothing.log_evidence < good.log_evidence - 10.0
-    stages = search.stages()
-    assert stages[-1].here.names == frozenset()
-    assert stages[-1].here.log_evidence == pytest.approx(good.log_evidence, abs=2.0 * SAME)
+    # Beside a wrong pattern any effect helps whose refit finds the right one.
+    good, state = clean.nothing, clean.state
+    planar = good.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
+    fit = at_model(state.study, good.fit.model.model_copy(update={'planar': planar}))
+    misled = Search(replace(state, fit=fit))
+    assert misled.nothing.log_evidence < good.log_evidence - 10.0
+    last = misled.stages()[-1].here
+    assert last.names == frozenset()
+    assert last.log_evidence == pytest.approx(good.log_evidence, abs=2.0 * SAME)

@@ -105,10 +105,6 @@ def test_papers_study_fit_at_577_predict_525_and_625(tmp_path):
         assert residuals.sd_um < 1.2 * noise_um
 
 
-def one_sided(panel):
-    return painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30))
-
-
 def with_film(panel, film_um, count=40, repeats=1, noise_um=0.0):
     return panel.with_readings(readings_at(column()[:count], film_um, noise_um, repeats))
 
@@ -124,7 +120,8 @@ def in_unit(panel, factor, rows=slice(None)):
     [
         (lambda panel: with_film(panel, panel.means.mean_um[:6], 6),
          'readings at 6 points; .* measure at least 10'),
-        (one_sided, 'one side of the passes'),
+        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
+         'one side of the passes'),
         (lambda panel: with_film(panel, np.full(40, 20.0), repeats=2, noise_um=0.7),
          'no pattern in it'),
         (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
