@@ -40,9 +40,8 @@ def off_valleys(film_um: np.ndarray, points: SurfacePoints) -> float:
     return -float(film_um[points.curvature_per_m > 1.0].sum())
 
 
-volume, width = volume_cm3, spread_m
 rightward, leftward, upward, downward = along(X), along(-X), along(UP), along(-UP)
-narrowness, loss = negative(width), negative(volume)
+narrowness, loss = negative(spread_m), negative(volume_cm3)
 FAR, NEAR = spot(standoff_m=0.32), spot(standoff_m=0.2)
 ASIDE = spot(x_m=0.2)
 PASS = serpentine((0.0,), half_width_m=0.4, opens_at_m=0.25)
@@ -51,9 +50,9 @@ ON_DOOR = serpentine((0.2, 0.45), half_width_m=0.7, opens_at_m=0.65)
 
 # What a positive value of each amplitude makes more of, and where.
 EXPECTED = {
-    ('incidence_attraction', 'attraction'): (volume, panel, NEAR),
+    ('incidence_attraction', 'attraction'): (volume_cm3, panel, NEAR),
     ('standoff_efficiency', 'exponent'): (loss, panel, FAR),
-    ('pattern_spread', 'exponent'): (width, panel, FAR),
+    ('pattern_spread', 'exponent'): (spread_m, panel, FAR),
     ('tcp_standoff', 'offset_z_m'): (narrowness, panel, FAR),
     ('air_drift', 'shift_down_m'): (downward, panel, FAR),
     ('air_drift', 'shift_across_m'): (rightward, panel, FAR),
@@ -68,15 +67,15 @@ EXPECTED = {
     ('convex_attraction', 'gain'): (on_ridges, door, ON_DOOR),
     ('faraday_shielding', 'shielding'): (off_valleys, door, ON_DOOR),
     ('gauge_curvature_bias', 'bias_um'): (on_ridges, door, ON_DOOR),
-    ('edge_build', 'gain'): (volume, door, ON_DOOR),
-    ('corner_slowdown', 'gain'): (volume, panel, PASSES),
+    ('edge_build', 'gain'): (volume_cm3, door, ON_DOOR),
+    ('corner_slowdown', 'gain'): (volume_cm3, panel, PASSES),
     ('trigger_lag', 'rise_s'): (loss, panel, PASS),
-    ('trigger_lag', 'fall_s'): (volume, panel, PASS),
+    ('trigger_lag', 'fall_s'): (volume_cm3, panel, PASS),
     ('flow_drift', 'drift_per_pass'): (downward, panel, PASSES),
     ('fog_gradient', 'fog_um'): (downward, panel, NEAR),
-    ('overspray_fog', 'fog_um'): (volume, panel, NEAR),
-    ('gauge_gain', 'gain'): (volume, panel, NEAR),
-    ('gauge_zero', 'offset_um'): (volume, panel, NEAR),
+    ('overspray_fog', 'fog_um'): (volume_cm3, panel, NEAR),
+    ('gauge_gain', 'gain'): (volume_cm3, panel, NEAR),
+    ('gauge_zero', 'offset_um'): (volume_cm3, panel, NEAR),
     ('pose_lag', 'lag_s'): (rightward, panel, PASS),
     ('gun_wake', 'lag_s'): (leftward, panel, PASS),
     ('occlusion', 'strength'): (loss, panel_with_screen, NEAR),

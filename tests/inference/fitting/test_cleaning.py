@@ -33,7 +33,7 @@ MODEL = pd.DepositionModel()
 
 
 def scattered(seed: int, texture: float = 0.005) -> FittedPoints:
-    """pd.Readings over a sheet, a share of them at its edge, beside a model of one free level."""
+    """Readings over a sheet, a share of them at its edge, beside a model of one free level."""
     random = np.random.default_rng(seed)
     positions = np.column_stack([random.uniform(0.0, 1.0, (COUNT, 2)), np.zeros(COUNT)])
     edge_m = np.minimum(np.min(np.minimum(positions[:, :2], 1.0 - positions[:, :2]), axis=1), 0.1)

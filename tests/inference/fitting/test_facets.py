@@ -28,7 +28,7 @@ def fold(edge_m: float) -> pd.Surface:
 
 
 def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int = 3) -> Experiment:
-    """pd.Readings on the fine part, set beside one with edges of this length."""
+    """Readings on the fine part, set beside one with edges of this length."""
     fine = fold(FINE_M)
     film_um = painted(fine, PATH).raw_um
     rng = np.random.default_rng(seed)

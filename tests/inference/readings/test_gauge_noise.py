@@ -31,7 +31,7 @@ def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
 def campaigns(
     layout: str, noise: Callable[[int], np.ndarray]
 ) -> Iterator[tuple[pd.Readings, np.ndarray]]:
-    """pd.Readings of 20 to 60 um and the film below them; `noise(count)` is in usual noises."""
+    """Readings of 20 to 60 um and the film below them; `noise(count)` is in usual noises."""
     repeats = LAYOUTS[layout]
     owner = np.repeat(np.arange(len(repeats)), repeats)
     film = np.linspace(20.0, 60.0, len(repeats))[owner]
@@ -41,7 +41,7 @@ def campaigns(
 
 
 def at_points(points: str, thickness_um, sigma_um=np.nan) -> pd.Readings:
-    """pd.Readings at points of one letter each."""
+    """Readings at points of one letter each."""
     count = len(thickness_um)
     return pd.Readings.of(
         np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
