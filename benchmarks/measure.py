@@ -24,13 +24,8 @@ from tests.virtual_paint_shop.truths import choose as choose_truths
 from paint_deposition.api.simulation import look_at
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.inference.design.reading_choice import (
-    ChosenReadings,
-    choose,
-    power_of,
-    usable_places,
-)
-from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
+from paint_deposition.inference.design.reading_choice import ChosenReadings, choose, usable_places
+from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.inference.readings.readings import Readings
@@ -117,7 +112,7 @@ def expected(door_and_count: tuple[int, int]) -> dict:
     here = door(seed)
     chosen = here.chosen(count)
     sets = [here.random(count, k) for k in range(RANDOM_SETS)]
-    drawn = [power_of(here.part, rows, float(REPEATS)) for rows in sets]
+    drawn = [here.part.power(rows, float(REPEATS)) for rows in sets]
     powers = {'chosen': [chosen.power], 'grid': [chosen.grid_power], 'random': drawn}
     mean = {way: float(np.mean([[*one.values()] for one in all_])) for way, all_ in powers.items()}
     return {'power': mean, 'count': count}

@@ -16,7 +16,7 @@ from paint_deposition.inference.comparison.comparison import Comparison, SideByS
 from paint_deposition.inference.comparison.comparison import compare as compared
 from paint_deposition.inference.design.next_experiment import with_proposals
 from paint_deposition.inference.design.reading_choice import ChosenReadings, choose
-from paint_deposition.inference.design.reading_exchange import UnmeasuredPart
+from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import space_around
 from paint_deposition.inference.diagnosis.procedure import diagnose as diagnosed
 from paint_deposition.inference.diagnosis.refit import refit as refitted

@@ -10,6 +10,7 @@ beforehand: on average by their Kullback-Leibler divergence (Lindley, Ann. Math.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 from scipy.linalg import solve_triangular
@@ -25,11 +26,10 @@ from paint_deposition.inference.diagnosis.explanations import (
     FOOTPRINT,
     LAW_LENGTH,
     UNKNOWN,
-    law_errors,
     neutral_shapes,
     of_effects,
-    other_laws,
     standardised,
+    ways_off,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
@@ -39,10 +39,11 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_EFFECT,
     SIZES,
     SURE,
+    amplitude_sizes,
     log_odds,
+    of_sizes,
     space_around,
 )
-from paint_deposition.inference.diagnosis.search import ANOTHER_FORM, LAWS_OFF
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
 from paint_deposition.inference.diagnosis.verdict import Diagnosis
 from paint_deposition.inference.fitting.least_squares import Fit
@@ -64,8 +65,9 @@ class Contender:
     fit: Fit  # of the model refitted to it
     sizes: DiscrepancyHyperparameters  # of the discrepancy beside it
     covariate: str = ''  # of which something unknown is any smooth function
-    # How its laws are off: the number among ``LAWS_OFF``; the next one for laws of another form.
+    # How its laws are off: the number among ``ways_off``, and its prior share.
     off: int = 0
+    share: float = 1.0
 
     @property
     def is_effect(self) -> bool:
@@ -80,11 +82,7 @@ class Contender:
             usual: their discrepancy around one model of all contenders.
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
-        laws = frozenset(e.id for e in fit.model.effects if e.family != 'learned')
-        given = study, fit, laws, usual.model
-        another = self.off == len(LAWS_OFF)
-        errors = other_laws(*given) if another else LAWS_OFF[self.off][0] * law_errors(*given)
-        columns = [study.nuisance, errors]
+        columns = [study.nuisance, ways_off(study, fit, _laws_of(fit), usual.model)[self.off][0]]
         if self.covariate:
             values = standardised(study, usual.model)[self.covariate]
             law = SIZES[-1] * FACTOR * field_over_values(values, LAW_LENGTH, NEGLIGIBLE)
@@ -97,8 +95,12 @@ class Contender:
         evidence = float(null.log_evidence(null.deviation[:, np.newaxis], freedom)[0])
         if not self.is_effect:
             return evidence + LOG_PRIOR[self.name]
-        shares = [*(share for _, share in LAWS_OFF), ANOTHER_FORM]
-        return evidence + log_odds(PRIOR_EFFECT) + float(np.log(shares[self.off]))
+        prior = log_odds(PRIOR_EFFECT) + float(np.log(self.share))
+        return evidence + of_sizes(self.fit, [self.name]) + prior
+
+
+def _laws_of(fit: Fit) -> frozenset[str]:
+    return frozenset(e.id for e in fit.model.effects if e.family != 'learned')
 
 
 def contenders_of(
@@ -119,9 +121,16 @@ def contenders_of(
     rest = tuple(effect for effect in fit.model.effects if effect.id not in left_out)
     without = fit.model.model_copy(update={'effects': rest})
 
-    def fitted(*effects: Effect, discrepancy: np.ndarray | None = None) -> Fit:
+    def fitted(
+        *effects: Effect,
+        discrepancy: np.ndarray | None = None,
+        sizes: Mapping[str, float] = MappingProxyType({}),
+    ) -> Fit:
         model = without.model_copy(update={'effects': (*rest, *effects)})
-        parameters = FreeParameters.of(model, *model.effects, known=fit.parameters.known)
+        sizes = {**fit.parameters.sizes, **sizes}
+        parameters = FreeParameters.of(
+            model, *model.effects, known=fit.parameters.known, sizes=sizes
+        )
         return study.fit(parameters, nuisance=study.nuisance, discrepancy=discrepancy)
 
     base = fitted()
@@ -131,8 +140,13 @@ def contenders_of(
     base, found = fitted(discrepancy=best.null.discrepancy), []
     for name in names:
         effect = fit.model.effect(name) or space.central.by_law(name)[1]
-        there = fitted(effect, discrepancy=best.null.discrepancy)
-        ways = [Contender(name, there, best.sizes, off=k) for k in range(len(LAWS_OFF) + 1)]
+        rough = fitted(effect, discrepancy=best.null.discrepancy)
+        sizes = amplitude_sizes(rough, [name])
+        there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
+        ways = [
+            Contender(name, there, best.sizes, off=k, share=share)
+            for k, (_, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model))
+        ]
         found.append(max(ways, key=lambda way: way.log_weight(way.null(study, usual), freedom)))
     if diagnosis.unknown is not None:
         found.append(Contender(UNKNOWN, base, best.sizes, diagnosis.unknown.covariate))

@@ -1,21 +1,27 @@
-"""Where to put the gauge on a painted part, so that missing effects are found soonest."""
+"""Where to put the gauge on a painted part, so that missing effects are found soonest.
+
+Readings are linear in the pattern's parameters and in the amplitudes of the effects. What an
+effect changes at the chosen places beyond what the pattern can imitate is its noncentrality (D_s-
+optimality: Atkinson and Donev, Optimum Experimental Designs, 1992). Places are added one by one,
+each where it raises the probability most that an effect is detected, averaged over the effects
+and over the sizes in which they occur: a sum of the squares would go on improving what is seen
+anyway.
+"""
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.integrator import NO_PAINT_UM
-from paint_deposition.inference.design.reading_exchange import (
-    CandidateDesign,
-    UnmeasuredPart,
-    exchanged,
-)
+from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.explanations import sensitivity
-from paint_deposition.inference.diagnosis.testability import power_along
+from paint_deposition.inference.diagnosis.model_space import SIZES
+from paint_deposition.inference.diagnosis.testability import LEVEL
 from paint_deposition.inference.fitting.least_squares import on_one_thread
 from paint_deposition.inference.readings.gauge_noise import ASSUMED_FREEDOM, ENOUGH_REPEATS
 from paint_deposition.motion.path import SprayPath
@@ -169,21 +175,21 @@ def choose(
     # Least distance between points, as a share of the side of the square that each stands for.
     apart_m = 0.5 * float(np.sqrt(surface.vertex_areas_m2[usable].sum() / count))
     progress('what the effects change')
-    marks = marks_at(part, places)
+    design = design_at(part, places)
     progress('choosing points')
-    rows = exchanged(marks, surface.vertices_m[places], count, apart_m)
+    rows = design.best(surface.vertices_m[places], count, apart_m)
     if len(rows) < count:
         raise _no_room(len(rows), count, foot_m)
     face = from_edges_m(surface, surface.vertices_m[places[rows]])
     # The walk goes in rows from the top, to and fro.
     row = ((face[:, 1].max() - face[:, 1]) / max(2.0 * apart_m, 1e-9)).astype(int)
     rows = rows[np.lexsort((np.where(row % 2 == 0, face[:, 0], -face[:, 0]), row))]
-    speaks_for = _speaks_for(marks, rows)
+    speaks_for = design.speaks_for(rows)
     progress('how surely effects would be found')
     freedom = float(repeats) if repeats >= ENOUGH_REPEATS else ASSUMED_FREEDOM
     study = part.study(places[rows])
     grid = grid_places(surface, usable, count)
-    found, on_grid = (power_of(part, at, freedom, seed) for at in (places[rows], grid))
+    found, on_grid = (part.power(at, freedom, seed) for at in (places[rows], grid))
     return ChosenReadings(
         surface, part.path, part.model, film_um, places[rows], study.measured_um,
         study.sigma_um, repeats,
@@ -206,7 +212,86 @@ def usable_places(surface: Surface, film_um: np.ndarray, foot_m: float = FOOT_M)
     return can_stand(surface, foot_m) & (film_um > 0.2 * (volume @ film_um) / volume.sum())
 
 
-def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
+@dataclass(frozen=True)
+class CandidateDesign:
+    """What readings at C places would show, over their noise."""
+
+    # (C, k) change with each parameter of the model, in standard deviations of its prior.
+    free: np.ndarray
+    columns: np.ndarray  # (C, m) change with each amplitude of the effects at its typical size
+    effects: np.ndarray  # (m,) id of the effect of each column
+
+    def beyond_model(self, chosen: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """What the model cannot imitate when it is refitted to readings at chosen places (n,).
+
+        Returns:
+            (C, m) of each column at every place; (C,) variance of what it predicts there, over
+            that of the noise; (m,) noncentrality of each column at the chosen places.
+        """
+        free, columns = self.free[chosen], self.columns[chosen]
+        covariance = np.linalg.inv(np.eye(free.shape[1]) + free.T @ free)
+        products = free.T @ columns
+        slopes = covariance @ products
+        variance = np.einsum('ck,kl,cl->c', self.free, covariance, self.free)
+        seen = np.maximum(np.sum(columns**2, axis=0) - np.sum(products * slopes, axis=0), 0.0)
+        return self.columns - self.free @ slopes, variance, seen
+
+    def gains(self, chosen: np.ndarray) -> np.ndarray:
+        """(C,) by about how much one more reading at each place raises the mean probability."""
+        names, owner, count = np.unique(self.effects, return_inverse=True, return_counts=True)
+        left, variance, seen = self.beyond_model(chosen)
+        step = 1e-3 * (1e-3 + seen)
+        slope = (power(seen + step, len(names)) - power(seen, len(names))) / step
+        return left**2 @ (slope / (len(names) * count[owner])) / (1.0 + variance)
+
+    def best(self, positions_m: np.ndarray, count: int, apart_m: float) -> np.ndarray:
+        """(n,) rows of the places that are taken one by one; fewer only where no more fit.
+
+        Args:
+            positions_m: (C, 3) of the places [m].
+            count: how many are wanted.
+            apart_m: least distance between two of them [m].
+        """
+        chosen: list[int] = []
+        usable = np.ones(len(positions_m), dtype=bool)
+        while len(chosen) < count and usable.any():
+            gains = self.gains(np.array(chosen, dtype=int))
+            best = int(np.argmax(np.where(usable, gains, -1.0)))
+            chosen.append(best)
+            usable &= np.linalg.norm(positions_m - positions_m[best], axis=1) >= apart_m
+        return np.array(chosen, dtype=int)
+
+    def speaks_for(self, chosen: np.ndarray) -> tuple[tuple[str, ...], ...]:
+        """(n,) effects of which each chosen place shows most."""
+        left, variance, seen = self.beyond_model(chosen)
+        # Share of the noncentrality that would be lost without each place; what the places
+        # together do not show, none of them speaks for.
+        lost = left[chosen] ** 2 / (1.0 - variance[chosen, np.newaxis])
+        shares = np.where(seen > 1.0, lost / np.maximum(seen, 1e-12), 0.0)
+        names = np.array(sorted(set(self.effects)))
+        by_effect = np.column_stack([shares[:, self.effects == n].mean(axis=1) for n in names])
+        even = by_effect.mean(axis=0)
+        over = by_effect / np.where(even > 0.0, even, np.inf)
+        # A place speaks for an effect if it carries this many times its even share of what is
+        # seen of it, for as many effects at the most.
+        return tuple(
+            tuple(str(names[k]) for k in np.argsort(-one)[:3] if one[k] > 1.5) for one in over
+        )
+
+
+def power(noncentrality: np.ndarray, tests: int) -> np.ndarray:
+    """(m,) probability of detection, averaged over the sizes in which effects occur.
+
+    Args:
+        noncentrality: (m,) of effects of typical size.
+        tests: how many effects share the level of the test.
+    """
+    limit = -ndtri(0.5 * LEVEL / tests)
+    ratio = SIZES * np.sqrt(noncentrality)[:, np.newaxis]
+    return np.mean(ndtr(ratio - limit) + ndtr(-ratio - limit), axis=1)
+
+
+def design_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
     """What readings at these vertices (C,) would show."""
     study = part.study(vertices)
     fit = part.fit(study)
@@ -219,44 +304,4 @@ def marks_at(part: UnmeasuredPart, vertices: np.ndarray) -> CandidateDesign:
         fit.jacobian @ fit.parameters.prior.factor,
         np.hstack([law.columns for law in laws]),
         np.array([law.id for law in laws for _ in law.names]),
-    )
-
-
-def power_of(
-    part: UnmeasuredPart, vertices: np.ndarray, freedom: float, seed: int = 0
-) -> dict[str, float]:
-    """By effect, probability that the test of the diagnosis finds it at its typical size.
-
-    The mean over its amplitudes and shapes.
-
-    Args:
-        part: what was painted how. vertices: (P,) where it is read.
-        freedom: degrees of freedom of the noise estimate.
-    """
-    space = part.space(part.study(vertices), freedom)
-    draws = space.null_draws(seed)
-    null, draws = space.evidence(draws), draws[:, :400]
-    found: dict[str, list[float]] = {}
-    for law in (e.law for e in space.explanations if e.law is not None):
-        for column, side in zip(space.null.whiten(law.columns).T, law.sides, strict=True):
-            strength = float(np.linalg.norm(column))
-            direction = (-column if side < 0.0 else column) / max(strength, 1e-12)
-            chance = power_along(space, direction, np.array([strength]), null, draws)[0]
-            found.setdefault(law.id, []).append(float(chance))
-    return {name: float(np.mean(chances)) for name, chances in sorted(found.items())}
-
-
-def _speaks_for(marks: CandidateDesign, rows: np.ndarray) -> tuple[tuple[str, ...], ...]:
-    """(P,) effects of which each point shows most."""
-    design = marks.around(rows)
-    # What the points together do not show, none of them speaks for.
-    shares = design.shares(rows) * (design.noncentralities > 1.0)
-    names = np.array(sorted(set(marks.effects)))
-    by_effect = np.column_stack([shares[:, marks.effects == n].mean(axis=1) for n in names])
-    even = by_effect.mean(axis=0)
-    over = by_effect / np.where(even > 0.0, even, np.inf)
-    # A point speaks for an effect if it carries this many times its even share of what is seen of
-    # it, for as many effects at the most.
-    return tuple(
-        tuple(str(names[k]) for k in np.argsort(-point)[:3] if point[k] > 1.5) for point in over
     )

@@ -5,7 +5,7 @@ explains by any smooth law over any covariate. The laws of effects that a model 
 a smooth relative error along the covariates that the effect itself names.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -129,6 +129,9 @@ UNKNOWN, FOOTPRINT, PLACE = 'unknown', 'footprint', 'place'
 LAW_ERROR, LAW_LENGTH = 0.3, 1.0
 # Relative error over all other conditions, and that of a law of another form over its own ones.
 OTHER_ERROR, OTHER_LAW = 0.3, 1.5
+# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
+# times as far, and the prior share of each; and the share of a law of another form.
+LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
@@ -263,14 +266,28 @@ def law_errors(study: Study, fit: Fit, kept: frozenset[str], model: DepositionMo
         model: whose rays say over which values of the covariates; one like it.
     """
     off = [columns for _, columns, _ in _laws_off(study, fit, kept, model)]
-    off += list(_off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False))
-    return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
+    off += _off_anywhere(study, fit, kept, model, OTHER_ERROR, own=False)
+    return _over_noise(study, off)
 
 
-def other_laws(study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel) -> np.ndarray:
-    """(P, n) directions over the noise of laws of another form, acting where these act."""
-    off = _off_anywhere(study, fit, kept, model, OTHER_LAW, own=True)
-    return np.hstack([np.empty((len(study), 0)), *off]) / study.sigma_um[:, np.newaxis]
+def ways_off(
+    study: Study, fit: Fit, kept: frozenset[str], model: DepositionModel
+) -> list[tuple[np.ndarray, float]]:
+    """Ways in which the laws of effects in a model may be off, as ``law_errors``.
+
+    Returns:
+        Of each way the directions (P, n) over the noise, and its prior share.
+    """
+    errors = law_errors(study, fit, kept, model)
+    if not errors.any():
+        return [(errors, 1.0)]
+    other = _over_noise(study, _off_anywhere(study, fit, kept, model, OTHER_LAW, own=True))
+    return [*((times * errors, share) for times, share in LAWS_OFF), (other, ANOTHER_FORM)]
+
+
+def _over_noise(study: Study, columns_um: Iterable[np.ndarray]) -> np.ndarray:
+    """(P, n) all of these directions (P, ...) [um], over the noise."""
+    return np.hstack([np.empty((len(study), 0)), *columns_um]) / study.sigma_um[:, np.newaxis]
 
 
 def _off_anywhere(

@@ -326,6 +326,33 @@ def space_around(study: Study, fit: Fit, explanations: Sequence[Explanation] = (
     return ModelSpace(weighed, explanations, discrepancy, freedom)
 
 
+def amplitude_sizes(fit: Fit, names: Iterable[str]) -> dict[str, float]:
+    """The most probable size of each effect's amplitudes, times their typical ones.
+
+    With the typical size an effect that is stronger would be drawn towards none.
+    """
+    return {name: float(SIZES[_by_size(fit, name).argmax()]) for name in names}
+
+
+def of_sizes(fit: Fit, names: Iterable[str]) -> float:
+    """What it adds to a fit's log evidence that the amplitudes of effects have any of the sizes.
+
+    The fit takes each as normal with one size as the standard deviation.
+    """
+    each = [np.logaddexp.reduce(_by_size(fit, name)) for name in names]
+    return float(np.sum(each)) - len(each) * float(np.log(len(SIZES)))
+
+
+def _by_size(fit: Fit, name: str) -> np.ndarray:
+    """(S,) log odds of each size of an effect's amplitudes against that of the fit."""
+    entries, fitted = fit.parameters.of_effects, fit.parameters.sizes.get(name, 1.0)
+    amounts = fit.vector[len(fit.vector) - len(entries) :]
+    own = [amount for amount, entry in zip(amounts, entries, strict=True)
+           if entry.effect == name and not entry.is_shape]  # fmt: skip
+    change = 0.5 * np.sum(np.square(own)) * (fitted**-2.0 - SIZES**-2.0)
+    return change - len(own) * np.log(SIZES / fitted)
+
+
 def inclusion_of(log_weights: Sequence[float], others: Sequence[float]) -> float:
     """Probability of any of some refitted models against others without what they have more."""
     return float(expit(np.logaddexp.reduce(log_weights) - np.logaddexp.reduce(others)))

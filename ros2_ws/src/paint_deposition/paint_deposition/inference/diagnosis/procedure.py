@@ -86,6 +86,7 @@ def diagnose(
     stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
+    state = replace(state, sizes=best.fit.parameters.sizes)
     fit = state.fitted_with([*best.effects.values()], state.fit.model)
     options = [
         *of_corrections(state.study, fit, best.names),
@@ -209,19 +210,21 @@ def _conclude(
     if named:
         names = ', and '.join(_in_words(c) for c in named)
         return state.diagnosis(p_value, 'effect_missing', f'The readings show {names}.', others)
-    if sum(c.probability for c in others) < 0.5:
-        unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
-        reason = f'Something outside the library acts. {unknown}'
-        if len(set(best.usual.setting_of)) == 1:
-            reason += (
-                ' All parts were painted alike: it may belong to the part or to the spray. Spray '
-                'the same part another way.'
-            )
-        return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
-    reason = 'These may be missing: ' + ', or '.join(
-        f'{c.best} ({percent(c.probability)})' for c in others[:3]
-    )
-    return state.diagnosis(p_value, 'undecided', reason, others)
+    possible = ', or '.join(f'{c.best} ({percent(c.probability)})' for c in others[:3])
+    # Where a law was learned something unknown acts, whatever may act beside it.
+    if not state.accepted and sum(c.probability for c in others) >= 0.5:
+        reason = f'These may be missing: {possible}'
+        return state.diagnosis(p_value, 'undecided', reason, others)
+    unknown = locate_unexplained(state.study, state.history[0].fit, best, state.seed)
+    reason = f'Something outside the library acts. {unknown}'
+    if len(set(best.usual.setting_of)) == 1:
+        reason += (
+            ' All parts were painted alike: it may belong to the part or to the spray. Spray '
+            'the same part another way.'
+        )
+    if others:
+        reason += f' Beside it these may be missing: {possible}.'
+    return state.diagnosis(p_value, 'unknown_effect', reason, others, unknown)
 
 
 def _others(state: DiagnosisState, probabilities: Mapping[str, float]) -> tuple[EffectClass, ...]:

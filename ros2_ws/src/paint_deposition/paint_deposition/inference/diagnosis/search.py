@@ -5,7 +5,7 @@ good enough to propose. What is accepted is decided between models that were ref
 the discrepancy of nature at all its sizes, and with or without something unknown beside it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -20,9 +20,8 @@ from paint_deposition.inference.diagnosis.discrepancy import (
 )
 from paint_deposition.inference.diagnosis.explanations import (
     UNKNOWN,
-    law_errors,
     of_effects,
-    other_laws,
+    ways_off,
 )
 from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.model_space import (
@@ -30,12 +29,13 @@ from paint_deposition.inference.diagnosis.model_space import (
     CREDIBLE,
     PRIOR_EFFECT,
     PRIOR_UNKNOWN,
-    SIZES,
     SURE,
     ModelSpace,
     WeightedNull,
+    amplitude_sizes,
     inclusion_of,
     log_odds,
+    of_sizes,
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
@@ -43,9 +43,6 @@ from paint_deposition.inference.fitting.least_squares import Fit
 
 # So many proposals are refitted each time.
 TRIALS = 5
-# An effect is there by its law, off by so much as laws are, or by a law much further off: how many
-# times as far, and the prior share of each; and the share of a law of another form.
-LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
 # Log evidence that two fits of one set may differ by and be the same.
@@ -89,14 +86,8 @@ class EffectSet:
     def weighed(self) -> list[WeightedNull]:
         """The model as the null hypothesis, its laws being off, with each size of discrepancy."""
         study, freedom = self.state.study, self.state.freedom
-        laws = study, self.fit, self.names, self.usual.model
-        errors = law_errors(*laws)
-        variants = [(errors, 1.0)]
-        if errors.any():
-            variants = [(times * errors, share) for times, share in LAWS_OFF]
-            variants.append((other_laws(*laws), ANOTHER_FORM))
         found = []
-        for columns, share in variants:
+        for columns, share in ways_off(study, self.fit, self.names, self.usual.model):
             null = NullModel.around(self.fit, np.hstack([study.nuisance, columns]))
             found += [
                 WeightedNull.of(null, self.discrepancy, sizes, freedom, share)
@@ -130,11 +121,6 @@ class EffectSet:
         return self.log_evidence + self.log_prior
 
     @cached_property
-    def log_weight_unknown(self) -> float:
-        """Logarithm of the weight of this set if something unknown acts beside it."""
-        return self.log_weight + self.of_unknown.alone[UNKNOWN]
-
-    @cached_property
     def of_unknown(self) -> ModelSpace:
         """What is outside the library and may be missing beside it."""
         state = self.state
@@ -144,22 +130,10 @@ class EffectSet:
     def log_evidence(self) -> float:
         """Its evidence, nothing unknown acting, the amplitudes being of any of the sizes.
 
-        The fit takes each as normal with its typical size as the standard deviation.
+        The fit takes each as normal with one size as the standard deviation.
         """
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature)) + self._of_sizes
-
-    @property
-    def _of_sizes(self) -> float:
-        """What the mixture of sizes changes of the log evidence."""
-        entries, found = self.fit.parameters.of_effects, 0.0
-        amounts = self.fit.vector[len(self.fit.vector) - len(entries) :]
-        for name in self.names:
-            own = [amount for amount, entry in zip(amounts, entries, strict=True)
-                   if entry.effect == name and not entry.is_shape]  # fmt: skip
-            by_size = 0.5 * np.sum(np.square(own)) * (1.0 - SIZES**-2.0) - len(own) * np.log(SIZES)
-            found += float(np.logaddexp.reduce(by_size)) - np.log(len(SIZES))
-        return found
+        return float(np.logaddexp.reduce(nature)) + of_sizes(self.fit, self.names)
 
     @property
     def log_prior(self) -> float:
@@ -183,7 +157,9 @@ class EffectSet:
         """Logarithm of the weight by some readings (P,), at the best size of the discrepancy."""
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
-        return evidence + self.best.sizes.log_prior + self._of_sizes + self.log_prior
+        return (
+            evidence + self.best.sizes.log_prior + of_sizes(self.fit, self.names) + self.log_prior
+        )
 
 
 @dataclass(frozen=True)
@@ -246,6 +222,12 @@ class Search:
             [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
+        sizes = amplitude_sizes(fit, effects)
+        if any(size != 1.0 for size in sizes.values()):
+            fit = self.state.fitted_with(
+                [*trial.effects.values()], fit.model, discrepancy=discrepancy, sizes=sizes
+            )
+            trial = replace(trial, fit=fit)
         known = self._trials.get(trial.names)
         if known is None or trial.log_evidence > known.log_evidence + SAME:
             self._trials[trial.names] = trial
@@ -281,7 +263,12 @@ class Search:
         best = max(tried, key=lambda one: one.log_weight, default=nothing)
         if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
             return nothing
-        others = self.state.fitted_with([*best.effects.values()], self.state.start, starts=STARTS)
+        others = self.state.fitted_with(
+            [*best.effects.values()],
+            self.state.start,
+            starts=STARTS,
+            sizes=best.fit.parameters.sizes,
+        )
         anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
         best = max(anew, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
@@ -305,15 +292,15 @@ class Search:
         """Effects that may act beside a set, with their probabilities if one at the most does."""
         for name in trial.proposed:
             self.with_effect(trial, name)
-        weights = {
-            name: larger.log_weight
-            for names, larger in self._trials.items()
+        larger = {
+            name: one
+            for names, one in self._trials.items()
             if names > trial.names and len(names) == len(trial.names) + 1
             for name in names - trial.names
         }
-        without = trial.log_weight, trial.log_weight_unknown
-        shares = softmax([*without, *weights.values()])[len(without) :]
-        found = dict(zip(weights, shares.tolist(), strict=True))
+        odds = self._log_odds(trial, larger)
+        shares = softmax([0.0, *odds.values()])[1:]
+        found = {n: p for n, p in zip(odds, shares.tolist(), strict=True) if n != UNKNOWN}
         return dict(sorted(found.items(), key=lambda item: -item[1]))
 
     def groups(self, trial: EffectSet) -> tuple[EffectSet, dict[str, Group]]:
@@ -345,11 +332,17 @@ class Search:
         found = [cause for cause in found if weights[cause] > others.log_weight] or [name]
         shares = np.cumsum(softmax([weights[cause] / COARSENED for cause in found]))
         members = found[: int(np.searchsorted(shares, CREDIBLE)) + 1]
+        odds = self._log_odds(others, tried)
+        outside = odds.pop(UNKNOWN)
+        return tuple(members), inclusion_of([*odds.values()], [0.0, outside])
+
+    def _log_odds(self, trial: EffectSet, larger: Mapping[str, EffectSet]) -> dict[str, float]:
+        """Logarithm of the odds of each larger set against one, and of something unknown in it."""
         # Beside an accepted effect, whose law is no truer than that, evidence counts for less.
-        scale = COARSENED if others.names else 1.0
+        scale = COARSENED if trial.names else 1.0
         effect, unknown = log_odds(PRIOR_EFFECT), log_odds(PRIOR_UNKNOWN)
-        odds = [
-            (one.log_evidence - others.log_evidence) / scale + effect for one in tried.values()
-        ]
-        outside = (others.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown
-        return tuple(members), inclusion_of(odds, [0.0, outside])
+        found = {
+            name: (one.log_evidence - trial.log_evidence) / scale + effect
+            for name, one in larger.items()
+        }
+        return found | {UNKNOWN: (trial.of_unknown.alone[UNKNOWN] - unknown) / scale + unknown}

@@ -5,7 +5,7 @@ user asks for.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -59,6 +59,7 @@ class DiagnosisState:
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
         testable: what the readings can show; None while it is not known.
+        sizes: of the amplitudes of effects that were found, times their typical ones, by id.
         figures, discrepancy: of the discrepancy, and its covariance (P, P) over the noise, by
             which intervals are wider; None while they are not known.
     """
@@ -73,6 +74,7 @@ class DiagnosisState:
     history: tuple[Step, ...]
     accepted: tuple[EffectClass, ...] = ()
     testable: Testability | None = None
+    sizes: Mapping[str, float] = field(default_factory=dict)
     figures: DiscrepancyFigures | None = None
     discrepancy: np.ndarray | None = None
 
@@ -98,7 +100,7 @@ class DiagnosisState:
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
-        return FreeParameters.of(start, *start.effects, known=self.known)
+        return FreeParameters.of(start, *start.effects, known=self.known, sizes=self.sizes)
 
     @cached_property
     def nonparametric_laws(self) -> list[Explanation]:
@@ -120,27 +122,30 @@ class DiagnosisState:
         self,
         effects: Sequence[Effect],
         model: DepositionModel,
-        free: np.ndarray | None = None,
+        directions: np.ndarray | None = None,
         discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
         starts: int = 1,
+        sizes: Mapping[str, float] | None = None,
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
         Args:
             effects: with their first values.
             model: to start from.
-            free: (P, n) directions over the noise that are left free beside them.
+            directions: (P, n) over the noise that are left free beside them.
             discrepancy: (P, P) covariance of the discrepancy, if that is allowed for.
             others: models whose patterns are starts, too.
             starts: how many, as in the first fit.
+            sizes: of the effects' amplitudes, times their typical ones; default: the state's.
         """
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
         start = model.model_copy(update={'effects': (*kept, *effects)})
         nuisance = self.study.nuisance
-        if free is not None:
-            nuisance = np.hstack([nuisance, free])
-        return self.study.fit(self._free(start), starts, self.seed, nuisance, discrepancy, others)
+        if directions is not None:
+            nuisance = np.hstack([nuisance, directions])
+        free = self._free(start) if sizes is None else replace(self._free(start), sizes=sizes)
+        return self.study.fit(free, starts, self.seed, nuisance, discrepancy, others)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:
         """The newest model with the laws that these explanations, at these sizes, stand for."""

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -50,8 +51,9 @@ MIRRORED = {
     'mirrored top to bottom': (0, 1),
     'turned by half a turn': (1, 1),
 }
-# Kinds of mistakes by which readings are taken for those of other places.
-PLACES = ('mirrored', 'exchanged')
+# Kinds of mistakes by which readings are taken for those of other places, and the share of what is
+# off that parts with such readings bear.
+PLACES, LEAST_BORNE = ('mirrored', 'exchanged'), 0.25
 
 
 @dataclass(frozen=True)
@@ -119,11 +121,24 @@ class Weighed:
         spread = float(np.log(self.study.sigma_um).sum())
         return -0.5 * self.fit.objective - spread - self.log_scale + self.log_size()
 
+    @cached_property
+    def excess_of_parts(self) -> np.ndarray:
+        """(E,) what is off beyond the noise on each part, each reading by 10 at most.
+
+        In squares over the noise and per reading of the campaign: their sum is ``excess``.
+        """
+        found = self.study.residuals(self.fit.predicted_um)
+        square = np.minimum((found.residual_um / found.sigma_um) ** 2, 100.0) - 1.0
+        return np.bincount(self.study.campaign.experiment_of, square) / len(square)
+
     @property
     def excess(self) -> float:
         """Mean square over the noise of what is off beyond it, each reading by 10 at most."""
-        found = self.study.residuals(self.fit.predicted_um)
-        return float(np.mean(np.minimum((found.residual_um / found.sigma_um) ** 2, 100.0))) - 1
+        return float(self.excess_of_parts.sum())
+
+    def bears(self, some: Sequence[int]) -> bool:
+        """Whether enough of what is off is on these parts for them to be the wrong ones."""
+        return float(self.excess_of_parts[[*some]].sum()) > LEAST_BORNE * max(self.excess, 0.0)
 
     def log_size(self, factor: float = 1.0) -> float:
         """Logarithm of the prior density of a film and a K1 as large as these over a factor."""
@@ -215,11 +230,15 @@ def _ways_meant(given: Weighed) -> Iterator[Meant]:
     parts = campaign.experiments
     every = tuple(range(len(parts)))
     for some in dict.fromkeys([every, *((k,) for k in every)]):
-        yield from _mirrored(campaign, some)
+        if given.bears(some):
+            yield from _mirrored(campaign, some)
         yield from _in_another_unit(given, some)
     # The level of a part for which something was switched off is not known: it may be any.
-    known = [part for part in parts if not part.switched_off]
-    for one, other in combinations(known, 2):
+    known = [k for k in every if not parts[k].switched_off]
+    for pair in combinations(known, 2):
+        if not given.bears(pair):
+            continue
+        one, other = (parts[k] for k in pair)
         with suppress(ReadingsError):
             changed = {
                 one.name: one.with_readings(other.readings),
