@@ -8,7 +8,7 @@ prints the tables of what is there.
 """
 
 import warnings
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import lru_cache
 from pathlib import Path
 
@@ -69,7 +69,7 @@ class Door:
             log.stamps_ns, log.positions_m, log.quaternions_xyzw,
             trigger_stamps_ns=log.trigger_stamps_ns, trigger_flow=1.0 * log.trigger_on,
         )  # fmt: skip
-        values = pattern.as_dict()
+        values = asdict(pattern)
         model = DepositionModel(
             planar=PlanarPattern(**{name: values[name] for name in PlanarPattern.model_fields}),
             projection=Projection(

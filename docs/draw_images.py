@@ -139,7 +139,8 @@ def draw_results() -> None:
               SAMPLES / 'door_horizontal', '--state-topic', '/atomizer/state',
               '--zones', zones, '-o', folder / 'film')  # fmt: skip
         film = Image.open(folder / 'film/film.png')
-        keep(film.crop((0, 0, film.width, film.height // 2)), 'zones.png')
+        # The upper panel with the figures of the zones beneath its histogram.
+        keep(film.crop((0, 0, film.width, int(0.508 * film.height))), 'zones.png')
         run('diagnose', SAMPLES / 'measured_door/campaign.yaml', '-o', folder / 'diagnosis')
         keep(of_the_door(Image.open(folder / 'diagnosis/comparison.png')), 'diagnosis.png')
         run('plan', '--mesh', SAMPLES / 'door.stl', '--model',
@@ -149,7 +150,7 @@ def draw_results() -> None:
               folder / 'plan/trajectory', '--model', folder / 'diagnosis/model.yaml',
               '--target-um', 20, '-o', folder / 'better')  # fmt: skip
         keep(Image.open(folder / 'better/improvement.png'), 'improve.png', 1150)
-        paint('place', '--trajectory', folder / 'plan/trajectory',
+        run('place', '--trajectory', folder / 'plan/trajectory',
               '--urdf', SAMPLES / 'robot.urdf', '--part-pose', 1.8, 0, 0.5, 0, 0,
               -0.7071068, 0.7071068, '-o', folder / 'place')  # fmt: skip
         keep(Image.open(folder / 'place/place.png'), 'place.png')

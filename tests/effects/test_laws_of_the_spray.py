@@ -81,10 +81,12 @@ def test_a_tilt_moves_the_spot_by_the_standoff_times_its_tangent(standoff_m, axi
 
 def test_misalignment_is_the_part_moved():
     drawn = panel(0.4, 0.04)
-    fault = EFFECTS['part_misalignment'](shift_down_m=0.03, shift_across_m=-0.02, yaw_rad=0.09)
+    fault = EFFECTS['part_misalignment'](
+        shift_down_m=0.03, shift_across_m=-0.02, shift_deep_m=0.01, yaw_rad=0.09
+    )
     seen_by_gun = Rotation.from_rotvec([0.0, -0.09, 0.0])  # about the outward normal, -y
     hung = Surface(
-        seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.0, -0.03]), drawn.faces,
+        seen_by_gun.apply(drawn.vertices_m) + np.array([-0.02, 0.01, -0.03]), drawn.faces,
         seen_by_gun.apply(drawn.normals), drawn.vertex_areas_m2, drawn.down,
     )  # fmt: skip
     motion = serpentine((0.1, -0.1))

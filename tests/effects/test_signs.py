@@ -62,6 +62,7 @@ EXPECTED = {
     ('tcp_tilt', 'tilt_y_rad'): (rightward, panel, FAR),
     ('part_misalignment', 'shift_down_m'): (upward, panel, FAR),
     ('part_misalignment', 'shift_across_m'): (leftward, panel, FAR),
+    ('part_misalignment', 'shift_deep_m'): (spread_m, panel, FAR),
     ('part_misalignment', 'yaw_rad'): (downward, panel, ASIDE),
     ('sag', 'run_m'): (downward, panel, NEAR),
     ('convex_attraction', 'gain'): (on_ridges, door, ON_DOOR),

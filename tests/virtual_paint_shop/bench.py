@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from types import MappingProxyType
 
 import numpy as np
 
@@ -19,7 +20,7 @@ class Bench:
 
     def __init__(
         self, seed: int, job: Job, pattern: Pattern, parcels: int,
-        brushes: Mapping[int, Pattern] | None = None,
+        brushes: Mapping[int, Pattern] = MappingProxyType({}),
     ) -> None:  # fmt: skip
         """Where the plan names brushes, each paints its own passes with its pattern."""
         self.scene = Scene(job.part, pattern, job.motion)
@@ -28,8 +29,7 @@ class Bench:
         self._clean_landings = {}
         numbers = sorted(set(job.plan.brushes))
         self._brushes = [
-            Bench(seed + n, job.of_brush(n), (brushes or {})[n], parcels // len(numbers))
-            for n in numbers
+            Bench(seed + n, job.of_brush(n), brushes[n], parcels // len(numbers)) for n in numbers
         ]
 
     def readings(
@@ -60,24 +60,23 @@ class Bench:
         key = (x.tobytes(), z.tobytes())
         if not flying and key in self._clean_landings:
             return self._clean_landings[key]
-        plume, motion, flow = self.plume, self.scene.nominal, self._commanded_flow
+        nominal, pattern = self.scene.nominal, self.scene.pattern
+        plume, motion = self.plume, nominal
+        flow = lambda t: pattern.K1_cm3_per_s * nominal.commanded(t)  # noqa: E731
         for truth in flying:
-            plume = truth.on_plume(plume, self.scene.pattern)
+            plume = truth.on_plume(plume, pattern)
             motion = truth.on_motion(motion, self.scene)
             flow = truth.on_flow(flow, self.scene)
         spraying = slices(motion, flow)
         air = still_air(spraying, plume)
         for truth in flying:
             air = truth.on_air(air, spraying, plume)
-        part, pattern = self.scene.part, self.scene.pattern
+        part = self.scene.part
         landings = fly(part, spraying, plume, air, part.point(x, z), pattern.model_plane_m,
                        pattern.emission_offset_m, self.parcels_total)  # fmt: skip
         if not flying:
             self._clean_landings[key] = landings
         return landings
-
-    def _commanded_flow(self, time_s: np.ndarray) -> np.ndarray:
-        return self.scene.pattern.K1_cm3_per_s * self.scene.nominal.commanded(time_s)
 
 
 def still_air(spraying: Slices, plume: Parcels) -> Air:

@@ -31,7 +31,7 @@ def draw_jobs(
     door = draw_door(rng)
     for truth in truths:
         door = truth.on_part(door)
-        gun = truth.staging().get('gun', gun)
+        gun = truth.gun or gun
     usual_gun = rng.choice(['outside', 'near_edge'], p=[0.6, 0.4])
     gun = str(gun or usual_gun)
     vertical = 'door_vertical' not in experiments and rng.random() < 0.25

@@ -13,7 +13,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from .gauge import Readings
-from .jobs import Log, Plan
+from .jobs import Log
 from .shop import Campaign
 
 ATOMIZER_STATE = Path(__file__).parents[2] / 'ros2_ws/src/paint_msgs/msg/AtomizerState.msg'
@@ -26,8 +26,8 @@ POSE_TOPIC, STATE_TOPIC = '/atomizer/pose', '/atomizer/state'
 def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False) -> Path:
     """Write the campaign and return the path of its campaign.yaml.
 
-    `truth/` holds truth.json, the held-out readings and the true films; campaign.yaml does not
-    mention it. Raises FileExistsError when the folder exists and is not empty.
+    `truth/truth.json` beside it has what is hidden; campaign.yaml does not mention it. Raises
+    FileExistsError when the folder exists and is not empty.
     """
     folder = Path(folder)
     if folder.exists() and any(folder.iterdir()):
@@ -39,26 +39,22 @@ def write(campaign: Campaign, folder: str | Path, *, sigma_column: bool = False)
         trimesh.Trimesh(experiment.vertices_m, experiment.faces, process=False).export(
             folder / mesh
         )
-        name, plan, truth = experiment.name, experiment.plan, folder / 'truth'
+        name, plan = experiment.name, experiment.plan
         write_bag(experiment.log, folder / name, plan.flow, plan.brushes)
-        write_readings(experiment.readings, folder / f'{name}.csv', sigma_column)
-        write_readings(experiment.heldout, truth / f'heldout_{name}.csv', sigma_column)
-        _write_films(experiment.readings, truth / f'films_readings_{name}.csv')
-        _write_films(experiment.heldout, truth / f'films_heldout_{name}.csv')
-        entries.append({
+        _write_readings(experiment.readings, folder / f'{name}.csv', sigma_column)
+        entry = {
             'name': name, 'mesh': mesh, 'trajectory': name, 'pose_topic': POSE_TOPIC,
-            'state_topic': STATE_TOPIC, 'measurements': f'{name}.csv', **_otherwise(plan),
-        })  # fmt: skip
+            'state_topic': STATE_TOPIC, 'measurements': f'{name}.csv',
+        }  # fmt: skip
+        if plan.upside_down:
+            entry['down'] = [0.0, 0.0, 1.0]
+        if plan.switched_off:
+            entry['switched_off'] = list(plan.switched_off)
+        entries.append(entry)
     (folder / 'truth' / 'truth.json').write_text(json.dumps(campaign.truth, indent=1) + '\n')
     path = folder / 'campaign.yaml'
     path.write_text(yaml.safe_dump({'experiments': entries}, sort_keys=False))
     return path
-
-
-def _otherwise(plan: Plan) -> dict:
-    """What of a plan a campaign must say."""
-    found = {'down': [0.0, 0.0, 1.0]} if plan.upside_down else {}
-    return found | ({'switched_off': list(plan.switched_off)} if plan.switched_off else {})
 
 
 def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...] = ()) -> None:
@@ -100,26 +96,14 @@ def write_bag(log: Log, folder: Path, flow: float = 1.0, brushes: tuple[int, ...
             bag.write(connection, stamp, data)
 
 
-def write_readings(table: Readings, path: Path, sigma_column: bool) -> None:
-    head = ['x_m', 'y_m', 'z_m', 'thickness_um', 'point']
-    columns = [*(np.round(table.positions_m, 4).T), table.thickness_um, table.point]
+def _write_readings(table: Readings, path: Path, sigma_column: bool) -> None:
+    columns = dict(zip(('x_m', 'y_m', 'z_m'), np.round(table.positions_m, 4).T, strict=True))
+    columns |= {'thickness_um': table.thickness_um, 'point': table.point}
     if any(table.group):
-        head, columns = [*head, 'group'], [*columns, table.group]
+        columns['group'] = table.group
     if sigma_column:
-        head, columns = [*head, 'sigma_um'], [*columns, np.round(table.sigma_um, 3)]
-    _write_csv(path, head, columns)
-
-
-def _write_films(table: Readings, path: Path) -> None:
-    films = [np.round(f, 4) for f in (table.film_um, table.expected_um, table.clean_um)]
-    marks = list(np.round(table.marks_um.T, 4))
-    head = ['point', 'film_um', 'expected_um', 'clean_um']
-    head += [f'mark_{k + 1}_um' for k in range(len(marks))]
-    _write_csv(path, head, [table.point, *films, *marks])
-
-
-def _write_csv(path: Path, head: list[str], columns: list) -> None:
+        columns['sigma_um'] = np.round(table.sigma_um, 3)
     with path.open('w', newline='') as file:
         out = csv.writer(file)
-        out.writerow(head)
-        out.writerows(zip(*(column.tolist() for column in columns), strict=True))
+        out.writerow(columns)
+        out.writerows(zip(*(column.tolist() for column in columns.values()), strict=True))

@@ -43,7 +43,6 @@ class Session:
     """One visit with the gauge to a part: what was written down, and why it is not the film."""
 
     thickness_um: np.ndarray  # (n,) as written down
-    slipped: np.ndarray  # (n,) bool, mistyped
     level: float  # the part's film over that of its kind
     offset_um: float  # of the gauge's zero
 
@@ -80,9 +79,6 @@ class Readings:
     expected_um: np.ndarray  # what a noise-free gauge would say
     clean_um: np.ndarray  # the film without the hidden effects
     marks_um: np.ndarray  # (n, hidden) what each hidden effect alone would change
-
-    def __len__(self) -> int:
-        return self.thickness_um.size
 
     def select(self, rows: np.ndarray | slice) -> Readings:
         return Readings(*(column[rows] for column in vars(self).values()))
@@ -122,7 +118,7 @@ def measure(
     reading = noise.read(film, rng, offset)
     slipped = rng.random(spot.size) < noise.slip_fraction
     reading[slipped] = [mistyped(value, rng) for value in reading[slipped]]
-    return Session(reading, slipped, level, offset)
+    return Session(reading, level, offset)
 
 
 def mistyped(reading_um: float, rng: np.random.Generator) -> float:

@@ -126,23 +126,29 @@ def draw_plan(
 
 def drive(part: Part, plan: Plan, rng: np.random.Generator) -> Motion:
     """Serpentine passes from the top down (or the left on), joined by rounded links."""
-    stretches, ends = [], []
+    tcps, axes, numbers, fires = [], [], [], []
     along = (0.0, part.height_m)
     if plan.direction == 'horizontal':
         along = (-0.5 * part.width_m, 0.5 * part.width_m)
     for number in range(plan.passes):
         rank = plan.passes - 1 - number if plan.from_below else number
         place = (0.5 * (plan.passes - 1) - rank) * plan.index_m
-        start, stop = along[0] - plan.overrun_m, along[1] + plan.overrun_m
-        forward = (rank % 2 == 0) != plan.other_way
-        path = np.arange(start, stop, STEP_M)
-        path = path if forward else path[::-1]
+        path = np.arange(along[0] - plan.overrun_m, along[1] + plan.overrun_m, STEP_M)
+        path = path if (rank % 2 == 0) != plan.other_way else path[::-1]
         tcp, axis = _pass(part, plan, rng, path, place)
-        opens = (along[0] - plan.gun_margin_m, along[1] + plan.gun_margin_m)
-        inside = np.flatnonzero((path > opens[0]) & (path < opens[1]))
-        stretches.append((tcp, axis, number))
-        ends.append((inside[0], inside[-1]))
-    return _in_time(stretches, ends, plan)
+        if number:
+            link = int(np.linalg.norm(tcp[0] - tcps[-1][-1]) / STEP_M) + 2
+            share = np.linspace(0.0, 1.0, link)[1:-1, None]
+            tcps.append((1 - share) * tcps[-1][-1] + share * tcp[0])
+            axes.append((1 - share) * axes[-1][-1] + share * axis[0])
+            numbers.append(np.full(len(share), -1))
+        opens = (path > along[0] - plan.gun_margin_m) & (path < along[1] + plan.gun_margin_m)
+        fires.append(sum(map(len, tcps)) + np.flatnonzero(opens)[[0, -1]])
+        tcps.append(tcp)
+        axes.append(axis)
+        numbers.append(np.full(len(tcp), number))
+    together = (np.concatenate(each) for each in (tcps, axes, numbers, fires))
+    return _in_time(*together, plan)
 
 
 def hold(part: Part, plan: Plan, place_m: np.ndarray, standoff_m: float, open_s: float) -> Motion:
@@ -195,14 +201,6 @@ def record(motion: Motion, sample_s: float, rng: np.random.Generator) -> Log:
     )
 
 
-def moved(
-    motion: Motion, tcp_m: np.ndarray | None = None, turn: np.ndarray | None = None
-) -> Motion:
-    """The same timing with other poses."""
-    poses = {'tcp_m': tcp_m, 'turn': turn}
-    return replace(motion, **{name: one for name, one in poses.items() if one is not None})
-
-
 def orthonormal(turn: np.ndarray) -> np.ndarray:
     z = turn[..., 2] / np.linalg.norm(turn[..., 2], axis=-1, keepdims=True)
     x = turn[..., 0] - np.sum(turn[..., 0] * z, axis=-1, keepdims=True) * z
@@ -232,25 +230,12 @@ def _pass(
     return CubicSpline(knots, tcp)(path), CubicSpline(knots, axis)(path)
 
 
-def _in_time(stretches: list, ends: list, plan: Plan) -> Motion:
-    tcps, axes, numbers, fires = [], [], [], []
-    total = 0
-    for k, (tcp, axis, number) in enumerate(stretches):
-        if k:
-            link = int(np.linalg.norm(tcp[0] - tcps[-1][-1]) / STEP_M) + 2
-            share = np.linspace(0.0, 1.0, link)[1:-1, None]
-            tcps.append((1 - share) * tcps[-1][-1] + share * tcp[0])
-            axes.append((1 - share) * axes[-1][-1] + share * axis[0])
-            numbers.append(np.full(len(share), -1))
-            total += len(share)
-        fires.append((total + ends[k][0], total + ends[k][1]))
-        tcps.append(tcp)
-        axes.append(axis)
-        numbers.append(np.full(len(tcp), number))
-        total += len(tcp)
-    number = np.concatenate(numbers)
-    tcp = gaussian_filter1d(np.concatenate(tcps), 5.0, axis=0, mode='nearest')
-    axis = gaussian_filter1d(np.concatenate(axes), 12.0, axis=0, mode='nearest')
+def _in_time(
+    tcp: np.ndarray, axis: np.ndarray, number: np.ndarray, trigger: np.ndarray, plan: Plan
+) -> Motion:
+    """The way of the gun rounded, and driven: slower about the ends of passes."""
+    tcp = gaussian_filter1d(tcp, 5.0, axis=0, mode='nearest')
+    axis = gaussian_filter1d(axis, 12.0, axis=0, mode='nearest')
     path = np.concatenate([[0.0], np.cumsum(_steps(tcp))])
     corners = path[np.flatnonzero(np.diff(number) != 0)]
     reversal = np.full(path.size, np.inf)
@@ -260,7 +245,6 @@ def _in_time(stretches: list, ends: list, plan: Plan) -> Motion:
     time = np.concatenate([[0.0], np.cumsum(np.diff(path) / (0.5 * (speed[1:] + speed[:-1])))])
     across = np.array([np.cos(plan.roll_rad), 0.0, np.sin(plan.roll_rad)])
     turn = orthonormal(np.stack([np.broadcast_to(across, axis.shape), axis, axis], axis=-1))
-    trigger = np.array(fires).ravel()
     return Motion(
         time, tcp, turn, number, reversal, time[trigger], np.arange(trigger.size) % 2 == 0
     )

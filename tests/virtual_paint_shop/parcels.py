@@ -7,7 +7,7 @@ distribution functions; the formula itself is never evaluated at a surface.
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import norm
@@ -33,9 +33,6 @@ class Pattern:
         """The same shape, `factor` times as wide."""
         lengths = ('r_m', 'sigma1_m', 'sigma2_m')
         return replace(self, **{name: getattr(self, name) * factor for name in lengths})
-
-    def as_dict(self) -> dict:
-        return asdict(self)
 
 
 @dataclass(frozen=True)

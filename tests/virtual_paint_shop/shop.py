@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -11,11 +13,12 @@ from .doors import Part, flat_panel
 from .draw import EXPERIMENTS, brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
 from .gauge import GaugeNoise, Readings, Spots, keep_clear, layout, scatter, tabulate
 from .jobs import Job, Log, Plan, record
-from .parcels import Pattern, conner_plume, draw_pattern, half_width_m
+from .parcels import Pattern, draw_pattern
 from .truths import Truth, choose, plain
 
 PARCELS = 8_000_000
 USUAL_NOISE = GaugeNoise()
+NO_BRUSHES: Mapping[int, Pattern] = MappingProxyType({})
 
 
 @dataclass(frozen=True)
@@ -30,7 +33,6 @@ class Experiment:
     log: Log
     readings: Readings
     heldout: Readings  # further points, for the judge alone
-    visible_um: dict  # id -> rms change of the noise-free readings
 
 
 @dataclass(frozen=True)
@@ -125,12 +127,12 @@ def panel_study(
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
     taking = Taking(readings, repeats, heldout, 'columns', noise)
     painted = [_paint(seed, 0, job, pattern, truths, taking, parcels)]
-    return _campaign(seed, pattern, painted, truths)
+    return _campaign(seed, pattern, painted, truths, {})
 
 
 def _paint(
     seed: int, number: int, job: Job, pattern: Pattern, truths: list[Truth], taking: Taking,
-    parcels: int, mesh_edge_m: float = 0.012, brushes: dict[int, Pattern] | None = None,
+    parcels: int, mesh_edge_m: float = 0.012, brushes: Mapping[int, Pattern] = NO_BRUSHES,
 ) -> Experiment:  # fmt: skip
     rng, noise = stream(seed, 40 + number), taking.noise
     style = taking.style or str(rng.choice(['columns', 'rows', 'random']))
@@ -146,17 +148,13 @@ def _paint(
     for k, one in enumerate(truths):
         alone = expected if len(truths) == 1 else bench.readings([one], at_x, at_z)[1]
         marks[:, k] = alone - clean
-    sizes = np.sqrt(np.mean(marks[:first] ** 2, axis=0))
-    visible = {one.id: float(size) for one, size in zip(truths, sizes, strict=True)}
     offset = noise.session_offset_um * rng.normal()
     tables = []
     for chosen, part in ((spots, slice(0, first)), (others, slice(first, None))):
         films = film[part], expected[part], clean[part], marks[part]
         tables.append(tabulate(job.part, chosen, *films, noise, offset, rng))
     log = record(job.motion, job.plan.sample_s, rng)
-    return Experiment(
-        job.name, job.part, job.plan, *job.part.mesh(mesh_edge_m), log, *tables, visible
-    )
+    return Experiment(job.name, job.part, job.plan, *job.part.mesh(mesh_edge_m), log, *tables)
 
 
 def gauged(
@@ -168,34 +166,18 @@ def gauged(
     levelled = (level * film for film in films)
     table = tabulate(job.part, Spots.at(x, z), *levelled, none, noise, offset, rng)
     log, nothing = record(job.motion, job.plan.sample_s, rng), table.select(slice(0))
-    return Experiment(job.name, job.part, job.plan, *job.part.mesh(), log, table, nothing, {})
+    return Experiment(job.name, job.part, job.plan, *job.part.mesh(), log, table, nothing)
 
 
 def _campaign(
     seed: int, pattern: Pattern, painted: list[Experiment], truths: list[Truth],
-    brushes: dict[int, Pattern] | None = None,
+    brushes: Mapping[int, Pattern],
 ) -> Campaign:  # fmt: skip
-    hidden = [
-        {**t.as_dict(), 'visible_rms_um': {e.name: e.visible_um[t.id] for e in painted}}
-        for t in truths
-    ]
     truth = {
         'seed': seed,
         'id': '+'.join(t.id for t in truths) or 'clean',
-        'hidden': hidden,
-        'pattern': pattern.as_dict(),
-        'brushes': {number: each.as_dict() for number, each in (brushes or {}).items()},
-        'half_width_m': half_width_m(conner_plume(pattern, 1 << 15, seed=1)),
-        'experiments': {e.name: _facts(e) for e in painted},
+        'hidden': [t.as_dict() for t in truths],
+        'pattern': asdict(pattern),
+        'brushes': {number: asdict(each) for number, each in brushes.items()},
     }
     return Campaign(seed, pattern, tuple(painted), plain(truth))
-
-
-def _facts(e: Experiment) -> dict:
-    named = ('direction', 'index_m', 'passes', 'standoff_m', 'speed_m_per_s', 'gun_margin_m')
-    return {name: getattr(e.plan, name) for name in named} | {
-        'poses': len(e.log.stamps_ns),
-        'readings': len(e.readings),
-        'mean_film_um': float(e.readings.film_um.mean()),
-        'noise_um': float(np.sqrt(np.mean(e.readings.sigma_um**2))),
-    }

@@ -2,26 +2,21 @@
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from .bench import Bench
-from .doors import Bend, Part
+from .doors import Part
+from .draw import draw_jobs
+from .gauge import scatter
 from .jobs import Job, Plan, drive
 from .parcels import Pattern
+from .programme import Painted, motion_of
 from .truths import DOWN, library
 
 pytestmark = pytest.mark.slow
 
 FLAT = Part('door', 1.0, 1.0)
-BENDS = Bend('z', 0.50, -1.0, -0.20, 0.012), Bend('z', 0.25, -1.0, 0.35, 0.02)
-DOOR = Part('door', 1.1, 0.9, 5.0, 3.0, bends=BENDS)
 ROUND = Pattern(1.5, K2=0.2, K3=0.0, phi_rad=0.0, r_m=0.09, sigma1_m=0.04, sigma2_m=0.06)
-CONTRACT_IDS = {
-    'incidence_attraction', 'convex_attraction', 'faraday_shielding', 'gauge_curvature_bias',
-    'edge_build', 'corner_slowdown', 'trigger_lag', 'standoff_efficiency', 'pattern_spread',
-    'tcp_standoff', 'air_drift', 'tcp_offset', 'tcp_tilt', 'part_misalignment', 'sag',
-    'flow_drift', 'fog_gradient', 'overspray_fog', 'gauge_gain', 'gauge_zero', 'pose_lag',
-    'gun_wake', 'occlusion',
-}  # fmt: skip
 COLUMN = np.zeros(61), np.linspace(0.02, 0.98, 61)
 ROW = np.linspace(-0.48, 0.48, 97), np.full(97, 0.5)
 
@@ -90,17 +85,6 @@ def test_corner_slowdown_adds_paint_near_the_reversals_only():
     assert film[48] == pytest.approx(clean[48], rel=0.002)
 
 
-@pytest.mark.parametrize(
-    ('truth_id', 'at_m', 'sign'), [('convex_attraction', 0.5, 1), ('faraday_shielding', 0.25, -1)]
-)
-def test_the_field_sees_the_convex_line_and_the_hollow(truth_id, at_m, sign):
-    clean, film = change(truth_id, COLUMN, 0.15, DOOR, passes=2)
-    gain = sign * relative(clean, film)
-    assert COLUMN[1][np.argmax(gain)] == pytest.approx(at_m, abs=0.03)
-    assert gain.min() >= 0.0
-    assert gain.max() > 0.10
-
-
 @pytest.mark.parametrize(('standoff', 'sign'), [(0.30, -1), (0.20, 1)])
 def test_distance_costs_paint_and_shaping_air_holds_the_plume_together(standoff, sign):
     clean, film = change('standoff_efficiency', COLUMN, 0.5, standoff_m=standoff)
@@ -132,3 +116,16 @@ def test_other_bells_keep_the_solids_and_change_the_shape(name):
     clean, film = change(name, COLUMN, 0.5, drawn={'angle_rad': 0.3})
     assert film.sum() == pytest.approx(clean.sum(), rel=0.02)
     assert np.sqrt(np.mean((film - clean) ** 2)) > 0.02 * clean.max()
+
+
+def test_a_given_programme_lays_the_film_of_the_shops_own():
+    """The shop's own motion as one would get it from a bag."""
+    pattern, (job,) = draw_jobs(5, [], ('door',), 0.05, 'outside')
+    spots, motion = scatter(job.part, 40, np.random.default_rng(1), 0.02), job.motion
+    given = motion_of(
+        motion.time_s, motion.tcp_m, Rotation.from_matrix(motion.turn).as_quat(),
+        motion.trigger_s, motion.trigger_on,
+    )  # fmt: skip
+    expected = Bench(9, job, pattern, 300_000).readings([], *spots)[0]
+    painted = Painted('door', job.part, pattern, [], given, 9, 300_000)
+    np.testing.assert_allclose(painted.film_um(*spots), expected, rtol=1e-9)

@@ -52,6 +52,7 @@ class Truth:
     unit = ''
     sign = 'positive'  # 'positive', 'negative' or 'either'
     ranges = between()  # of further parameters: low, high and, of several, how many
+    gun = None  # where the gun must open, so that the effect can occur at all
 
     @classmethod
     def draw(
@@ -76,10 +77,6 @@ class Truth:
     @classmethod
     def details(cls, rng: np.random.Generator) -> dict:
         return {name: rng.uniform(*limits) for name, limits in cls.ranges.items()}
-
-    def staging(self) -> dict:
-        """What the shop must arrange so that the effect can occur at all."""
-        return {}
 
     def on_part(self, part: Part) -> Part:
         return part

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .jobs import moved
 from .truths import DOWN, Scene, Truth, between, variant, with_drift
 
 
@@ -20,7 +19,7 @@ class TcpOffset(Truth):
     def on_motion(self, motion, scene):
         a = self.drawn['direction_rad']
         aside = motion.turn @ np.array([np.cos(a), np.sin(a), 0.0])
-        return moved(motion, tcp_m=motion.tcp_m + self.amplitude * aside)
+        return replace(motion, tcp_m=motion.tcp_m + self.amplitude * aside)
 
 
 class TcpStandoff(Truth):
@@ -29,7 +28,7 @@ class TcpStandoff(Truth):
     id, family, typical, most, unit, sign = 'tcp_standoff', 'standoff', 0.006, 0.05, 'm', 'either'
 
     def on_motion(self, motion, scene):
-        return moved(motion, tcp_m=motion.tcp_m + self.amplitude * motion.turn[:, :, 2])
+        return replace(motion, tcp_m=motion.tcp_m + self.amplitude * motion.turn[:, :, 2])
 
 
 class TcpTilt(Truth):
@@ -42,7 +41,7 @@ class TcpTilt(Truth):
     def on_motion(self, motion, scene):
         a = self.drawn['axis_rad']
         tilt = Rotation.from_rotvec(self.amplitude * np.array([np.cos(a), np.sin(a), 0.0]))
-        return moved(motion, turn=motion.turn @ tilt.as_matrix())
+        return replace(motion, turn=motion.turn @ tilt.as_matrix())
 
 
 class PartMisalignment(Truth):
@@ -62,7 +61,8 @@ class PartMisalignment(Truth):
         centre = np.array([0.0, 0.0, 0.5 * scene.part.height_m])
         back = Rotation.from_rotvec(-np.asarray(self.drawn['turn_rad'])).as_matrix()
         shift = self.amplitude * np.asarray(self.drawn['direction'])
-        return moved(motion, (motion.tcp_m - centre - shift) @ back.T + centre, back @ motion.turn)
+        tcp_m = (motion.tcp_m - centre - shift) @ back.T + centre
+        return replace(motion, tcp_m=tcp_m, turn=back @ motion.turn)
 
 
 class PoseLag(Truth):
@@ -120,10 +120,7 @@ class TriggerLag(Truth):
     """The flow answers the trigger like a first-order lag: rise in `amplitude`, fall faster."""
 
     id, family, typical, most, unit = 'trigger_lag', 'boundary', 0.08, 0.6, 's'
-    ranges = between(fall_ratio=(0.3, 0.8))
-
-    def staging(self) -> dict:
-        return {'gun': 'near_edge'}
+    ranges, gun = between(fall_ratio=(0.3, 0.8)), 'near_edge'
 
     def on_flow(self, flow, scene):
         nominal = scene.nominal
@@ -208,7 +205,7 @@ class TiltBentBracket(TcpTilt):
     def on_motion(self, motion, scene):
         tilted = super().on_motion(motion, scene)
         aside = self.drawn['pivot_m'] * (tilted.turn[:, :, 2] - motion.turn[:, :, 2])
-        return moved(tilted, tcp_m=tilted.tcp_m + aside)
+        return replace(tilted, tcp_m=tilted.tcp_m + aside)
 
 
 class MisalignmentSwing(PartMisalignment):
@@ -227,7 +224,8 @@ class MisalignmentSwing(PartMisalignment):
         hanger = np.array([0.0, 0.0, part.height_m])
         angle = self.drawn['side'] * self.amplitude / part.height_m
         back = Rotation.from_rotvec([-angle, 0.0, 0.0]).as_matrix()
-        return moved(motion, (motion.tcp_m - hanger) @ back.T + hanger, back @ motion.turn)
+        tcp_m = (motion.tcp_m - hanger) @ back.T + hanger
+        return replace(motion, tcp_m=tcp_m, turn=back @ motion.turn)
 
 
 class TriggerDelay(TriggerLag):

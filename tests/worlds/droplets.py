@@ -30,12 +30,16 @@ TRACED = 0.004
 FREE = {'K1_cm3_per_s': 0.5, 'K2': 0.2, 'K3': 0.2, 'phi_rad': 0.6, 'r_m': 0.25, 'sigma1_m': 0.25,
         'sigma2_m': 0.25}  # fmt: skip
 NAMES = {
-    'flow_drift': 'drift_per_pass',
     'gauge_zero': 'offset_um',
     'gun_wake': 'lag_s',
     'overspray_fog': 'fog_um',
     'pose_lag': 'lag_s',
     'tcp_standoff': 'offset_z_m',
+}
+# Angle of the truth, and parameters of the law, along the axes of the tool.
+TURNED = {
+    'tcp_offset': ('direction_rad', 'offset_x_m', 'offset_y_m'),
+    'tcp_tilt': ('axis_rad', 'tilt_x_rad', 'tilt_y_rad'),
 }
 SAG_REFERENCE_UM = 20.0
 # Other forms of a law that mean the same by their amount: a shift at the model plane.
@@ -130,13 +134,11 @@ def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
     amplitude, truth = hidden['amplitude'], hidden['id']
     if hidden['form'] and hidden['form'] not in SAME_AMOUNT.get(truth, ()):
         return {}
-    found: dict[str, float] = {}
-    if truth in ('tcp_offset', 'tcp_tilt'):
-        angle = hidden['direction_rad' if truth == 'tcp_offset' else 'axis_rad']
-        names = (
-            ('offset_x_m', 'offset_y_m') if truth == 'tcp_offset' else ('tilt_x_rad', 'tilt_y_rad')
-        )
-        found = dict(zip(names, amplitude * np.array([np.cos(angle), np.sin(angle)]), strict=True))
+    found = {NAMES[truth]: amplitude} if truth in NAMES else {}
+    if truth in TURNED:
+        angle, *names = TURNED[truth]
+        along = amplitude * np.array([np.cos(hidden[angle]), np.sin(hidden[angle])])
+        found = dict(zip(names, along, strict=True))
     elif truth == 'air_drift':
         # The surface faces +y, so that its right side, seen by the gun, is -x.
         x, _, z = hidden['direction']
@@ -145,8 +147,6 @@ def true_amounts(hidden: dict, passes: list[int]) -> dict[str, float]:
         found = {'run_m': amplitude / SAG_REFERENCE_UM}
     elif truth == 'flow_drift':
         found = {'drift_per_pass': np.mean([_growth(amplitude, n) for n in passes])}
-    elif truth in NAMES:
-        found = {NAMES[truth]: amplitude}
     return {f'{truth}.{name}': float(value) for name, value in found.items()}
 
 

@@ -12,11 +12,9 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .measured import available, measured
+from .measured import measured
 from .record import Judged, Painted, Part, amounts, grid_mesh, strengths, trigger
 from .semi_real_laws import GRID, HALF_M, Hidden, Job, Pattern, Sheet, gauge_um, remainder_um
-
-__all__ = ['available', 'paint']
 
 STEP_M, POSE_M = 0.010, 0.024
 UNSEEN = 60  # points a part

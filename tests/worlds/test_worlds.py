@@ -9,6 +9,7 @@ import paint_deposition as pd
 from virtual_paint_shop.cases import draw_case
 from virtual_paint_shop.gauge import GaugeNoise
 from worlds import droplets, semi_real
+from worlds.measured import available
 from worlds.record import KINDS, detectability
 
 WIDTH_M, FLOW = 0.09, 1.5
@@ -17,9 +18,7 @@ planar: {{K1_cm3_per_s: {FLOW}, K2: 1.0, K3: 0.0, phi_rad: 0.0, r_m: 0.1, sigma1
   sigma2_m: {WIDTH_M}}}
 projection: {{model_plane_m: 0.3, emission_offset_m: 0.05}}
 """
-measured = pytest.mark.skipif(
-    not semi_real.available(), reason='measurements kept beside the repository'
-)
+measured = pytest.mark.skipif(not available(), reason='measurements kept beside the repository')
 
 
 def gaussian():

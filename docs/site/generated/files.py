@@ -4,6 +4,7 @@
 """
 
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,10 @@ from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)
+# Keys that were explained before, in the order of the file.
+TARGET = ['target_um', 'tolerance_um']
+COAT = [k for k in campaign_coats.CoatEntry.model_fields if k not in MOTION | {'wet_on_wet'}]
+SWEPT = [key for key in SweepFile.model_fields if key in PART]
 BEGIN, END = '<!-- generated: files -->', '<!-- end of generated -->'
 MODEL = """
 A model has `planar` or `brushes` by their numbers, `projection`, a list of
@@ -36,6 +41,7 @@ A model has `planar` or `brushes` by their numbers, `projection`, a list of
 def text() -> str:
     """A section for each file."""
     own = ', '.join(f'`{name}`' for name in OWN.values())
+    layouts = dict.fromkeys([*(one.name for one in FORMATS), *LINES, *FOLDERS])
     aliases = [(f'`{name}`', ', '.join(words)) for name, words in ALIASES.items()]
     return '\n'.join([
         '## Model\n',
@@ -45,10 +51,11 @@ def text() -> str:
         '### A brush of `brushes`\n', 'Also `planar`.\n', _keys(SetPoints),
         '## Campaign\n', _keys(campaign_file._File),
         '### An experiment of `experiments`\n',
-        'Also the keys of [a motion](#a-motion) and of [a part](#a-part).\n',
-        _keys(campaign_file._Entry, without=MOTION | PART),
-        '### A coat of `coats`\n', 'Also the keys of [a motion](#a-motion).\n',
-        _keys(campaign_coats.CoatEntry, without=MOTION),
+        f'Also the keys of [a motion](#a-motion) and of [a part](#a-part), {_listed(TARGET)}.\n',
+        _keys(campaign_file._Entry, without=MOTION.union(PART, TARGET)),
+        '### A coat of `coats`\n',
+        f'Also the keys of [a motion](#a-motion), and of an experiment {_listed(COAT)}.\n',
+        _keys(campaign_coats.CoatEntry, without=MOTION.union(COAT)),
         '## Zones\n', 'Each of the list `zones`, see [zones](zones.md).\n', _keys(ZoneEntry),
         '## A motion\n', 'How a recording is read; for commands the same as options.\n',
         _keys(MotionSource),
@@ -56,10 +63,10 @@ def text() -> str:
         '## Gauge readings\n', f'Own columns: {own}. Other headings, without accents:\n',
         table(('column', 'headings'), aliases),
         'Side by side, layers: ' + '; '.join(f'`{n}` {", ".join(w)}' for n, w in LAYERS.items()),
-        '\nLayouts known by their headings, `#` a number:\n',
-        table(('layout', 'known by', 'columns', 'no reading unless'), _layouts()),
-        '## Sweep\n', 'Also the keys of [a motion](#a-motion).\n',
-        _keys(SweepFile, without=MOTION),
+        f'\nLayouts known by their headings or lines: {"; ".join(layouts)}.\n',
+        '## Sweep\n',
+        f'Also the keys of [a motion](#a-motion), and of [a part](#a-part) {_listed(SWEPT)}.\n',
+        _keys(SweepFile, without=MOTION.union(SWEPT)),
         '### `passes`\n', _keys(Passes), '### `sample`\n', _keys(Sample),
     ])  # fmt: skip
 
@@ -71,27 +78,20 @@ def written(page: str) -> str:
                   flags=re.DOTALL)  # fmt: skip
 
 
-def _layouts() -> list[tuple[str, str, str, str]]:
-    rows = [
-        (
-            one.name, ', '.join(one.shown_by),
-            ', '.join(f'{quantity}: {heading}' for quantity, heading in one.columns.items()),
-            ', '.join(f'{heading} is {good[1]}' for heading, good in one.status.items()),
-        )
-        for one in FORMATS
-    ]  # fmt: skip
-    rows += [(n, 'its lines', ', '.join(line.groupindex), '') for n, line in LINES.items()]
-    return rows + [(f'{n}, folder or zip', ', '.join(f), '', '') for n, f in FOLDERS.items()]
-
-
 def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:
+    """A table of keys; those of one meaning share a row."""
     schema = model.model_json_schema()
-    rows = [
-        (f'`{key}`', said.get('description', 'text'), _bounds(said), _default(said, key, schema))
-        for key, said in schema['properties'].items()
-        if key not in without
-    ]
-    return table(('key', 'meaning', 'range', 'default'), rows)
+    rows: dict[str, list[str]] = {}
+    for key, said in schema['properties'].items():
+        if key not in without:
+            meaning, bounds = said.get('description', 'text'), _bounds(said)
+            facts = meaning, '' if bounds in meaning else bounds, _default(said, key, schema)
+            rows.setdefault('; '.join(filter(None, facts)), []).append(f'`{key}`')
+    return table(('key', 'meaning'), [(', '.join(keys), said) for said, keys in rows.items()])
+
+
+def _listed(keys: Iterable[str]) -> str:
+    return ', '.join(f'`{key}`' for key in keys)
 
 
 def _bounds(said: dict[str, Any]) -> str:
@@ -111,9 +111,9 @@ def _default(said: dict[str, Any], key: str, schema: dict[str, Any]) -> str:
         return 'required'
     value = said.get('default')
     if isinstance(value, bool):
-        return f'`{value}`'.lower()
+        return f'default `{value}`'.lower()
     shown = value not in (None, '', [], {}) and not isinstance(value, dict)
-    return f'`{value}`' if shown else ''
+    return f'default `{value}`' if shown else ''
 
 
 if __name__ == '__main__':

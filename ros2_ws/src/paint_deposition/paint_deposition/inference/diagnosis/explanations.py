@@ -131,7 +131,7 @@ LAW_ERROR, LAW_LENGTH = 0.3, 1.0
 OTHER_ERROR, OTHER_LAW = 0.3, 1.5
 # An effect is there by its law, off by so much as laws are, or by a law much further off: how many
 # times as far, and the prior share of each; and the share of a law of another form.
-LAWS_OFF, ANOTHER_FORM = ((1.0, 0.6), (3.0, 0.25)), 0.15
+LAWS_OFF, ANOTHER_FORM = ((0.2, 0.25), (1.0, 0.4), (3.0, 0.2)), 0.15
 # Laws of any form: typical size of a factor, of an addition [um], and of a factor over a part.
 FACTOR, ADDITION_UM = 0.05, 0.7
 FACTOR_OF_PLACE = 0.1
