@@ -14,6 +14,7 @@ from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 from scenes import stamps_ns
 
@@ -117,6 +118,21 @@ def painted(
     )
     integrator.add(path)
     return integrator
+
+
+def volume_cm3(film_um: np.ndarray, points: SurfacePoints) -> float:
+    return float(film_um @ points.area_m2)
+
+
+def centroid_m(film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
+    """(3,) centre of the paint."""
+    return (film_um * points.area_m2) @ points.positions_m / volume_cm3(film_um, points)
+
+
+def spread_m(film_um: np.ndarray, points: SurfacePoints) -> float:
+    """Root mean square distance of the paint from its centre."""
+    away_m2 = ((points.positions_m - centroid_m(film_um, points)) ** 2).sum(axis=1)
+    return float(np.sqrt(volume_cm3(film_um * away_m2, points) / volume_cm3(film_um, points)))
 
 
 def in_batches(trajectory: Trajectory, poses: int, whole_strokes: bool):

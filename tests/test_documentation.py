@@ -1,4 +1,4 @@
-"""What the documentation names is there: files, headings, commands with their options, layers."""
+"""What the documentation names is there, and the rooms keep their order."""
 
 import re
 import shlex
@@ -8,6 +8,7 @@ from xml.etree import ElementTree
 
 import click
 import pytest
+from importlinter.cli import lint_imports
 
 ROOT = Path(__file__).resolve().parent.parent
 SHARE = ROOT / 'ros2_ws/src/paint_deposition'
@@ -39,7 +40,7 @@ def test_links_lead_to_files_and_headings(page: Path):
 
 
 @every_page
-def test_files_that_are_named_are_there(page: Path):
+def test_files_and_targets_of_make_that_are_named_are_there(page: Path):
     folders = [folder for folder in (PACKAGE, SHARE, ROOT) if folder.is_dir()]
     known = {entry.name for folder in folders for entry in folder.iterdir() if entry.is_dir()}
     known -= {'build', 'install', 'runs', 'results'}
@@ -48,6 +49,8 @@ def test_files_that_are_named_are_there(page: Path):
         path for path in re.findall(r'`([\w.-]+/[\w./-]*)`', text) if path.split('/')[0] in known
     ]
     assert not [p for p in named if not any((folder / p).exists() for folder in folders)]
+    targets = re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE)
+    assert not set(re.findall(r'`make ([a-z-]+)', text)) - set(targets)
 
 
 @every_page
@@ -62,18 +65,10 @@ def test_commands_that_are_shown_have_their_options(page: Path):
             unknown.append(name)
             continue
         command = paint.get_command(context, name)
-        options = {o for parameter in command.params for o in parameter.opts}
-        options |= {o for parameter in command.params for o in parameter.secondary_opts}
+        options = {o for p in command.params for o in (*p.opts, *p.secondary_opts)}
         given = [word for word in words if re.fullmatch(r'--?[a-z][a-z-]*', word)]
         unknown += [f'{name} {word}' for word in given if word not in {*options, '--help'}]
     assert not unknown
-
-
-@every_page
-def test_targets_of_make_are_there(page: Path):
-    targets = re.findall(r'^([a-z-]+):', (ROOT / 'Makefile').read_text(), re.MULTILINE)
-    named = re.findall(r'`make ([a-z-]+)', page.read_text(encoding='utf-8'))
-    assert not set(named) - set(targets)
 
 
 @pytest.mark.skipif(sys.version_info < (3, 11), reason='tomllib comes with Python 3.11')
@@ -104,3 +99,8 @@ def shown_commands(page: Path) -> list[str]:
     blocks = re.findall(r'```bash\n(.*?)```', page.read_text(encoding='utf-8'), re.DOTALL)
     lines = '\n'.join(blocks).replace('\\\n', ' ')
     return re.findall(r'^(?:\./)?paint (.*)$', lines, re.MULTILINE)
+
+
+def test_rooms_import_only_from_below(repository, monkeypatch):
+    monkeypatch.syspath_prepend(str(repository / 'ros2_ws/src/paint_deposition'))
+    assert lint_imports(config_filename=str(repository / 'pyproject.toml'), no_cache=True) == 0

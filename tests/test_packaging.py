@@ -2,9 +2,9 @@
 
 import importlib
 import importlib.metadata
-import importlib.util
 import os
 import re
+import runpy
 import shutil
 import subprocess
 import sys
@@ -32,11 +32,6 @@ def manifest(package: str) -> ElementTree.Element:
     return ElementTree.parse(SOURCES / package / 'package.xml').getroot()
 
 
-def console_scripts() -> dict[str, importlib.metadata.EntryPoint]:
-    scripts = importlib.metadata.distribution(PACKAGE).entry_points
-    return {script.name: script for script in scripts if script.group == 'console_scripts'}
-
-
 def table_of(node: str) -> dict:
     """The parameter table of the node's class, by name."""
     _, place, node_class = getattr(executables, node).args
@@ -44,29 +39,18 @@ def table_of(node: str) -> dict:
     return getattr(module, node_class).PARAMETERS
 
 
-def cell_parameters() -> dict[str, dict]:
-    """The shipped parameter file: node -> name -> value."""
-    path = SOURCES / PACKAGE / 'config' / 'cell.yaml'
-    nodes = yaml.safe_load(path.read_text())
-    return {key.removeprefix('/**/'): body['ros__parameters'] for key, body in nodes.items()}
+@pytest.mark.filterwarnings('ignore::DeprecationWarning')
+def test_manifests_changelogs_and_licences_agree(repository):
+    """The changelogs of the packages are read as bloom reads them."""
+    from catkin_pkg.changelog import get_changelog_from_path
 
-
-def test_manifest_and_setup_agree():
-    xml = manifest(PACKAGE)
-    installed = importlib.metadata.metadata(PACKAGE)
+    xml, installed = manifest(PACKAGE), importlib.metadata.metadata(PACKAGE)
+    version = paint_deposition.__version__
     assert xml.findtext('name') == installed['Name'].replace('-', '_')
     assert xml.findtext('license') == installed['License']
     maintainer = xml.find('maintainer')
     assert installed['Maintainer-email'] == f'{maintainer.text} <{maintainer.get("email")}>'
-    assert installed['Version'] == paint_deposition.__version__
-
-
-@pytest.mark.filterwarnings('ignore::DeprecationWarning')
-def test_one_version_stands_everywhere(repository):
-    """Also as the newest of each changelog, that of the packages as bloom reads it."""
-    from catkin_pkg.changelog import get_changelog_from_path
-
-    version = paint_deposition.__version__
+    assert installed['Version'] == version
     for package in (PACKAGE, 'paint_msgs'):
         assert manifest(package).findtext('version') == version
         changelog = get_changelog_from_path(SOURCES / package)
@@ -86,19 +70,15 @@ def test_manifest_names_every_message_package_in_use():
     assert used <= declared
 
 
-def test_console_scripts_are_the_nodes_and_paint():
-    assert set(console_scripts()) == {'paint', *NODES}
-
-
-@pytest.mark.parametrize('name', ['paint', *NODES])
-def test_executables_lie_where_ros2_run_looks(name, repository):
-    path = repository / 'ros2_ws' / 'install' / 'lib' / PACKAGE / name
-    assert os.access(path, os.X_OK)
-
-
-def test_shared_files_are_installed():
+def test_what_is_installed_is_where_ros2_looks(repository):
     from ament_index_python.packages import get_package_share_directory
 
+    scripts = importlib.metadata.distribution(PACKAGE).entry_points
+    names = {script.name for script in scripts if script.group == 'console_scripts'}
+    assert names == {'paint', *NODES}
+    for name in names:
+        path = repository / 'ros2_ws' / 'install' / 'lib' / PACKAGE / name
+        assert os.access(path, os.X_OK), name
     share = Path(get_package_share_directory(PACKAGE))
     for folder in ('launch', 'config', 'samples'):
         for source in (SOURCES / PACKAGE / folder).rglob('*'):
@@ -130,22 +110,22 @@ def wanted(**given: str) -> dict[str, dict]:
     from launch import LaunchContext
     from launch.actions import DeclareLaunchArgument
 
-    spec = importlib.util.spec_from_file_location('paint_cell', LAUNCH_FILE)
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    file = runpy.run_path(str(LAUNCH_FILE))
     context = LaunchContext()
     context.launch_configurations.update(given)
-    for entity in module.generate_launch_description().entities:
+    for entity in file['generate_launch_description']().entities:
         if isinstance(entity, DeclareLaunchArgument):
             entity.execute(context)
-    return module.node_parameters(context.launch_configurations)
+    return file['node_parameters'](context.launch_configurations)
 
 
-def launched(*arguments: str) -> subprocess.CompletedProcess:
-    """The launch file as `ros2 launch` runs it."""
+def launched(*arguments: str) -> str:
+    """What `ros2 launch` says of a launch that ends with an error."""
     pytest.importorskip('launch_ros', reason='launch_ros comes with a ROS installation')
     command = [sys.executable, '-c', LAUNCHED, LAUNCH_FILE, *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert done.returncode == 1, done.stdout + done.stderr
+    return done.stdout + done.stderr
 
 
 def test_launch_file_describes_every_node():
@@ -181,9 +161,7 @@ def test_launched_replay_waits_for_every_node_that_takes_poses(given, count):
     ],
 )
 def test_a_launch_that_cannot_be_starts_no_node(argument, words):
-    done = launched('bag:=run', argument)
-    said = done.stdout + done.stderr
-    assert done.returncode == 1, said
+    said = launched('bag:=run', argument)
     assert words in said
     assert 'process started' not in said
 
@@ -191,9 +169,7 @@ def test_a_launch_that_cannot_be_starts_no_node(argument, words):
 @pytest.mark.slow
 def test_a_node_that_fails_ends_the_launch_with_an_error(ros_domain, tmp_path):
     """The bag is not there: the player fails at once, while the others still load."""
-    done = launched(f'bag:={tmp_path / "run"}')
-    said = done.stdout + done.stderr
-    assert done.returncode == 1, said
+    said = launched(f'bag:={tmp_path / "run"}')
     assert 'bag_player ended with exit code 2' in said
     for process in re.findall(r'process started with pid \[(\d+)\]', said):
         assert not Path(f'/proc/{process}').exists()
@@ -224,10 +200,10 @@ def test_the_aggregator_has_one_group_for_each_node():
 def test_parameter_file_tells_of_every_parameter_and_holds_the_defaults(node):
     text = (SOURCES / PACKAGE / 'config' / 'cell.yaml').read_text()
     section = text.split(f'/**/{node}:')[1].split('/**/')[0]
-    table, values = table_of(node), cell_parameters()[node]
+    table = table_of(node)
     for name in table:
         assert re.search(rf'^ +(# )?{name}: .*#', section, re.M), f'{node}: {name} is not there'
-    for name, value in values.items():
+    for name, value in yaml.safe_load(text)[f'/**/{node}']['ros__parameters'].items():
         assert (value, type(value)) == (table[name].default, type(table[name].default)), name
 
 

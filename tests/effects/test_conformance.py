@@ -49,14 +49,10 @@ def case(effect: type[Effect], *more: str):
     return pytest.param(effect, *more, id='-'.join([effect.id, *more]), marks=marks)
 
 
+# Two passes over the panel, the gun opening and closing on it.
+PASSES = path_of(serpentine((0.08, -0.08)))
 EFFECT = pytest.mark.parametrize('effect', [case(effect) for effect in ALL])
 AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in AMPLITUDES])
-
-
-@pytest.fixture(scope='module')
-def passes():
-    """Two passes over the panel, gun opening and closing on it."""
-    return path_of(serpentine((0.08, -0.08)))
 
 
 @EFFECT
@@ -98,17 +94,17 @@ def test_values_outside_the_bounds_are_refused(effect: type[Effect]):
 
 
 @EFFECT
-def test_neutral_changes_nothing(effect: type[Effect], passes):
+def test_neutral_changes_nothing(effect: type[Effect]):
     points, neutral = door().points(), effect()
     film = np.linspace(0.0, 30.0, len(points))
     context = PathContext(MODEL.projection, points.down, points.outward, points.centre_m)
     assert np.array_equal(neutral.on_film(film, points), film)
     assert np.array_equal(neutral.on_gauge(film, points), film)
-    path = neutral.on_path(passes, context)
-    for column in fields(path):
-        before, after = getattr(passes, column.name), getattr(path, column.name)
+    path = neutral.on_path(PASSES, context)
+    for column in fields(PASSES):
+        before, after = getattr(PASSES, column.name), getattr(path, column.name)
         np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-14, err_msg=column.name)
-    film_of, base = painted(door(), passes, effect()), painted(door(), passes)
+    film_of, base = painted(door(), PASSES, effect()), painted(door(), PASSES)
     assert neutral.is_neutral
     assert np.array_equal(film_of.gauge_um, base.gauge_um)
     for law in (effect.flux_factor, effect.pattern_scale):
@@ -119,23 +115,23 @@ def test_neutral_changes_nothing(effect: type[Effect], passes):
 
 
 @EFFECT
-def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect], passes):
+def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect]):
     for end in ('low', 'high'):
         extreme = effect(**{name: at[end] for name, at in effect.parameters().items()})
-        film = painted(door(), passes, extreme)
+        film = painted(door(), PASSES, extreme)
         assert np.isfinite(film.gauge_um).all()
         assert film.raw_um.min() >= 0.0
 
 
 @AMPLITUDE
-def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str, passes):
+def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str):
     described = effect.parameters()[name]
     neutral, step = described['neutral'], 1e-3 * described['typical']
     surface = panel_with_screen() if effect.id == 'occlusion' else door()
 
     def slope(before: float, after: float) -> np.ndarray:
         films = [
-            painted(surface, passes, effect(**{name: value})).gauge_um for value in (before, after)
+            painted(surface, PASSES, effect(**{name: value})).gauge_um for value in (before, after)
         ]
         return (films[1] - films[0]) / (after - before)
 
@@ -188,14 +184,14 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
 
 
 @EFFECT
-def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect], passes):
-    sheet = painted(door(), passes, effect.typical()).gauge_um
+def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect]):
+    sheet = painted(door(), PASSES, effect.typical()).gauge_um
     some = slice(11, None, 97)
     stencil_m = 0.01 if effect.needs_slope else None
     at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
     model = MODEL.with_effect(effect.typical())
     integrator = FilmIntegrator(at, model, 'double', door().occluder, parallel=False)
-    integrator.add(passes)
+    integrator.add(PASSES)
     readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.
     tolerance = 0.02 if effect.needs_slope else 1e-6

@@ -5,20 +5,23 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from booth import door, painted, panel, panel_with_screen, path_of, serpentine, spot
+from booth import (
+    centroid_m,
+    door,
+    painted,
+    panel,
+    panel_with_screen,
+    path_of,
+    serpentine,
+    spot,
+    spread_m,
+    volume_cm3,
+)
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.part.points import SurfacePoints
 
 X, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 Figure = Callable[[np.ndarray, SurfacePoints], float]
-
-
-def volume(film_um: np.ndarray, points: SurfacePoints) -> float:
-    return float(film_um @ points.area_m2)
-
-
-def centroid_m(film_um: np.ndarray, points: SurfacePoints) -> np.ndarray:
-    return (film_um * points.area_m2) @ points.positions_m / volume(film_um, points)
 
 
 def along(axis: np.ndarray) -> Figure:
@@ -27,11 +30,6 @@ def along(axis: np.ndarray) -> Figure:
 
 def negative(figure: Figure) -> Figure:
     return lambda film_um, points: -figure(film_um, points)
-
-
-def width(film_um: np.ndarray, points: SurfacePoints) -> float:
-    offsets = points.positions_m - centroid_m(film_um, points)
-    return float((film_um * points.area_m2) @ (offsets**2).sum(axis=1) / volume(film_um, points))
 
 
 def on_ridges(film_um: np.ndarray, points: SurfacePoints) -> float:
@@ -43,7 +41,7 @@ def off_valleys(film_um: np.ndarray, points: SurfacePoints) -> float:
 
 
 rightward, leftward, upward, downward = along(X), along(-X), along(UP), along(-UP)
-narrowness, loss = negative(width), negative(volume)
+narrowness, loss = negative(spread_m), negative(volume_cm3)
 FAR, NEAR = spot(standoff_m=0.32), spot(standoff_m=0.2)
 ASIDE = spot(x_m=0.2)
 PASS = serpentine((0.0,), half_width_m=0.4, opens_at_m=0.25)
@@ -52,9 +50,9 @@ ON_DOOR = serpentine((0.2, 0.45), half_width_m=0.7, opens_at_m=0.65)
 
 # What a positive value of each amplitude makes more of, and where.
 EXPECTED = {
-    ('incidence_attraction', 'attraction'): (volume, panel, NEAR),
+    ('incidence_attraction', 'attraction'): (volume_cm3, panel, NEAR),
     ('standoff_efficiency', 'exponent'): (loss, panel, FAR),
-    ('pattern_spread', 'exponent'): (width, panel, FAR),
+    ('pattern_spread', 'exponent'): (spread_m, panel, FAR),
     ('tcp_standoff', 'offset_z_m'): (narrowness, panel, FAR),
     ('air_drift', 'shift_down_m'): (downward, panel, FAR),
     ('air_drift', 'shift_across_m'): (rightward, panel, FAR),
@@ -64,21 +62,21 @@ EXPECTED = {
     ('tcp_tilt', 'tilt_y_rad'): (rightward, panel, FAR),
     ('part_misalignment', 'shift_down_m'): (upward, panel, FAR),
     ('part_misalignment', 'shift_across_m'): (leftward, panel, FAR),
-    ('part_misalignment', 'shift_deep_m'): (width, panel, FAR),
+    ('part_misalignment', 'shift_deep_m'): (spread_m, panel, FAR),
     ('part_misalignment', 'yaw_rad'): (downward, panel, ASIDE),
     ('sag', 'run_m'): (downward, panel, NEAR),
     ('convex_attraction', 'gain'): (on_ridges, door, ON_DOOR),
     ('faraday_shielding', 'shielding'): (off_valleys, door, ON_DOOR),
     ('gauge_curvature_bias', 'bias_um'): (on_ridges, door, ON_DOOR),
-    ('edge_build', 'gain'): (volume, door, ON_DOOR),
-    ('corner_slowdown', 'gain'): (volume, panel, PASSES),
+    ('edge_build', 'gain'): (volume_cm3, door, ON_DOOR),
+    ('corner_slowdown', 'gain'): (volume_cm3, panel, PASSES),
     ('trigger_lag', 'rise_s'): (loss, panel, PASS),
-    ('trigger_lag', 'fall_s'): (volume, panel, PASS),
+    ('trigger_lag', 'fall_s'): (volume_cm3, panel, PASS),
     ('flow_drift', 'drift_per_pass'): (downward, panel, PASSES),
     ('fog_gradient', 'fog_um'): (downward, panel, NEAR),
-    ('overspray_fog', 'fog_um'): (volume, panel, NEAR),
-    ('gauge_gain', 'gain'): (volume, panel, NEAR),
-    ('gauge_zero', 'offset_um'): (volume, panel, NEAR),
+    ('overspray_fog', 'fog_um'): (volume_cm3, panel, NEAR),
+    ('gauge_gain', 'gain'): (volume_cm3, panel, NEAR),
+    ('gauge_zero', 'offset_um'): (volume_cm3, panel, NEAR),
     ('pose_lag', 'lag_s'): (rightward, panel, PASS),
     ('gun_wake', 'lag_s'): (leftward, panel, PASS),
     ('occlusion', 'strength'): (loss, panel_with_screen, NEAR),

@@ -1,7 +1,9 @@
 """A user's own effect: one file, taken in like those of the project or refused with a remedy."""
 
 import importlib.util
+import os
 import pickle
+import subprocess
 import sys
 from pathlib import Path
 
@@ -10,6 +12,7 @@ import pytest
 from numba import njit
 
 from booth import SAMPLES, painted, panel, path_of, serpentine
+from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
@@ -65,6 +68,11 @@ def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
     assert pickle.loads(pickle.dumps(effect.typical())) == effect.typical()
 
 
+def with_place(head: str, body: str) -> list[tuple[str, str]]:
+    method = f'    def {head}:\n        {body}\n\n'
+    return [('    @staticmethod', f'{method}    @staticmethod')]
+
+
 @pytest.mark.parametrize(
     ('changes', 'message'),
     [
@@ -86,11 +94,19 @@ def test_the_same_file_is_the_same_class_and_can_go_to_another_process(own):
         ([('return exp', 'return -exp')], 'a factor is 0 or more'),
         ([('return exp', 'retrun exp')], 'SyntaxError'),
         ([('kernel.fast_math', 'kernel.fast_maths')], 'line 7: ModuleNotFoundError'),
+        # Its other places are tried out.
+        (with_place('on_film(self, film_um, points)', 'return film_um[:2]'),
+         'not return a finite film'),
+        (with_place('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0'),
+         'not return a finite'),
+        (with_place('on_film(self, film_um, points)', 'return points.no_such'),
+         'fails (AttributeError'),
+        (with_place('on_path(self, path, context)', 'return None'), 'return path.with_(...)'),
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_said_in_one_line_with_its_remedy(own, changes, message):
     path = own(*changes)
-    with pytest.raises(ModelError) as refused:
+    with np.errstate(all='ignore'), pytest.raises(ModelError) as refused:
         load_effect_file(path)
     assert message in str(refused.value)
     assert str(refused.value).startswith(str(path))
@@ -104,20 +120,14 @@ def test_two_effects_in_a_file_are_refused(own):
         load_effect_file(path)
 
 
-@pytest.mark.parametrize(
-    ('place', 'body', 'message'),
-    [
-        ('on_film(self, film_um, points)', 'return film_um[:2]', 'not return a finite film'),
-        ('on_gauge(self, film_um, points)', 'return film_um / 0.0 * 0.0', 'not return a finite'),
-        ('on_film(self, film_um, points)', 'return points.no_such', 'fails (AttributeError'),
-        ('on_path(self, path, context)', 'return None', 'return path.with_(...)'),
-    ],
-)
-def test_places_are_tried_out(own, place, body, message):
-    path = own(('    @staticmethod', f'    def {place}:\n        {body}\n\n    @staticmethod'))
-    with np.errstate(all='ignore'), pytest.raises(ModelError) as refused:
-        load_effect_file(path)
-    assert message in str(refused.value)
+def test_the_page_on_ones_own_effect_names_what_there_is(repository: Path):
+    text = (repository / 'docs/own_effect.md').read_text(encoding='utf-8')
+    assert (SAMPLES / 'my_effect.py').relative_to(repository).as_posix() in text
+    for name in Ray._fields:
+        assert f'`{name}`' in text
+    for place in ('flux_factor', 'pattern_scale', 'on_path', 'on_film', 'on_gauge'):
+        assert f'`{place}(' in text
+        assert hasattr(Effect, place)
 
 
 def test_a_missing_file_is_named(tmp_path: Path):
@@ -154,3 +164,64 @@ def test_a_class_of_a_script_is_kept_as_a_file_beside_the_model(own, tmp_path):
         ModelError, match="source of effect 'wake_loss' is not known: put WakeLoss in"
     ):
         write_model(tmp_path / 'out.yaml', model)
+
+
+# An effect that is edited between runs.
+
+IMPORTED = """
+from numba import njit
+
+@njit
+def raised(x):
+    return x + {lift}
+"""
+EFFECT = """
+from raising import raised
+from paint_deposition.effects.base import Effect, Ray, parameter
+
+GAIN = 2.0
+
+class Scaled(Effect):
+    id = 'scaled'
+    family = 'own'
+    a: float = parameter(0.0, low=0.0, high=1.0, typical=0.5, unit='1', description='a')
+
+    @staticmethod
+    def flux_factor(ray: Ray, a: float) -> float:
+        return 1.0 + GAIN * (raised(a) - a)
+"""
+# One run: the law, compiled and kept on disk as a kernel is, and how often it was found there.
+RUN = """
+import sys
+
+from paint_deposition.effects.base import Ray
+from paint_deposition.effects.catalogue import load_effect_file
+from paint_deposition.kernel.compiler import named_for_its_code, njit
+from paint_deposition.kernel.laws import product
+
+law = load_effect_file(sys.argv[1]).flux_factor
+factor = product([(law, 1)], float)
+
+def scaled(ray, parameters):
+    return factor(ray, parameters)
+
+compiled = njit(cache=True)(named_for_its_code(scaled, [law]))
+print(compiled(Ray(0.1, 0.2, 1.7, 0.6, 0.4), (0.5,)))
+print(sum(compiled.stats.cache_hits.values()))
+"""
+
+
+@pytest.mark.slow
+def test_what_is_edited_between_runs_counts_in_the_next_and_what_is_not_is_found_again(tmp_path):
+    """Also in a file that the effect's file imports, whatever Numba goes by."""
+    (tmp_path / 'run.py').write_text(RUN)
+    (tmp_path / 'own.py').write_text(EFFECT)
+    environment = {k: v for k, v in os.environ.items() if k != 'NUMBA_CACHE_DIR'}
+    for lift, hits in ((0.25, 0), (0.25, 1), (0.75, 0)):
+        (tmp_path / 'raising.py').write_text(IMPORTED.format(lift=lift))
+        command = [sys.executable, '-B', tmp_path / 'run.py', tmp_path / 'own.py']
+        done = subprocess.run(command, capture_output=True, text=True, env=environment)
+        assert done.returncode == 0, done.stderr
+        factor, found = done.stdout.split()
+        assert float(factor) == pytest.approx(1.0 + 2.0 * lift)
+        assert int(found) == hits

@@ -1,13 +1,9 @@
 """Campaigns rebuilt from real sprays: what one nozzle laid into one-inch troughs at three heights.
 
-The table (``patternator_two_nozzles.csv``) is read where it is and never shipped. Its lengths are
-scaled by 1:4, so that a height of 20, 30 or 40 in becomes a standoff of 127, 190 or 254 mm and a
-trough every 6.35 mm; its volumes by one factor for each nozzle, so that the highest reading is
-30 um. Each spray is one straight pass across a panel, the TCP at the nozzle's mouth, and the
-troughs are readings in one line across the pass.
-
-What eq. (2) lacks is known: the width grows as the height to a power below 1, and the volume
-stays.
+The table (``patternator_two_nozzles.csv``) is never shipped. Its lengths are scaled by 1:4, its
+volumes so that the highest reading of each nozzle is 30 um. Each spray is one straight pass across
+a panel, the TCP at the nozzle's mouth; the troughs are readings in one line across the pass. What
+eq. (2) lacks is known: the width grows as the height to a power below 1, and the volume stays.
 """
 
 from __future__ import annotations
@@ -70,10 +66,7 @@ def spray_campaign(
     """Write the campaign of a nozzle into an empty folder and return its ``campaign.yaml``.
 
     Args:
-        table: ``patternator_two_nozzles.csv``.
-        nozzle: one of NOZZLES.
-        folder: where to.
-        heights_in: which of the heights [in].
+        table, nozzle, folder, heights_in: what of the table is written where.
         as_repeats: the sprays of one height are repeats on one panel (an experiment for each
             height) instead of panels of their own (an experiment for each spray).
         hanging: 'column' and 'row' for the line of readings on an upright panel, 'lying' for one

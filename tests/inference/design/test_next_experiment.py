@@ -1,15 +1,16 @@
 """What to spray and measure next: rivals that look alike must look different afterwards."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scipy.stats import multivariate_normal
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.inference.design.contenders import contenders_of
+from paint_deposition.inference.design.contenders import Forecast, Placement, contenders_of
 from paint_deposition.inference.design.next_experiment import (
     EDGE_MARGIN_M,
     SPACING_M,
@@ -17,12 +18,11 @@ from paint_deposition.inference.design.next_experiment import (
     with_proposals,
 )
 from paint_deposition.inference.design.sprays import MENU, together
+from paint_deposition.inference.diagnosis.gaussian import NullModel
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, EffectClass, Step, Unknown
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.inference.readings.readings import Readings
 
 BY_KEY = {change.key: change for change in MENU}
 
@@ -31,12 +31,12 @@ BY_KEY = {change.key: change for change in MENU}
 def study(repository):
     """One panel of a sample study."""
     folder = repository / 'ros2_ws/src/paint_deposition/samples/panel_study'
-    return Study.of(Campaign(read_campaign(folder / 'campaign.yaml').experiments[:1]))
+    return Study.of(pd.Campaign(pd.read_campaign(folder / 'campaign.yaml').experiments[:1]))
 
 
 @pytest.fixture(scope='module')
 def fit(study):
-    return study.fit(FreeParameters.of(DepositionModel()), starts=3)
+    return study.fit(FreeParameters.of(pd.DepositionModel()), starts=3)
 
 
 @pytest.fixture(scope='module')
@@ -47,8 +47,8 @@ def drifting(study, fit):
     film_um = Forward(study.campaign, drifting.effects).predict_um(drifting)
     noise_um = study.gauge_um * np.random.default_rng(2).normal(size=len(film_um))
     places_m = panel.measured_points.positions_m
-    readings = Readings.of(places_m, film_um + noise_um, sigma_um=study.gauge_um)
-    return Study.of(Campaign((panel.with_readings(readings),)), drifting.effects)
+    readings = pd.Readings.of(places_m, film_um + noise_um, sigma_um=study.gauge_um)
+    return Study.of(pd.Campaign((panel.with_readings(readings),)), drifting.effects)
 
 
 @pytest.fixture(scope='module')
@@ -59,35 +59,27 @@ def drift_or_tool(drifting, fit):
     return propose(drifting, contenders_of(diagnosed(drifting, found, group), EFFECTS))
 
 
-def best_of(sprays, key):
-    """The spray with this change alone."""
-    return next(spray for spray in sprays if spray.changes == (key,))
-
-
 @pytest.mark.slow
-def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drift_or_tool):
+def test_a_rolled_gun_tells_drifting_air_from_a_wrong_tool(drifting, drift_or_tool):
     """The air drifts in the booth, the tool is off in its own frame."""
-    _, sprays = drift_or_tool
-    rolled = best_of(sprays, 'roll_180')
+    by_changes = {spray.changes: spray for spray in drift_or_tool[1]}
+    rolled = by_changes['roll_180',]
     assert rolled.separates == ('air_drift', 'tcp_offset', 'footprint')
     assert rolled.separation > 2.0 * rolled.now
     # Half a turn of the part in the booth does to the air what half a turn of the gun does to it.
-    assert best_of(sprays, 'upside_down').separation > 0.8 * rolled.separation
+    assert by_changes['upside_down',].separation > 0.8 * rolled.separation
     assert rolled.chance > 0.7
     # The order of the passes tells nothing of it: it is not among the best.
-    assert all(spray.changes != ('reverse_order',) for spray in sprays)
-
-
-@pytest.mark.slow
-def test_a_rolled_gun_on_one_spot_tells_the_air_from_the_tool(drifting, drift_or_tool):
-    points = drifting.campaign.experiments[0].measured_points
-    spot = next(s for s in drift_or_tool[1] if s.changes == ('standing', 'roll_180'))
+    assert ('reverse_order',) not in by_changes
+    # One spot will do.
+    spot = by_changes['standing', 'roll_180']
     assert spot.separation > 2.0 * spot.now
     told = spot.to_dict()['stand']
     assert told['dwell_s'] > 0.5
     assert f'{told["dwell_s"]:.1f} s' in spot.what
     assert told['peak_um'] <= drifting.measured_um.max()
     at = np.array([told['x_m'], told['y_m'], told['z_m']])
+    points = drifting.campaign.experiments[0].measured_points
     (row,) = np.flatnonzero((points.positions_m == at).all(axis=1))
     assert told['film_um'] == pytest.approx(drifting.measured_um[row])
 
@@ -103,16 +95,19 @@ def test_places_lie_on_the_surface_apart_and_off_the_edge(study, fit, drift_or_t
     apart = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
     assert (apart + np.eye(len(places)) > SPACING_M).all()
     assert 'air_drift' in places[0].why
+    told = places[0].to_dict()
+    assert [told[axis] for axis in ('x_m', 'y_m', 'z_m')] == positions[0].tolist()
+    assert (told['experiment'], told['why']) == (places[0].experiment, places[0].why)
     film_um = np.array([place.film_um for place in places])
     assert 0.2 * study.measured_um.mean() < film_um.min() < film_um.max() < 100.0
 
 
 def test_without_voltage_what_needs_it_is_gone(study):
     experiment = BY_KEY['voltage_off'].made(study.campaign.experiments[0])
-    model = DepositionModel(effects=(EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)))
-    left = model.without(experiment.switched_off)
+    edge, drift = EFFECTS['edge_build'].typical(), AirDrift(shift_down_m=0.03)
+    left = pd.DepositionModel(effects=(edge, drift)).without(experiment.switched_off)
     assert left.effect('edge_build').is_neutral
-    assert left.effect('air_drift') == AirDrift(shift_down_m=0.03)
+    assert left.effect('air_drift') == drift
 
 
 @pytest.mark.parametrize('change', MENU, ids=lambda change: change.key)
@@ -170,10 +165,86 @@ def test_all_of_the_leading_group_compete_and_the_shapeless_cause_where_it_does(
     assert contenders_of(diagnosed(study, fit, group), {}) == ()
 
 
-def test_all_errors_of_the_figures_are_of_one_residual(study, fit):
-    step = Step.of(study, '', fit)
-    found = replace(diagnosed(study, fit), history=(step,)).to_dict()
-    errors = {'rmse_before_um': step.rmse_um, 'rmse_after_um': step.rmse_um}
-    assert found['experiments'] == [{'name': study.campaign.experiments[0].name} | errors]
-    assert found['rmse_um']['before'] == step.rmse_um
-    assert found['rmse_um']['left_out'] in ('experiments', 'points')
+# How much further readings tell between explanations, against draws of these readings.
+
+READINGS, DRAWS = 6, 40_000
+
+
+def forecast(spread: float = 1.0) -> Forecast:
+    """Two effects and the footprint: other means, and covariances as unlike as this."""
+    rng = np.random.default_rng(3)
+    means = rng.normal(size=(3, READINGS))
+    roots = spread * rng.normal(size=(3, READINGS, 2))
+    covariances = np.eye(READINGS) + roots @ roots.transpose(0, 2, 1)
+    contenders = [
+        SimpleNamespace(is_effect=True), SimpleNamespace(is_effect=True),
+        SimpleNamespace(is_effect=False),
+    ]  # fmt: skip
+    return Forecast(contenders, np.array([0.0, 0.4, 1.0]), means, np.linalg.cholesky(covariances))
+
+
+def log_odds_drawn(told: Forecast, true: int, other: int) -> np.ndarray:
+    """(DRAWS,) logarithm of the odds of the true one after readings that it gives."""
+    rng = np.random.default_rng(4)
+    laws = [
+        multivariate_normal(mean, factor @ factor.T)
+        for mean, factor in zip(told.means, told.factors, strict=True)
+    ]
+    readings = laws[true].rvs(DRAWS, rng)
+    return told.odds[true, other] + laws[true].logpdf(readings) - laws[other].logpdf(readings)
+
+
+def test_the_log_odds_are_those_of_readings_that_are_drawn():
+    told = forecast()
+    for true, other in ((0, 1), (1, 0), (0, 2)):
+        drawn = log_odds_drawn(told, true, other)
+        mean, variance = told.gains[:, true, other]
+        error = drawn.std() / np.sqrt(DRAWS)
+        assert told.odds[true, other] + mean == pytest.approx(drawn.mean(), abs=4.0 * error)
+        assert variance == pytest.approx(drawn.var(), rel=0.05)
+
+
+def test_nothing_tells_between_explanations_that_say_the_same():
+    told = forecast()
+    same = replace(
+        told,
+        log_weight=np.zeros(3),
+        means=np.tile(told.means[0], (3, 1)),
+        factors=np.tile(told.factors[0], (3, 1, 1)),
+    )
+    assert same.separations == pytest.approx((0.0, 0.0), abs=1e-6)
+    assert same.chance == 0.0
+
+
+@pytest.mark.parametrize(('spread', 'alike', 'tolerance'), [(1.0, True, 1e-6), (0.5, False, 0.15)])
+def test_single_readings_add_up_to_all_of_them(spread, alike, tolerance):
+    """With errors that differ the mean of what is read so far goes on: about as much."""
+    told = forecast(spread)
+    if alike:
+        told = replace(told, factors=np.tile(told.factors[0], (3, 1, 1)))
+    placement = Placement(told)
+    for reading in range(READINGS):
+        placement.take(reading)
+    found = placement.separation(placement.nearest())
+    assert found == pytest.approx(told.separations[1], rel=tolerance)
+
+
+def test_equal_errors_leave_the_distance_of_the_means():
+    told = forecast(spread=0.0)
+    two = Forecast(told.contenders[:2], np.zeros(2), told.means[:2], told.factors[:2])
+    away = float(np.linalg.norm(told.means[1] - told.means[0]))
+    assert two.separations == pytest.approx((0.0, away))
+
+
+def test_some_readings_are_predicted_from_others():
+    rng = np.random.default_rng(5)
+    columns, raw = rng.normal(size=(9, 4)), rng.normal(size=9)
+    null = NullModel.of(columns, raw)
+    mean, factor = null.predicted(6)
+    first, anew = null.first(6), NullModel.of(columns[:6], raw[:6])
+    assert first.lower == pytest.approx(anew.lower)
+    assert first.deviation == pytest.approx(anew.deviation)
+    covariance = np.eye(9) + columns @ columns.T
+    slope = covariance[6:, :6] @ np.linalg.inv(covariance[:6, :6])
+    assert mean == pytest.approx(slope @ raw[:6])
+    assert factor @ factor.T == pytest.approx(covariance[6:, 6:] - slope @ covariance[:6, 6:])

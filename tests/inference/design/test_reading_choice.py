@@ -1,6 +1,6 @@
 """Points for the gauge: the design beside exact figures, and what it is worth on a part."""
 
-from functools import cache
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -9,11 +9,9 @@ from scipy.stats import chi2, ncx2
 
 from booth import MODEL, panel, path_of, serpentine
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.design.reading_choice import (
     CandidateDesign,
-    ChosenReadings,
     choose,
     design_at,
     power,
@@ -22,33 +20,19 @@ from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
 from paint_deposition.part.gauge_places import grid_places
 
-PLACES, FREE, COLUMNS = 40, 3, 5
-EFFECT_OF = np.array(['a', 'a', 'b', 'c', 'd'])
-
-
-@pytest.fixture
-def design() -> CandidateDesign:
-    random = np.random.default_rng(4)
-    return CandidateDesign(
-        3.0 * random.normal(size=(PLACES, FREE)), random.normal(size=(PLACES, COLUMNS)), EFFECT_OF
-    )
-
 
 def on_panel(*names: str) -> UnmeasuredPart:
     """The panel under three level passes that overlap."""
     path = path_of(serpentine((0.12, 0.0, -0.12), opens_at_m=0.4, period_s=0.1))
-    library = {name: EFFECTS[name] for name in names or EFFECTS}
-    return UnmeasuredPart(panel(), path, MODEL, library)
+    return UnmeasuredPart(panel(), path, MODEL, {name: EFFECTS[name] for name in names})
 
 
-@cache
-def chosen_on_panel() -> ChosenReadings:
-    return choose(on_panel('air_drift', 'flow_drift', 'gauge_zero', 'edge_build'), 24)
-
-
-def test_noncentrality_is_what_the_model_cannot_imitate(design):
+def test_noncentrality_is_what_the_model_cannot_imitate():
     """Against the covariance of noise and model parameters, built in full."""
-    rows = np.arange(0, PLACES, 3)
+    random, rows = np.random.default_rng(4), np.arange(0, 40, 3)
+    design = CandidateDesign(
+        3.0 * random.normal(size=(40, 3)), random.normal(size=(40, 5)), np.array([*'aabcd'])
+    )
     free, columns = design.free[rows], design.columns[rows]
     covariance = np.eye(len(rows)) + free @ free.T
     exact = np.diag(columns.T @ np.linalg.solve(covariance, columns))
@@ -67,9 +51,8 @@ def test_power_is_that_of_the_likelihood_ratio():
 def test_places_taken_one_by_one_are_about_the_best_of_all_sets():
     """Few places, so that all sets can be tried."""
     random = np.random.default_rng(8)
-    design = CandidateDesign(
-        random.normal(size=(10, 1)), 2.0 * random.normal(size=(10, 3)), np.array(['a', 'b', 'c'])
-    )
+    free, columns = random.normal(size=(10, 1)), 2.0 * random.normal(size=(10, 3))
+    design = CandidateDesign(free, columns, np.array(['a', 'b', 'c']))
 
     def worth(rows: np.ndarray) -> float:
         return float(power(design.beyond_model(rows)[2], 3).mean())
@@ -80,7 +63,7 @@ def test_places_taken_one_by_one_are_about_the_best_of_all_sets():
 
 
 def test_points_keep_off_edges_and_apart():
-    chosen = chosen_on_panel()
+    chosen = choose(on_panel('air_drift', 'flow_drift', 'gauge_zero', 'edge_build'), 24)
     positions = chosen.positions_m
     assert np.abs(positions[:, [0, 2]]).max() <= 0.5 - chosen.foot_m
     distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2)
@@ -103,9 +86,8 @@ def test_an_effect_is_measured_where_it_shows():
 
 
 def test_what_the_model_has_already_is_not_looked_for():
-    model = MODEL.with_effect(AirDrift(shift_down_m=0.01))
     part = on_panel('air_drift', 'flow_drift')
-    part = UnmeasuredPart(part.surface, part.path, model, part.library)
+    part = replace(part, model=MODEL.with_effect(EFFECTS['air_drift'](shift_down_m=0.01)))
     assert list(part.candidates) == ['flow_drift']
     # Its amplitudes are free, as the pattern is.
     painted = np.flatnonzero(np.abs(part.surface.vertices_m).max(axis=1) < 0.03)
@@ -116,7 +98,7 @@ def test_a_part_without_paint_is_refused():
     part = on_panel('flow_drift')
     aside = part.path.with_(position_m=np.add(part.path.position_m, [0.0, 0.0, 5.0]))
     with pytest.raises(ReadingsError, match='no paint lands'):
-        choose(UnmeasuredPart(part.surface, aside, MODEL, part.library), 12)
+        choose(replace(part, path=aside), 12)
 
 
 @pytest.mark.parametrize(

@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.design.sprays import MENU
 from paint_deposition.inference.diagnosis.proposals import Spray, StationarySpray, spots, suits
 from paint_deposition.inference.fitting.forward import Forward
-from paint_deposition.inference.readings.campaign import Campaign
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 MOST_UM = 25.0
 BY_KEY = {change.key: change for change in MENU}
 
@@ -27,7 +26,7 @@ def stand(panel, **more) -> StationarySpray:
 
 
 def film_um(panel, one, model=MODEL):
-    return Forward(Campaign((one.sprayed(panel),)), model.effects).predict_um(model)
+    return Forward(pd.Campaign((one.sprayed(panel),)), model.effects).predict_um(model)
 
 
 def test_the_gun_stands_square_before_a_spot_at_the_distance_of_the_passes(panel):
@@ -61,7 +60,7 @@ def test_the_film_stays_within_the_one_given_and_comes_near_it(panel):
 def test_effects_of_motion_do_not_show(panel, name):
     effect = EFFECTS[name].typical()
     model = MODEL.model_copy(update={'effects': (effect,)})
-    passes = Forward(Campaign((panel,)), (effect,))
+    passes = Forward(pd.Campaign((panel,)), (effect,))
     assert np.abs(passes.predict_um(model) - passes.predict_um(MODEL)).max() > 1e-4
     one = stand(panel)
     assert film_um(panel, one, model) == pytest.approx(film_um(panel, one), abs=1e-9)

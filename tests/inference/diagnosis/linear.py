@@ -5,10 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.effects.learned.law import LearnedFootprint, hat_weights
+import paint_deposition as pd
+from paint_deposition.effects.catalogue import EFFECTS
+from paint_deposition.effects.learned.law import LearnedFootprint
 from paint_deposition.inference.diagnosis.discrepancy import Footprints, ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN, Explanation, Sensitivity
 from paint_deposition.inference.diagnosis.gaussian import NullModel
@@ -17,7 +16,7 @@ from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.posterior import Posterior
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 PARAMETERS = FreeParameters.of(MODEL)
 
 
@@ -42,14 +41,7 @@ def linear_fit(
     data: np.ndarray | None = None,
     parameters: FreeParameters = PARAMETERS,
 ) -> Fit:
-    """Most probable values of a linear model with the parameters' prior and noise 1.
-
-    Args:
-        random: draws the model, and data from it if none are given.
-        count: of the readings.
-        data: (count,) readings.
-        parameters: whose prior is taken.
-    """
+    """A fit of readings (count,), drawn if not given, of a linear model with noise 1."""
     prior = parameters.prior
     jacobian = random.normal(size=(count, len(prior.centre))) @ prior.whitening
     if data is None:
@@ -80,56 +72,33 @@ def null_of(fit: Fit, nuisance: np.ndarray | None = None) -> NullModel:
     return NullModel.around(fit, fit.nuisance if nuisance is None else nuisance)
 
 
-def smooth_curves(place: np.ndarray, knots: int, length: float) -> RandomLaw:
-    """Curves of unit size over a covariate, for readings of which each has one value.
-
-    Args:
-        place: (P,) values, in knots from the first on.
-        knots: of the curve.
-        length: of correlation, in standard deviations of the values.
-    """
-    spread = float(np.std(place))
-    at = np.arange(knots)[:, np.newaxis] / spread
-    basis = Basis(CURVES['height_fraction'], {}, hat_weights(place, knots), at, 1.0 / spread)
-    return basis.random(1.0, length)
-
-
-def no_discrepancy(count: int) -> ModelDiscrepancy:
-    """No discrepancy at so many readings."""
-    none = np.zeros((count, count))
-    lengths_m = (0.02, 0.05, 0.1)
-    fields, one_setting = 3 * (none,), np.zeros(count, dtype=int)
-    laws = 3 * (footprint_law(none[:1, :1]),)
-    footprint = Footprints(3 * (none[:, :1],), laws, none[0, :1], none[0, :1])
-    return ModelDiscrepancy(MODEL, footprint, none, fields, fields, False, lengths_m, one_setting)
+def discrepancy_of(
+    fields: Sequence[np.ndarray], footprint: np.ndarray, sizes: Sequence[float]
+) -> ModelDiscrepancy:
+    """Fields (P, P) of three lengths and a deviation of the footprint (P, 1), but nothing else."""
+    none, unseen = np.zeros_like(fields[0]), np.empty((0, 1))
+    basis = Basis(LearnedFootprint, {}, unseen, unseen.T, 1.0)
+    footprints = Footprints(
+        tuple(size * footprint for size in sizes),
+        tuple(RandomLaw(basis, 0.1 * size * np.eye(1)) for size in sizes),
+        radius_m=np.zeros(1),
+        flux=np.ones(1),
+    )
+    one_setting = np.zeros(len(none), dtype=int)
+    return ModelDiscrepancy(
+        MODEL, footprints, none, tuple(fields), 3 * (none,), False, (0.02, 0.05, 0.1), one_setting
+    )
 
 
-def footprint_law(at_knots: np.ndarray) -> RandomLaw:
-    """A deviation of a footprint that shows in no reading, by its values (K, n) at knots."""
-    none = np.empty((0, len(at_knots)))
-    return RandomLaw(Basis(LearnedFootprint, {}, none, none.T, 1.0), at_knots)
-
-
-def prior_covariance(fit: Fit) -> np.ndarray:
-    """(P, P) covariance of readings that the base model predicts before it is fitted."""
-    scaled = fit.jacobian @ fit.parameters.prior.factor
-    return np.eye(len(fit.residual)) + scaled @ scaled.T
-
-
-def deviation(fit: Fit) -> np.ndarray:
-    """(P,) data minus prediction at the priors' centre."""
-    return fit.residual + fit.jacobian @ (fit.vector - fit.parameters.prior.centre)
-
-
-def explanation_of(
-    effect: Effect, *columns: np.ndarray, sides: Sequence[int], share: float = 1.0
+def law(
+    name: str, *columns: np.ndarray, side: float = 1.0, share: float = 1.0, **shape: float
 ) -> Explanation:
     """An effect by the directions (P,) of its first amplitudes, which are ten sizes wide."""
-    known = np.array(sides, dtype=float)
-    low, high = np.where(known > 0, 0.0, -10.0), np.where(known < 0, 0.0, 10.0)
-    names = type(effect).amplitudes()[: len(columns)]
-    law = Sensitivity(effect, names, np.column_stack(columns), low, high)
-    return Explanation(effect.id, law.columns, law.sides, share, law)
+    effect = EFFECTS[name](**shape)
+    names = effect.amplitudes()[: len(columns)]
+    low, high = (np.full(len(columns), end) for end in (-10.0 * (side == 0.0), 10.0))
+    found = Sensitivity(effect, names, np.column_stack(columns), low, high)
+    return Explanation(name, found.columns, found.sides, share, found)
 
 
 def unknown(columns: np.ndarray, share: float = 1.0) -> Explanation:

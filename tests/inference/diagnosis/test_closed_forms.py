@@ -59,15 +59,17 @@ def test_an_addition_is_in_micrometres():
     assert 'level_um' in best.parameters
 
 
-@pytest.mark.parametrize('size', [0.1, 0.3])
-def test_a_wiggly_curve_has_none(size):
-    curve = 1.0 + size * np.sin(TIME_S / 2.5)
-    assert fitting_forms(TIME_S, curve, np.full(KNOTS, 0.02), unit='s') == ()
-
-
-def test_a_flat_curve_has_none():
-    flat = 1.0 + 0.003 * np.random.default_rng(1).normal(size=KNOTS)
-    assert fitting_forms(TIME_S, flat, np.full(KNOTS, 0.02), unit='s') == ()
+@pytest.mark.parametrize(
+    ('change', 'sd'),
+    [
+        (0.1 * np.sin(TIME_S / 2.5), 0.02),
+        (0.3 * np.sin(TIME_S / 2.5), 0.02),
+        (0.003 * np.random.default_rng(1).normal(size=KNOTS), 0.02),
+    ],
+    ids=['wavy', 'very wavy', 'flat'],
+)
+def test_a_wiggly_or_flat_curve_has_none(change, sd):
+    assert fitting_forms(TIME_S, 1.0 + change, np.full(KNOTS, sd), unit='s') == ()
 
 
 def test_a_wide_band_leaves_several_forms_and_says_so():

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
+from inference.fitting.panels import reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.inference.diagnosis.procedure import diagnose
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from small_campaign import generated, small_campaign
 from virtual_paint_shop.draw import stream
@@ -36,14 +36,13 @@ def test_an_effect_that_grows_over_each_day_is_named_with_its_mean(tmp_path):
         share = row % A_DAY / (A_DAY - 1)
         film_um = shown.clean_um + share * (shown.expected_um - shown.clean_um)
         read = measure(shown.point, film_um, film_um, GaugeNoise(level=0.015), stream(row, 80))
-        taken = replace(door.readings, thickness_um=read.thickness_um)
+        taken = reading(door, read.thickness_um).readings
         taken = taken.select(np.arange(READINGS) % TURNS == row % TURNS)
-        part = replace(door.with_readings(taken), name=f'part {row}')
-        parts.append(part)
+        parts.append(replace(door.with_readings(taken), name=f'part {row}'))
     pattern = painted.truth['pattern']
     planar = PlanarPattern(**{name: pattern[name] for name in PlanarPattern.model_fields})
     start = time.process_time()
-    found = diagnose(Campaign(tuple(parts)), DepositionModel(planar=planar), EFFECTS)
+    found = diagnose(pd.Campaign(tuple(parts)), pd.DepositionModel(planar=planar), EFFECTS)
     assert time.process_time() - start < 120.0  # of one core, on any machine
     assert found.accepted == ('faraday_shielding',)
     shielding = found.classes[0].parameters['shielding']

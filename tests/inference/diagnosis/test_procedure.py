@@ -9,9 +9,8 @@ from scipy.stats import binom
 
 import paint_deposition as pd
 from inference.diagnosis.readings_on_door import DOOR, SHIELDED
-from inference.fitting.panels import ORDERS, gauged
+from inference.fitting.panels import ORDERS, gauged, reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.faraday_shielding import FaradayShielding
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -19,14 +18,13 @@ from paint_deposition.effects.library.fog_gradient import FogGradient
 from paint_deposition.files.atomic import json_text
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA, diagnose
-from paint_deposition.inference.diagnosis.proposals import Place
 from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
-from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.diagnosis.verdict import percent
+from paint_deposition.inference.readings.campaign import Experiment
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
-BASE = DepositionModel()
+BASE = pd.DepositionModel()
 
 
 @pytest.fixture(scope='module')
@@ -37,25 +35,20 @@ def shielded(tmp_path_factory):
 
 @pytest.fixture(scope='module')
 def found(shielded):
-    """What the diagnosis says of it."""
     return diagnose(shielded, BASE, EFFECTS)
 
 
 @pytest.fixture(scope='module')
-def clean(tmp_path_factory):
+def clean(tmp_path_factory) -> Experiment:
     """A door painted as the model says, all readings in one group."""
     options = DOOR | {'seed': 3, 'truth': None}
     (one,) = small_campaign(tmp_path_factory.mktemp('clean'), **options).experiments
     grouped = replace(one.readings, group=np.full(len(one.readings), 'column 1'))
-    return Campaign((one.with_readings(grouped),))
+    return one.with_readings(grouped)
 
 
-@pytest.fixture(scope='module')
-def nothing_found(clean):
-    return diagnose(clean, BASE, EFFECTS)
-
-
-def test_nothing_is_found_where_nothing_is_missing(nothing_found):
+def test_nothing_is_found_where_nothing_is_missing(clean):
+    nothing_found = diagnose(pd.Campaign((clean,)), BASE, EFFECTS)
     assert nothing_found.verdict == 'none_missing'
     assert nothing_found.p_value > 0.05
     assert (nothing_found.accepted, nothing_found.classes) == ((), ())
@@ -70,6 +63,7 @@ def test_nothing_is_found_where_nothing_is_missing(nothing_found):
     assert figures.part_share == 0.0
     assert figures.footprint_of_peak < 0.15
     assert str(figures) in nothing_found.notes
+    assert nothing_found.to_dict()['classes'] == []
 
 
 def test_the_effect_is_named_and_predicts_readings_left_out(found):
@@ -81,9 +75,24 @@ def test_the_effect_is_named_and_predicts_readings_left_out(found):
     assert 'faraday_shielding' in best.members
     assert {EFFECTS[name].family for name in best.members} == {'curvature'}
     assert best.probability > SURE
-    assert best.holdout_rmse_um['after'] < best.holdout_rmse_um['before']
     assert [step.added for step in found.history] == ['', best.best]
-    assert found.history[1].rmse_um < 0.8 * found.history[0].rmse_um
+    before, after = found.history
+    assert after.rmse_um < 0.8 * before.rmse_um
+    assert after.holdout_rmse_um < before.holdout_rmse_um
+    content = json.loads(json_text(found.to_dict()))
+    one = content['classes'][0]
+    assert content['accepted'] == [one['best']] == [one['members'][0]] == [best.best]
+    assert set(content['not_testable']) <= set(EFFECTS)
+    assert content['regions'][0]['mean_residual_um'] < 0.0  # too little paint in the valley
+    errors = {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um}
+    assert one['holdout_rmse_um'] == errors
+    figures = content['rmse_um']
+    assert {when: figures[f'holdout_{when}'] for when in errors} == errors
+    assert figures['left_out'] == 'points'
+    # All are of one residual.
+    (part,) = content['experiments']
+    assert [part['rmse_before_um'], part['rmse_after_um']] == [before.rmse_um, after.rmse_um]
+    assert [figures['before'], figures['after']] == [before.rmse_um, after.rmse_um]
 
 
 def test_an_effect_outside_the_library_is_not_blamed_on_another(tmp_path):
@@ -130,7 +139,7 @@ def test_what_a_footprint_could_show_as_well_is_blamed_on_nothing_else(tmp_path)
 
 
 def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):
-    start = DepositionModel(effects=(FaradayShielding(shielding=0.1),))
+    start = pd.DepositionModel(effects=(FaradayShielding(shielding=0.1),))
     diagnosis = diagnose(shielded, start, {'faraday_shielding': FaradayShielding})
     assert diagnosis.verdict == 'none_missing'
     assert diagnosis.accepted == ()
@@ -139,21 +148,16 @@ def test_an_effect_in_the_start_model_is_refitted_and_not_found_again(shielded):
 
 @pytest.mark.parametrize('points', [2, 11])
 def test_a_few_readings_are_too_few(clean, points):
-    (one,) = clean.experiments
-    few = one.with_readings(one.readings.select(one.means.owner < points))
-    diagnosis = diagnose(Campaign((few,)), BASE, {})
+    few = clean.with_readings(clean.readings.select(clean.means.owner < points))
+    diagnosis = diagnose(pd.Campaign((few,)), BASE, {})
     assert diagnosis.verdict == 'fit_broken'
     assert f'{points} points cannot determine 7 parameters' in diagnosis.reason
 
 
 def test_a_path_that_misses_the_part_is_told(clean):
-    (one,) = clean.experiments
-    off = one.path.with_(flow=np.zeros(len(one.path)))
-    campaign = Campaign((replace(one, path=off),))
-    for diagnosis in (
-        diagnose(campaign, BASE, {}),
-        refit(campaign, BASE, FaradayShielding),
-    ):
+    off = clean.path.with_(flow=np.zeros(len(clean.path)))
+    campaign = pd.Campaign((replace(clean, path=off),))
+    for diagnosis in (diagnose(campaign, BASE, {}), refit(campaign, BASE, FaradayShielding)):
         assert diagnosis.verdict == 'fit_broken'
         assert 'leaves 100 % of the points bare, where the gauge found paint' in diagnosis.reason
 
@@ -166,26 +170,6 @@ def test_no_probability_is_printed_as_certain(probability, text):
     assert percent(probability) == text
 
 
-def test_the_file_says_what_was_found(found, nothing_found):
-    content = json.loads(json_text(found.to_dict()))
-    one = content['classes'][0]
-    assert content['accepted'] == [one['best']] == [one['members'][0]] == list(found.accepted)
-    assert set(content['not_testable']) <= set(EFFECTS)
-    assert content['regions'][0]['mean_residual_um'] < 0.0  # too little paint in the valley
-    errors = {
-        'before': found.history[0].holdout_rmse_um,
-        'after': found.history[1].holdout_rmse_um,
-    }
-    assert one['holdout_rmse_um'] == errors
-    assert {when: content['rmse_um'][f'holdout_{when}'] for when in errors} == errors
-    assert content['rmse_um']['left_out'] == 'points'
-    assert nothing_found.to_dict()['classes'] == []
-    place = Place(np.array([0.1, 0.2, 0.3]), 'door', 'tells them apart')
-    assert place.to_dict() == {
-        'experiment': 'door', 'x_m': 0.1, 'y_m': 0.2, 'z_m': 0.3, 'why': 'tells them apart',
-    }  # fmt: skip
-
-
 # Small panels that the model itself painted, and a library of three effects: a diagnosis is cheap
 # enough for dozens of them.
 
@@ -195,40 +179,29 @@ CAMPAIGNS = 8
 CHANCE = 0.01
 
 
-@pytest.fixture(scope='module')
-def two_missing() -> Diagnosis:
-    """The diagnosis of two panels, painted in opposite orders, on which two effects acted."""
+def test_two_effects_are_found_each_with_a_step_that_improves_the_prediction():
+    """On two panels, painted in opposite orders."""
     truth = BASE.with_effect(FogGradient(fog_um=6.0)).with_effect(FlowDrift(drift_per_pass=0.1))
-    return diagnose(gauged(truth, seed=0, orders=ORDERS), BASE, LIBRARY)
-
-
-def test_a_second_effect_is_found_beside_the_first(two_missing):
-    assert two_missing.verdict == 'effect_missing'
+    found = diagnose(gauged(truth, seed=0, orders=ORDERS), BASE, LIBRARY)
+    assert found.verdict == 'effect_missing'
     # A footprint that the readings learned beside them is no effect.
-    named = set(two_missing.accepted) - {'learned:footprint'}
+    named = set(found.accepted) - {'learned:footprint'}
     assert named == {'fog_gradient', 'flow_drift'}
-    accepted = two_missing.classes[: len(two_missing.accepted)]
-    assert [c.best for c in accepted] == list(two_missing.accepted)
+    assert all(name in found.reason for name in named)
+    accepted = found.classes[: len(found.accepted)]
+    assert [c.best for c in accepted] == list(found.accepted)
     assert all(c.probability > SURE for c in accepted)
-    assert {effect.id for effect in two_missing.model.effects} == set(two_missing.accepted)
-    assert all(name in two_missing.reason for name in named)
-
-
-def test_each_accepted_effect_has_a_step_that_improves_the_prediction(two_missing):
-    steps = two_missing.history
-    assert [step.added for step in steps] == ['', *two_missing.accepted]
-    for before, after, found in zip(steps, steps[1:], two_missing.classes, strict=False):
+    steps = found.history
+    assert [step.added for step in steps] == ['', *found.accepted]
+    for before, after, group in zip(steps, steps[1:], found.classes, strict=False):
         assert after.rmse_um < before.rmse_um
-        assert found.holdout_rmse_um == {
-            'before': before.holdout_rmse_um,
-            'after': after.holdout_rmse_um,
-        }
-    assert steps[-1].rmse_um < 1.2 * two_missing.noise_floor_um
+        errors = {'before': before.holdout_rmse_um, 'after': after.holdout_rmse_um}
+        assert group.holdout_rmse_um == errors
+    assert steps[-1].rmse_um < 1.2 * found.noise_floor_um
     # Amounts of both are found together.
-    fog = two_missing.model.effect('fog_gradient').fog_um
-    drift = two_missing.model.effect('flow_drift').drift_per_pass
-    assert fog == pytest.approx(6.0, abs=1.2)
-    assert drift == pytest.approx(0.1, abs=0.03)
+    assert {effect.id for effect in found.model.effects} == set(found.accepted)
+    assert found.model.effect('fog_gradient').fog_um == pytest.approx(6.0, abs=1.2)
+    assert found.model.effect('flow_drift').drift_per_pass == pytest.approx(0.1, abs=0.03)
 
 
 def test_size_of_the_procedure():
@@ -241,41 +214,33 @@ def test_size_of_the_procedure():
     assert alarms == np.count_nonzero(p_values < ALPHA)
     assert alarms <= binom.isf(CHANCE, CAMPAIGNS, ALPHA)
     # An alarm by chance is no accepted effect but in rare cases.
-    assert sum(bool(diagnosis.accepted) for diagnosis in found) <= binom.isf(
-        CHANCE, CAMPAIGNS, 0.02
-    )
+    blamed = sum(bool(diagnosis.accepted) for diagnosis in found)
+    assert blamed <= binom.isf(CHANCE, CAMPAIGNS, 0.02)
 
 
-@pytest.fixture(scope='module')
-def striped():
-    """Three panels painted alike, with an upright stripe that lost a fifth of its film."""
-    experiments = []
+def test_a_stripe_on_parts_painted_alike_is_unknown_with_its_place():
+    """An upright stripe lost a fifth of its film on three panels."""
+    panels = []
     for number in range(3):
         (panel,) = gauged(BASE, seed=number, columns=7).experiments
         across_m = panel.readings.positions_m[:, 0]
         lost = 0.2 * np.exp(-0.5 * ((across_m - 0.15) / 0.08) ** 2)
-        readings = replace(panel.readings, thickness_um=panel.readings.thickness_um * (1.0 - lost))
-        experiments.append(replace(panel.with_readings(readings), name=f'panel {number + 1}'))
-    return diagnose(Campaign(tuple(experiments)), BASE, EFFECTS)
-
-
-def test_a_stripe_on_parts_painted_alike_is_unknown_with_its_place(striped):
-    assert striped.verdict == 'unknown_effect'
-    assert striped.p_value < ALPHA
-    assert not [name for name in striped.accepted if not name.startswith('learned:')]
-    unknown = striped.unknown
+        striped = reading(panel, panel.readings.thickness_um * (1.0 - lost))
+        panels.append(replace(striped, name=f'panel {number + 1}'))
+    found = diagnose(pd.Campaign(tuple(panels)), BASE, EFFECTS)
+    assert found.verdict == 'unknown_effect'
+    assert found.p_value < ALPHA
+    assert not [name for name in found.accepted if not name.startswith('learned:')]
+    unknown = found.unknown
     assert unknown.parts == ('panel 1', 'panel 2', 'panel 3')
     assert -0.25 < unknown.share < -0.03
     assert 'of the width from the left' in unknown.where
-    assert str(unknown) in striped.reason
-    assert 'Spray the same part another way' in striped.reason
-
-
-def test_the_figures_of_the_error_belong_together(striped):
-    rmse_um = striped.to_dict()['rmse_um']
+    assert str(unknown) in found.reason
+    assert 'Spray the same part another way' in found.reason
+    # The figures of the error belong together.
+    rmse_um = found.to_dict()['rmse_um']
     for when in ('before', 'after'):
         square = rmse_um[f'beyond_noise_{when}'] ** 2 + rmse_um['noise_floor'] ** 2
-        assert square == pytest.approx(
-            max(rmse_um[f'holdout_{when}'], rmse_um['noise_floor']) ** 2
-        )
+        most = max(rmse_um[f'holdout_{when}'], rmse_um['noise_floor'])
+        assert square == pytest.approx(most**2)
     assert rmse_um['holdout_after'] < rmse_um['holdout_before']

@@ -3,66 +3,59 @@
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from inference.diagnosis.readings_on_door import SHIELDED
 from inference.fitting.panels import ORDERS, gauged
-from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+from paint_deposition.effects.catalogue import EFFECTS, LEARNED
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.refit import refit
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.report.writers.inference import write_fitted
 from small_campaign import small_campaign
 
 pytestmark = pytest.mark.slow
 
 
-@pytest.fixture(scope='module')
-def shielded(tmp_path_factory):
-    return small_campaign(tmp_path_factory.mktemp('shielded'), **SHIELDED)
+BASE = pd.DepositionModel()
+SHIELDING, DRIFT = EFFECTS['faraday_shielding'], EFFECTS['air_drift']
 
 
-@pytest.fixture(scope='module')
-def refitted(shielded):
-    """The model of the shielded door with what it lacks, added because somebody asked for it."""
-    return refit(shielded, DepositionModel(), FaradayShielding)
-
-
-def test_refit_adds_what_was_asked_for_and_weighs_it(shielded, refitted):
+def test_refit_adds_what_was_asked_for_and_weighs_it(tmp_path):
+    """To the model of a door with a shielded valley."""
+    shielded = small_campaign(tmp_path, **SHIELDED)
+    refitted = refit(shielded, BASE, SHIELDING)
     assert refitted.accepted == ('faraday_shielding',)
     assert refitted.classes[0].probability > 0.9
     assert refitted.history[1].holdout_rmse_um < 0.7 * refitted.history[0].holdout_rmse_um
-    after = refit(shielded, refitted.model, AirDrift)
+    after = refit(shielded, refitted.model, DRIFT)
     assert [effect.id for effect in after.model.effects] == ['faraday_shielding', 'air_drift']
     # What does not act is not sure, and predicts no better.
     assert after.verdict == 'none_missing'
     assert after.classes[0].probability < SURE
     assert after.history[1].holdout_rmse_um > 0.98 * after.history[0].holdout_rmse_um
     with pytest.raises(ModelError, match='faraday_shielding is in the model already'):
-        refit(shielded, refitted.model, FaradayShielding)
+        refit(shielded, refitted.model, SHIELDING)
     # With nothing added the model is kept and tested.
     assert refit(shielded, refitted.model, None).verdict == 'none_missing'
-    assert refit(shielded, DepositionModel(), None).verdict == 'unknown_effect'
+    assert refit(shielded, BASE, None).verdict == 'unknown_effect'
 
 
 HIDDEN = LEARNED['time_s'](low=0.0, high=70.0, learned=(-0.15, 0.0, 0.08, 0.12, 0.13))
 
 
 @pytest.fixture(scope='module')
-def campaign() -> Campaign:
+def campaign() -> pd.Campaign:
     """Panels painted with a flow that rises and levels off."""
-    return gauged(DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
+    return gauged(pd.DepositionModel(effects=(HIDDEN,)), seed=3, orders=ORDERS)
 
 
 @pytest.fixture(scope='module')
 def done(campaign):
-    return refit(campaign, DepositionModel(), LEARNED['time_s'])
+    return refit(campaign, BASE, LEARNED['time_s'])
 
 
-def test_the_law_is_learned_and_counts_as_no_named_effect(done):
+def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
     assert done.verdict == 'unknown_effect'
     assert done.accepted == ('learned:time_s',)
     (found,) = done.classes
@@ -74,16 +67,13 @@ def test_the_law_is_learned_and_counts_as_no_named_effect(done):
     before, after = done.history
     assert after.rmse_um < 0.8 * before.rmse_um
     assert after.rmse_um < after.holdout_rmse_um < 0.9 * before.holdout_rmse_um
-
-
-def test_the_band_holds_the_hidden_law_up_to_a_constant(done):
+    # The band holds the hidden law up to a constant, and is much narrower than it.
     law = done.model.effect('learned:time_s')
     times = np.linspace(law.low, law.high, 50)
     sd = law.deviation(times)
     away = law.factor(times) - HIDDEN.factor(times)
     away -= np.average(away, weights=sd**-2)
     assert np.mean(np.abs(away) < 1.96 * sd) > 0.9
-    # It is much narrower than what the law does.
     assert 1.96 * np.median(sd) < 0.25 * np.ptp(HIDDEN.factor(times))
 
 
@@ -99,6 +89,6 @@ def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
 
 
 def test_what_does_not_vary_cannot_be_learned(campaign):
-    panel = Campaign(campaign.experiments[:1])
+    panel = pd.Campaign(campaign.experiments[:1])
     with pytest.raises(ModelError, match='sky_view_factor is the same at all readings'):
-        refit(panel, DepositionModel(), LEARNED['sky_view_factor'])
+        refit(panel, BASE, LEARNED['sky_view_factor'])

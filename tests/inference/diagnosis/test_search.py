@@ -1,6 +1,5 @@
 """The search for missing effects between refitted models, on panels that the model painted."""
 
-from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -8,14 +7,10 @@ import numpy as np
 import pytest
 from scipy.special import logsumexp, softmax
 
+import paint_deposition as pd
 from inference.diagnosis.readings_on_door import at_model
 from inference.fitting.panels import gauged
-from paint_deposition.effects.base import Effect
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.edge_build import EdgeBuild
-from paint_deposition.effects.library.flow_drift import FlowDrift
-from paint_deposition.effects.library.fog_gradient import FogGradient
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.explanations import UNKNOWN
 from paint_deposition.inference.diagnosis.model_space import (
     COARSENED,
@@ -27,31 +22,32 @@ from paint_deposition.inference.diagnosis.model_space import (
 )
 from paint_deposition.inference.diagnosis.search import SAME, Search, SearchStage
 from paint_deposition.inference.diagnosis.state import DiagnosisState
-from paint_deposition.inference.readings.campaign import Campaign
 
 pytestmark = pytest.mark.slow
 
-BASE = DepositionModel()
-EDGE, DRIFT = EdgeBuild(gain=0.6, length_m=0.1), FlowDrift(drift_per_pass=0.06)
-PLANTED = {'edge_build', 'flow_drift'}
+BASE = pd.DepositionModel()
+EDGE = EFFECTS['edge_build'](gain=0.6, length_m=0.1)
+DRIFT = EFFECTS['flow_drift'](drift_per_pass=0.06)
+PLANTED = ('edge_build', 'flow_drift')
 
 
-class Twin(EdgeBuild):
+class Twin(EFFECTS['edge_build']):
     """An effect that readings cannot tell from edge build."""
 
     id = 'twin'
 
 
-def searching(campaign: Campaign, library: Iterable[type[Effect]]) -> Search:
-    known = {effect.id: effect for effect in library}
-    return Search(DiagnosisState.begin(campaign, BASE, known, seed=0))
+def searching(campaign: pd.Campaign, *library: str) -> Search:
+    known = dict(EFFECTS) | {Twin.id: Twin}
+    library = {name: known[name] for name in library}
+    return Search(DiagnosisState.begin(campaign, BASE, library, seed=0))
 
 
 @pytest.fixture(scope='module')
 def search() -> Search:
     """On a panel on which two effects acted."""
-    truth = BASE.with_effect(EDGE).with_effect(DRIFT)
-    return searching(gauged(truth, seed=0, columns=5), (EdgeBuild, FlowDrift, AirDrift))
+    truth = pd.DepositionModel(effects=(EDGE, DRIFT))
+    return searching(gauged(truth, seed=0, columns=5), *PLANTED, 'air_drift')
 
 
 @pytest.fixture(scope='module')
@@ -62,17 +58,24 @@ def stages(search) -> list[SearchStage]:
 @pytest.fixture(scope='module')
 def clean() -> Search:
     """On a panel on which nothing acted."""
-    return searching(gauged(BASE, seed=2), (FogGradient, FlowDrift, AirDrift))
+    return searching(gauged(BASE, seed=2), 'fog_gradient', 'flow_drift', 'air_drift')
 
 
-def test_the_set_found_is_the_one_planted(search, stages):
+def test_the_set_found_is_the_one_planted_and_leaves_less_for_something_unknown(search, stages):
     assert [len(stage.here.names) for stage in stages] == [0, 1, 2]
     assert stages[0].here is search.nothing
-    assert stages[-1].here.names == PLANTED
+    assert stages[-1].here.names == {*PLANTED}
     for stage, following in pairwise(stages):
         assert stage.chosen().names == following.here.names
         assert following.here.log_weight > stage.here.log_weight
     assert stages[-1].chosen() is stages[-1].here
+    gains = []
+    for here in (stage.here for stage in stages):
+        assert here.log_weight == pytest.approx(here.log_evidence + here.log_prior)
+        gains.append(here.of_unknown.alone[UNKNOWN])
+    assert gains[-1] < min(0.0, gains[0])
+    assert stages[0].here.p_value_of_causes < 0.05 < stages[-1].here.p_value
+    assert stages[0].here.p_value <= stages[0].here.p_value_of_causes
 
 
 def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
@@ -92,22 +95,14 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     assert best.log_weight_of(everything) == pytest.approx(best.log_weight, abs=1.5)
 
 
-def test_something_unknown_beside_a_set_competes_with_it(stages):
-    """It is improbable before the readings, and weighs more where an effect is missing."""
-    gains = []
-    for stage in stages:
-        here = stage.here
-        assert here.log_weight == pytest.approx(here.log_evidence + here.log_prior)
-        gains.append(here.of_unknown.alone[UNKNOWN])
-    assert gains[-1] < 0.0
-    assert gains[0] > gains[-1]
-    assert stages[0].here.p_value_of_causes < 0.05 < stages[-1].here.p_value
-    assert stages[0].here.p_value <= stages[0].here.p_value_of_causes
-
-
-def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
-    trial, groups = search.groups(stages[-1].here)
-    assert trial.names == groups.keys() == PLANTED
+def test_each_effect_of_the_set_is_sure_and_one_that_does_not_stand_is_taken_out(search, stages):
+    best = stages[-1].here
+    one_more = search.with_effect(best, 'air_drift')
+    assert one_more.names == {*PLANTED, 'air_drift'}
+    assert one_more.log_weight < best.log_weight
+    for found in (one_more, best):
+        trial, groups = search.groups(found)
+        assert trial.names == groups.keys() == {*PLANTED}
     for name, (members, probability) in groups.items():
         assert members == (name,)
         assert probability > SURE
@@ -124,20 +119,12 @@ def test_each_effect_of_the_set_is_sure_and_has_no_rival(search, stages):
 
 
 def test_effects_that_look_alike_share_one_group():
-    search = searching(gauged(BASE.with_effect(EDGE), seed=1), (EdgeBuild, Twin, FlowDrift))
+    search = searching(gauged(BASE.with_effect(EDGE), seed=1), *PLANTED, 'twin')
     trial, groups = search.groups(search.stages()[-1].here)
     ((name, (members, probability)),) = groups.items()
     assert trial.names == {name}
     assert set(members) == {'edge_build', 'twin'}
     assert probability > SURE
-
-
-def test_an_effect_that_does_not_stand_is_taken_out_of_the_set(search, stages):
-    one_more = search.with_effect(stages[-1].here, 'air_drift')
-    assert one_more.names == {*PLANTED, 'air_drift'}
-    assert one_more.log_weight < stages[-1].here.log_weight
-    trial, groups = search.groups(one_more)
-    assert trial.names == groups.keys() == PLANTED
 
 
 def test_nothing_is_added_where_nothing_acts(clean):
@@ -147,16 +134,12 @@ def test_nothing_is_added_where_nothing_acts(clean):
     # The readings left over by a fold do not call for more either.
     rows = np.arange(len(clean.state.study)) % 4 > 0
     assert stage.chosen(rows) is stage.here
-
-
-def test_what_only_led_to_a_better_pattern_is_no_effect(clean):
-    """Beside a wrong pattern any effect helps whose refit finds the right one."""
-    good = clean.nothing
-    wrong = good.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
-    state = clean.state
-    fit = at_model(state.study, good.fit.model.model_copy(update={'planar': wrong}))
-    search = Search(replace(state, fit=fit))
-    assert search.nothing.log_evidence < good.log_evidence - 10.0
-    stages = search.stages()
-    assert stages[-1].here.names == frozenset()
-    assert stages[-1].here.log_evidence == pytest.approx(good.log_evidence, abs=2.0 * SAME)
+    # Beside a wrong pattern any effect helps whose refit finds the right one.
+    good, state = clean.nothing, clean.state
+    planar = good.fit.model.planar.model_copy(update={'r_m': 0.5, 'sigma1_m': 0.05})
+    fit = at_model(state.study, good.fit.model.model_copy(update={'planar': planar}))
+    misled = Search(replace(state, fit=fit))
+    assert misled.nothing.log_evidence < good.log_evidence - 10.0
+    last = misled.stages()[-1].here
+    assert last.names == frozenset()
+    assert last.log_evidence == pytest.approx(good.log_evidence, abs=2.0 * SAME)

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from booth import MODEL
 from inference.diagnosis.linear import PARAMETERS, fit_linear
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
 from paint_deposition.effects.catalogue import LEARNED
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
 from paint_deposition.inference.diagnosis.smooth_laws import (
     Basis,
@@ -41,7 +41,7 @@ def study() -> Study:
     return study_of(on_door(count=12))
 
 
-def film_um(experiment: Experiment, model: DepositionModel, law: LearnedLaw | None = None):
+def film_um(experiment: Experiment, model: pd.DepositionModel, law: LearnedLaw | None = None):
     """(P,) film at the readings, ray by ray, with a law in the model or none."""
     points, path = experiment.measured_points, experiment.path
     if law is None:
@@ -75,28 +75,25 @@ def test_around_another_model_a_law_keeps_its_values_and_changes_other_film(stud
         np.testing.assert_allclose(moved.change_um, 2.0 * random.change_um, rtol=1e-6, atol=1e-12)
 
 
-def basis_on_a_line(knots: int = 9, step: float = 0.5) -> Basis:
-    at = step * np.arange(knots)[:, np.newaxis]
-    return Basis(LEARNED['height_fraction'], {}, np.eye(knots), at, step)
-
-
-@pytest.mark.parametrize('length', [0.5, 1.0, 3.0])
-def test_values_have_the_size_and_the_correlation_that_were_asked_for(length):
-    random = basis_on_a_line().random(0.2, length)
-    covariance = random.at_knots @ random.at_knots.T
-    away = 0.5 * np.subtract.outer(np.arange(9), np.arange(9))
-    expected = 0.2**2 * np.exp(-0.5 * (away / length) ** 2)
-    assert covariance == pytest.approx(expected, abs=0.03 * 0.2**2)
-
-
-def test_a_law_may_leave_the_film_as_a_whole_as_it_is():
-    """Beside a pattern of which the level is free that part of it would say nothing."""
-    basis = replace(basis_on_a_line(), film_um=np.diag(np.arange(1.0, 10.0)))
-    free, centred = basis.random(0.2, 1.0), basis.random(0.2, 1.0).centred
-    assert np.abs(free.change_um.sum(axis=0)).max() > 0.1
-    assert np.abs(centred.change_um.sum(axis=0)).max() < 1e-12
-    # Its form is the same.
-    np.testing.assert_allclose(np.diff(centred.at_knots, axis=0), np.diff(free.at_knots, axis=0))
+@pytest.mark.parametrize(
+    ('edges', 'lengths', 'correlation'),
+    [
+        (False, (0.5, 1.0, 3.0), lambda d: np.exp(-0.5 * d**2)),
+        # A map bends more sharply: beyond an edge it still knows less of the other side.
+        (True, (3.0,), lambda d: (1.0 + np.sqrt(3.0) * d) * np.exp(-np.sqrt(3.0) * d)),
+    ],
+    ids=['curve', 'map'],
+)
+def test_values_have_the_size_and_the_correlation_that_were_asked_for(edges, lengths, correlation):
+    step, knots = 0.5, np.arange(9)
+    at = step * knots[:, np.newaxis]
+    basis = Basis(LEARNED['height_fraction'], {}, np.eye(9), at, step, edges=edges)
+    away = step * np.abs(np.subtract.outer(knots, knots))
+    for length in lengths:
+        random = basis.random(0.2, length)
+        expected = 0.2**2 * correlation(away / length)
+        covariance = random.at_knots @ random.at_knots.T
+        assert covariance == pytest.approx(expected, abs=0.03 * 0.2**2)
 
 
 def test_harmonics_of_a_footprint_are_independent(study):
@@ -125,20 +122,6 @@ def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     ]
 
 
-def test_a_map_bends_more_sharply_than_a_curve():
-    """Half a length from an edge it still knows less of the other side."""
-    curve = basis_on_a_line(knots=41, step=0.05)
-    over_map = replace(curve, edges=True)
-    near, middle = np.arange(41), 20
-    correlation = [
-        (random.at_knots @ random.at_knots.T)[middle, near]
-        for random in (curve.random(1.0, 1.0), over_map.random(1.0, 1.0))
-    ]
-    assert correlation[1][middle + 10] < correlation[0][middle + 10] - 0.05
-    d = np.sqrt(3.0) * 0.5
-    assert correlation[1][middle + 10] == pytest.approx((1.0 + d) * np.exp(-d), abs=0.03)
-
-
 # How well a learned curve is known: its band covers the true one as often as it says.
 
 KNOTS, LENGTH, SIZE = 12, 3.0, 0.1
@@ -163,15 +146,11 @@ def fitted(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fi
     return replace(fit, nuisance=law.change_um / NOISE_UM)
 
 
-def from_the_mean(law: RandomLaw, values: np.ndarray) -> np.ndarray:
-    """(K,) values of a curve from their mean over all film."""
-    return values - np.average(values, weights=law.basis.film_um.sum(axis=0))
-
-
 def covered(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """(K,) whether the band of a fit holds the true curve at the knots."""
+    """(K,) whether the band of a fit holds the true curve at the knots, but for its level."""
     learned = law.learned(*fitted(law, truth, random).amplitudes)
-    away = from_the_mean(law, np.array(learned.learned) - truth)
+    away = np.array(learned.learned) - truth
+    away -= np.average(away, weights=law.basis.film_um.sum(axis=0))
     return np.abs(away) <= TWO_SIDED_95 * np.array(learned.sd)
 
 
@@ -209,5 +188,8 @@ def test_a_level_that_the_pattern_takes_up_does_not_widen_the_band(law):
     level = np.sqrt(np.diag(law.at_knots @ covariance @ law.at_knots.T)).min()
     assert level > 2.0 * np.median(law.sd(covariance))
     settings = {**law.basis.settings, 'kind': 'addition'}
+    # Its form is what a centred law keeps.
+    forms = [np.diff(one.at_knots, axis=0) for one in (law.centred, law)]
+    np.testing.assert_allclose(*forms)
     added = replace(law, basis=replace(law.basis, settings=settings))
     assert added.sd(covariance).min() == pytest.approx(level)

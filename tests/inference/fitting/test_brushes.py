@@ -8,10 +8,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import paint_deposition as pd
 from brushes import two_brushes
 from inference.fitting.panels import column, painted_by, passes
-from paint_deposition.api.inference import calibrate, compare, diagnose
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, ReadingsError
 from paint_deposition.files.model_file import ModelFile, read_model_file
 from paint_deposition.inference.fitting.calibration import brush_figures
@@ -19,7 +18,7 @@ from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
 from paint_deposition.inference.fitting.posterior import of_brushes, with_brushes_of
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import PATTERN, Brush, PlanarPattern
 from paint_deposition.report.writers.write import write
 
@@ -34,7 +33,7 @@ SETTINGS = {
     1: {'flow_cm3_per_min': 300.0, 'solids': 0.45, 'bell_speed_rpm': 40e3},
     4: {'flow_cm3_per_min': 200.0, 'solids': 0.45, 'bell_speed_rpm': 25e3},
 }
-TRUTH = DepositionModel.of_brushes(
+TRUTH = pd.DepositionModel.of_brushes(
     [Brush(number=1, planar=FIRST, **SETTINGS[1]), Brush(number=4, planar=SECOND, **SETTINGS[4])]
 )
 VECTOR = PatternVector((1, 4))
@@ -42,34 +41,34 @@ VECTOR = PatternVector((1, 4))
 
 def painted(name: str, heights_m, brushes, seed=0) -> Experiment:
     """A panel with a pass of each of these brushes, measured as far as they reach."""
-    motion = passes(heights_m, samples=300)
+    motion = replace(passes(heights_m, samples=300), trigger_brush=np.repeat(brushes, 2))
     reached = column(min(heights_m) - 0.35, max(heights_m) + 0.35, 30)
-    numbered = replace(motion, trigger_brush=np.repeat(brushes, 2))
-    return replace(painted_by(TRUTH, numbered, reached, seed=seed), name=name)
+    return painted_by(TRUTH, motion, reached, name=name, seed=seed)
 
 
 @pytest.fixture(scope='module')
 def campaign():
-    return Campaign((
+    return pd.Campaign((
         painted('one', (1.577, 1.0, 0.423), (1, 1, 1)),
         painted('four', (1.3, 1.0, 0.7), (4, 4, 4), seed=1),
         painted('both', (1.3, 0.8), (1, 4), seed=2),
     ))  # fmt: skip
 
 
-def same(found: PlanarPattern, truth: PlanarPattern, rel: float) -> bool:
-    return found.model_dump() == pytest.approx(truth.model_dump(), rel=rel)
-
-
 def test_patterns_survive_the_way_there_and_back():
     vector = np.array(VECTOR.encode(TRUTH.patterns))
     assert len(vector) == len(VECTOR) == 13
-    for again, before in zip(
-        VECTOR.patterns(VECTOR.values(vector[np.newaxis])[0]), TRUTH.patterns, strict=True
-    ):
-        assert same(again, before, 1e-12)
+    again = VECTOR.patterns(VECTOR.values(vector[np.newaxis])[0])
+    for found, truth in zip(again, TRUTH.patterns, strict=True):
+        assert found.model_dump() == pytest.approx(truth.model_dump(), rel=1e-12)
     assert VECTOR.names[7:9] == ('brush_4.K1_cm3_per_s', 'brush_4.K2')
     assert VECTOR.coordinates[9].name == 'brush_4.log_K3_ratio'
+
+
+def slopes(function, vector: np.ndarray) -> np.ndarray:
+    """(n, len(vector)) numerical derivatives of a function (n,)."""
+    steps = 1e-6 * np.eye(len(vector))
+    return np.array([(function(vector + s) - function(vector - s)) / 2e-6 for s in steps]).T
 
 
 @settings(max_examples=30)
@@ -87,19 +86,17 @@ def test_the_jacobian_is_that_of_the_coordinates(shifts):
     size = np.hypot(*VECTOR.of_patterns(vector[np.newaxis])[0][:, 2:4].T)
     if np.any(np.abs(size - 1.0) < 1e-3) or np.any(size < 1e-3):
         return  # a kink, or no phase
-    steps = 1e-6 * np.eye(13)
-    slopes = [(bounded(vector + s) - bounded(vector - s)) / 2e-6 for s in steps]
-    np.testing.assert_allclose(VECTOR.jacobian(vector), np.array(slopes).T, atol=1e-6)
+    np.testing.assert_allclose(VECTOR.jacobian(vector), slopes(bounded, vector), atol=1e-6)
 
 
 @pytest.fixture(scope='module')
 def calibrated(campaign):
     """From a plain start: nothing says what the brushes are but the recordings."""
-    return calibrate(campaign)
+    return pd.calibrate(campaign)
 
 
 @pytest.mark.slow
-def test_panels_of_two_brushes_give_both_patterns_back(calibrated):
+def test_panels_of_two_brushes_give_both_patterns_and_transfer_efficiencies_back(calibrated):
     assert calibrated.chi_square_per_freedom < 1.5
     by_name = {value.name: value for value in calibrated.parameters}
     shared = calibrated.model.brushes[0].planar.phi_rad
@@ -113,18 +110,14 @@ def test_panels_of_two_brushes_give_both_patterns_back(calibrated):
             assert abs(value.value - getattr(truth.planar, name)) < 4.0 * value.sigma
     # Three parameters of eq. (3) start each brush from a panel of its own; one has no panel.
     assert [panel is None for panel in calibrated.panels] == [False, False, True]
-
-
-@pytest.mark.slow
-def test_a_calibration_tells_the_transfer_efficiency(calibrated):
     settled = [Brush(number=b.number, planar=b.planar, **SETTINGS[b.number])
                for b in calibrated.model.brushes]  # fmt: skip
-    figures = brush_figures(DepositionModel.of_brushes(settled), calibrated.parameters)
+    told = brush_figures(pd.DepositionModel.of_brushes(settled), calibrated.parameters)
     for brush in TRUTH.brushes:
-        told = figures['by_number'][str(brush.number)]
+        figures = told['by_number'][str(brush.number)]
         share = brush.planar.K1_cm3_per_s * 60.0 / (brush.flow_cm3_per_min * brush.solids)
-        assert told['transfer_efficiency'] == pytest.approx(share, rel=0.02)
-        assert 0.0 < told['transfer_efficiency_sigma'] < 0.02
+        assert figures['transfer_efficiency'] == pytest.approx(share, rel=0.02)
+        assert 0.0 < figures['transfer_efficiency_sigma'] < 0.02
 
 
 @pytest.mark.slow
@@ -136,7 +129,7 @@ def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path)
     assert again.uncertainty['brush_4']['r_m'] > 0.0
     # A brush that was not painted with stays as it was given.
     third = Brush(number=7, planar=FIRST, flow_cm3_per_min=250.0, bell_speed_rpm=3e4, solids=0.45)
-    start = ModelFile(DepositionModel.of_brushes([*TRUTH.brushes, third]))
+    start = ModelFile(pd.DepositionModel.of_brushes([*TRUTH.brushes, third]))
     files = write(calibrated, tmp_path / 'three', start=start)
     assert json.loads(files[1].read_text())['brushes']['by_number'].keys() == {'1', '4'}
     kept = read_model_file(files[0])
@@ -147,32 +140,28 @@ def test_the_written_model_has_all_brushes_that_were_given(calibrated, tmp_path)
 def test_the_start_of_a_campaign_has_its_brushes_and_what_recordings_tell(campaign):
     told = [{'bell_speed_rpm': 4e4, 'voltage_kv': -70.0}, {'bell_speed_rpm': 2e4}, {}]
     experiments = [replace(e, settings=s) for e, s in zip(campaign.experiments, told, strict=True)]
-    start = with_brushes_of(Campaign(tuple(experiments)), DepositionModel())
+    start = with_brushes_of(pd.Campaign(tuple(experiments)), pd.DepositionModel())
     assert [(b.number, b.bell_speed_rpm, b.voltage_kv) for b in start.brushes] == [
         (1, 4e4, 70.0), (4, 2e4, None)
     ]  # fmt: skip
-    assert start.patterns == (DepositionModel().planar,) * 2
+    assert start.patterns == (pd.DepositionModel().planar,) * 2
     # A campaign of one brush needs of the model that one only.
-    of_four = Campaign(campaign.experiments[1:2])
+    of_four = pd.Campaign(campaign.experiments[1:2])
     assert with_brushes_of(of_four, TRUTH).patterns == (SECOND,)
-    assert with_brushes_of(of_four, DepositionModel()) == DepositionModel()
+    assert with_brushes_of(of_four, pd.DepositionModel()) == pd.DepositionModel()
 
 
-def test_recordings_that_do_not_all_name_their_brush_are_refused(campaign):
+def test_brushes_that_are_not_all_named_or_not_in_the_model_are_refused(campaign):
     one, *others = campaign.experiments
     path = one.path.with_(brush=np.zeros(len(one.path), np.int64))
-    mixed = Campaign((replace(one, name='silent', path=path), *others))
+    mixed = pd.Campaign((replace(one, name='silent', path=path), *others))
     with pytest.raises(ReadingsError, match="'silent' names no brush, others name 1, 4: give it"):
-        with_brushes_of(mixed, DepositionModel())
-
-
-def test_models_without_the_brushes_of_a_campaign_are_refused(campaign):
-    with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
-        calibrate(campaign, two_brushes())
+        with_brushes_of(mixed, pd.DepositionModel())
+    for take in (pd.calibrate, pd.diagnose):
+        with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
+            take(campaign, two_brushes())
     with pytest.raises(ModelError, match='brushes 1, 4 are used and the model has the pattern of'):
-        compare(campaign, DepositionModel())
-    with pytest.raises(ModelError, match='brush 4 is not in the model; its brushes: 1, 2'):
-        diagnose(campaign, two_brushes())
+        pd.compare(campaign, pd.DepositionModel())
 
 
 THREE = PatternVector((1, 4, 7))
@@ -194,28 +183,25 @@ def test_some_brushes_out_of_all_keep_their_patterns(shifts, numbers):
     entries, slope = kept.subset(THREE, vector)
     rows = [THREE.brushes.index(number) for number in numbers]
     np.testing.assert_allclose(patterns(kept, entries), patterns(THREE, vector)[rows], rtol=1e-12)
-    steps = 1e-6 * np.eye(19)
-    found = [
-        (kept.subset(THREE, vector + s)[0] - kept.subset(THREE, vector - s)[0]) for s in steps
-    ]
-    np.testing.assert_allclose(slope, np.array(found).T / 2e-6, atol=1e-8)
+    found = slopes(lambda at: kept.subset(THREE, at)[0], vector)
+    np.testing.assert_allclose(slope, found, atol=1e-8)
 
 
-def known_of(model: DepositionModel, deviation: float = 0.02) -> Posterior:
+def known_of(model: pd.DepositionModel, deviation: float = 0.02) -> Posterior:
     """A calibration of these brushes, each entry known by itself."""
     vector = PatternVector(tuple(brush.number for brush in model.brushes))
     names, mean = [c.name for c in vector.coordinates], np.array(vector.encode(model.patterns))
     return Posterior.of(names, mean, deviation**2 * np.eye(len(names)), readings=('a',))
 
 
-def spread(known: Posterior, model: DepositionModel, first: str, second: str) -> tuple[float, ...]:
+def spread(known: Posterior, model: pd.DepositionModel, first: str, second: str) -> list[float]:
     """Prior deviations in a job of two coordinates, and of the difference of the two."""
     parameters = FreeParameters.of(model, known=known)
     factor = parameters.prior.factor
     i, j = (parameters.coordinates.index(name) for name in (first, second))
     covariance = factor @ factor.T
     apart = covariance[i, i] + covariance[j, j] - 2.0 * covariance[i, j]
-    return tuple(np.sqrt([covariance[i, i], covariance[j, j], apart]).tolist())
+    return np.sqrt([covariance[i, i], covariance[j, j], apart]).tolist()
 
 
 def test_brushes_change_together_from_job_to_job():
@@ -225,15 +211,12 @@ def test_brushes_change_together_from_job_to_job():
     assert one == other == pytest.approx(np.hypot(0.1, 0.02))
     # The calibration's own uncertainty of each, and a tenth of the variance between jobs.
     assert apart == pytest.approx(np.sqrt(2.0 * (0.02**2 + 0.1 * 0.1**2)))
-
-
-def test_a_model_without_a_calibration_tells_how_its_brushes_differ():
-    """Their level is open, and their ratio is known as well as jobs differ."""
+    # Without a calibration the level is open, and the ratio is known as well as jobs differ.
     known = of_brushes(None, TRUTH, TRUTH)
     one, other, apart = spread(known, TRUTH, 'brush_1.log_K1', 'brush_4.log_K1')
     assert one == other > 2.0
     assert apart == pytest.approx(np.sqrt(2.0 * (0.1**2 + 0.1 * 0.1**2)), rel=1e-6)
-    assert of_brushes(None, DepositionModel(), TRUTH) is None
+    assert of_brushes(None, pd.DepositionModel(), TRUTH) is None
 
 
 def test_a_job_of_one_brush_rests_on_the_calibration_of_all():

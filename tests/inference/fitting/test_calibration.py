@@ -1,59 +1,52 @@
-"""The pattern found back from readings of panels."""
+"""The pattern found back from readings of panels, and from those too small for it."""
 
 import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import norm
 
-from inference.fitting.panels import campaign_of, column, painted_by, passes, readings_at
-from paint_deposition.effects.deposition_model import DepositionModel
+import paint_deposition as pd
+from inference.fitting.panels import column, painted_by, panel_of, passes, readings_at
+from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.errors import ReadingsError
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate
-from paint_deposition.inference.fitting.panel import Panel, fit_collapse
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import panel_study
 
 pytestmark = pytest.mark.slow
 
-TRUTH = DepositionModel(
+TRUTH = pd.DepositionModel(
     planar=PlanarPattern(
         K1_cm3_per_s=1.6, K2=0.25, K3=0.25, phi_rad=0.0, r_m=0.2, sigma1_m=0.08, sigma2_m=0.14
     )
 )
-THREE_PASSES = passes((1.577, 1.0, 0.423))
+HEIGHTS_M = (1.577, 1.0, 0.423)
 
 
 @pytest.fixture(scope='module')
 def panel():
-    return painted_by(TRUTH, THREE_PASSES, column())
+    return painted_by(TRUTH, passes(HEIGHTS_M), column())
 
 
-@pytest.fixture(scope='module')
-def calibrated(panel):
-    return calibrate(Campaign((panel,)))
-
-
-def test_panel_is_seen_as_one(panel):
-    seen = Panel.of(panel)
-    np.testing.assert_allclose(np.sort(seen.passes_m), [0.423, 1.0, 1.577], atol=1e-6)
+@pytest.mark.parametrize('turned', [False, True])
+def test_a_panel_is_seen_as_one_with_its_turned_passes(panel, turned):
+    part = painted_by(TRUTH, passes(HEIGHTS_M, turned=True), column()) if turned else panel
+    seen = Panel.of(part)
+    np.testing.assert_allclose(np.sort(seen.passes_m), sorted(HEIGHTS_M), atol=1e-6)
     np.testing.assert_allclose(seen.speed_m_per_s, 0.15, rtol=1e-6)
     assert seen.distance_m == pytest.approx(0.25, abs=1e-6)
     assert seen.scale_m == pytest.approx(0.577, abs=1e-6)
-    assert not seen.mirrored.any()
-
-
-def test_turned_passes_are_told_from_kept_ones(panel):
-    motion = passes((1.577, 1.0, 0.423), turned=True)
-    turned = painted_by(TRUTH, motion, column())
-    assert Panel.of(turned).mirrored.tolist() == [False, True, False]
-    kept_um, turned_um = panel.means.mean_um, turned.means.mean_um
-    assert np.abs(kept_um - turned_um).max() > 1.0
-    film = Panel.of(turned).film_um(TRUTH, Panel.of(turned).across_m)
-    assert np.sqrt(np.mean((film - turned_um) ** 2)) < 0.3
+    assert seen.mirrored.tolist() == [False, turned, False]
+    off_um = seen.film_um(TRUTH, seen.across_m) - part.means.mean_um
+    assert np.sqrt(np.mean(off_um**2)) < 0.3
+    assert (np.abs(part.means.mean_um - panel.means.mean_um).max() > 1.0) == turned
 
 
 def test_three_gaussians_forgive_gross_errors(panel):
@@ -68,15 +61,13 @@ def test_three_gaussians_forgive_gross_errors(panel):
     assert clean.collapse.area_um_m == pytest.approx(expected, rel=0.02)
 
 
-def test_true_values_lie_in_their_intervals(calibrated):
-    for value in calibrated.parameters:
-        truth = getattr(TRUTH.planar, value.name)
+def test_true_values_lie_in_their_intervals_and_undetermined_ones_are_named(panel):
+    calibrated = pd.calibrate(pd.Campaign((panel,)))
+    by_name = {value.name: value for value in calibrated.parameters}
+    for name, value in by_name.items():
+        truth = getattr(TRUTH.planar, name)
         assert value.low - 0.3 * value.sigma <= truth <= value.high + 0.3 * value.sigma, value
     assert calibrated.chi_square_per_freedom == pytest.approx(1.0, abs=0.6)
-
-
-def test_undetermined_parameters_are_named(calibrated):
-    by_name = {value.name: value for value in calibrated.parameters}
     assert by_name['K1_cm3_per_s'].determined
     assert not by_name['phi_rad'].determined
     assert any(warning.startswith('phi_rad is not determined') for warning in calibrated.warnings)
@@ -88,8 +79,8 @@ def test_crosswise_passes_determine_the_asymmetry(panel):
     upward = passes((-0.3, 0.3), standoff_m=0.35)
     # The same to and fro, but upward on the panel: its x becomes z.
     turned = replace(upward, positions_m=upward.positions_m[:, [2, 1, 0]] + [0.0, 0.0, 1.0])
-    crossing = painted_by(TRUTH, turned, np.array(across), seed=1)
-    both = calibrate(Campaign((panel, replace(crossing, name='crossing'))))
+    crossing = painted_by(TRUTH, turned, np.array(across), name='crossing', seed=1)
+    both = pd.calibrate(pd.Campaign((panel, crossing)))
     by_name = {value.name: value for value in both.parameters}
     assert by_name['phi_rad'].determined
     assert by_name['K3'].determined
@@ -98,63 +89,128 @@ def test_crosswise_passes_determine_the_asymmetry(panel):
         assert by_name[name].value == pytest.approx(truth, abs=3.0 * by_name[name].sigma)
 
 
-def test_papers_study_fit_at_577_predict_525_and_625():
+def test_papers_study_fit_at_577_predict_525_and_625(tmp_path):
     """On panels of the virtual paint shop, which shares no code with the model."""
-    fitted = calibrate(campaign_of(panel_study(4, 0.577, parcels=2_000_000)))
-    noise = 0.73
-    assert fitted.residuals[0].sd_um < 1.15 * noise
-    for index in (0.525, 0.625):
-        other = Study.of(campaign_of(panel_study(4, index, parcels=2_000_000)))
+
+    def campaign(index_m: float) -> pd.Campaign:
+        painted = panel_study(4, index_m, parcels=2_000_000)
+        return pd.read_campaign(write(painted, tmp_path / f'{index_m}'))
+
+    fitted, noise_um = pd.calibrate(campaign(0.577)), 0.73
+    assert fitted.residuals[0].sd_um < 1.15 * noise_um
+    for index_m in (0.525, 0.625):
+        other = Study.of(campaign(index_m))
         residuals = other.residuals(other.forward.predict_um(fitted.model))
         assert residuals.predicted_um.mean() == pytest.approx(other.measured_um.mean(), rel=0.015)
-        assert residuals.sd_um < 1.2 * noise
+        assert residuals.sd_um < 1.2 * noise_um
 
 
-def with_film(panel, film_um, points=None, repeats=1, noise_um=0.0) -> Campaign:
-    points = column() if points is None else points
-    return Campaign((panel.with_readings(readings_at(points, film_um, noise_um, repeats)),))
+def with_film(panel, film_um, count=40, repeats=1, noise_um=0.0):
+    return panel.with_readings(readings_at(column()[:count], film_um, noise_um, repeats))
 
 
-def refused(campaign) -> str:
-    with pytest.raises(ReadingsError) as refusal:
-        calibrate(campaign)
-    assert '\n' not in str(refusal.value)
-    return str(refusal.value)
+def in_unit(panel, factor, rows=slice(None)):
+    film_um = panel.means.mean_um.copy()
+    film_um[rows] /= factor
+    return with_film(panel, film_um)
 
 
 @pytest.mark.parametrize(
     ('made', 'words'),
     [
-        (
-            lambda panel: with_film(panel, panel.means.mean_um[:6], column()[:6]),
-            'readings at 6 points; .* measure at least 10',
-        ),
-        (
-            lambda _: Campaign((painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),)),
-            'one side of the passes',
-        ),
-        (
-            lambda panel: with_film(panel, np.full(40, 20.0), repeats=2, noise_um=0.7),
-            'no pattern in it',
-        ),
-        (
-            lambda panel: with_film(
-                panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)
-            ),
-            "point 'P7' reads -4.5 µm; .* zero the gauge",
-        ),
+        (lambda panel: with_film(panel, panel.means.mean_um[:6], 6),
+         'readings at 6 points; .* measure at least 10'),
+        (lambda _: painted_by(TRUTH, passes((1.0,)), column(1.05, 1.6, 30)),
+         'one side of the passes'),
+        (lambda panel: with_film(panel, np.full(40, 20.0), repeats=2, noise_um=0.7),
+         'no pattern in it'),
+        (lambda panel: with_film(panel, np.where(np.arange(40) == 7, -4.5, panel.means.mean_um)),
+         "point 'P7' reads -4.5 µm; .* zero the gauge"),
+        (lambda panel: in_unit(panel, 25.4), r'look like mils, multiply by 25\.4'),
+        (lambda panel: in_unit(panel, 1000.0), 'look like mm, multiply by 1000'),
+        (lambda panel: in_unit(panel, 25.4, slice(10, 16)),
+         r'6 of the readings.* look like mils, multiply them by 25\.4'),
+        (lambda panel: in_unit(panel, 1000.0, slice(10, 16)),
+         '6 of the readings.* look like mm, multiply them by 1000'),
     ],
-    ids=['few', 'one side', 'even', 'negative'],
+    ids=['few', 'one side', 'even', 'negative', 'mils', 'mm', 'six in mils', 'six in mm'],
+)  # fmt: skip
+def test_readings_that_determine_nothing_or_are_in_another_unit_are_refused(panel, made, words):
+    with pytest.raises(ReadingsError) as refusal:
+        pd.calibrate(pd.Campaign((made(panel),)))
+    assert '\n' not in str(refusal.value)
+    assert re.search(words, str(refusal.value))
+
+
+# Panels too small for the pattern are noticed, and the uncertainty is made honest.
+
+WIDE = PlanarPattern(
+    K1_cm3_per_s=1.6, K2=0.15, K3=0.2, phi_rad=0.6, r_m=0.22, sigma1_m=0.09, sigma2_m=0.15
 )
-def test_readings_that_determine_nothing_are_refused(panel, made, words):
-    assert re.search(words, refused(made(panel)))
+RIM_M = 0.015
 
 
-@pytest.mark.parametrize(('factor', 'unit'), [(25.4, 'mils'), (1000.0, 'mm')])
-def test_another_unit(panel, factor, unit):
-    film = panel.means.mean_um.copy()
-    assert f'look like {unit}, multiply by {factor:g}' in refused(with_film(panel, film / factor))
-    film[10:16] /= factor
-    text = refused(with_film(panel, film))
-    assert f'look like {unit}, multiply them by {factor:g}' in text
-    assert '6 of the readings' in text
+def panel_campaign(height_m: float, passes_m, *effects: EdgeBuild) -> pd.Campaign:
+    """A panel measured across its whole height but for the rim."""
+    model, places = pd.DepositionModel(planar=WIDE, effects=effects), (RIM_M, height_m - RIM_M)
+    return pd.Campaign((
+        painted_by(
+            model, passes(passes_m), column(*places, 36), surface=panel_of(height_m, 0.05),
+            noise_um=0.5,
+        ),
+    ))  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def small() -> pd.Campaign:
+    """A panel of half a metre with 30 % more film along its rim, as fat edges have it."""
+    return panel_campaign(0.5, (0.45, 0.25, 0.05), EdgeBuild(gain=0.3))
+
+
+def covered(values) -> list[bool]:
+    names = ('K1_cm3_per_s', 'K2', 'r_m', 'sigma1_m', 'sigma2_m')
+    return [v.low <= getattr(WIDE, v.name) <= v.high for v in values if v.name in names]
+
+
+def test_paint_beyond_the_readings_is_that_of_the_normal_distribution():
+    """A pattern of one Gaussian leaves a Gaussian across the pass."""
+    sigma_m = 0.2
+    gaussian = pd.DepositionModel(planar=PlanarPattern(K2=1.0, K3=0.0, sigma2_m=sigma_m))
+    narrow, wide = (
+        painted_by(gaussian, passes((1.0,)), column(*ends), name=f'{ends}')
+        for ends in ((0.8, 1.3), (0.6, 1.4))
+    )
+    (reach,) = short_reaches(pd.Campaign((narrow,)), gaussian)
+    assert sorted(reach.ends_m) == pytest.approx([0.2, 0.3], abs=1e-6)
+    expected = norm.sf(np.array(reach.ends_m) / sigma_m)
+    assert reach.beyond == pytest.approx(expected, rel=1e-3)
+    assert reach.needed_m == pytest.approx(norm.isf(0.025) * sigma_m, rel=1e-3)
+    for enough in ((wide,), (narrow, wide)):
+        assert short_reaches(pd.Campaign(enough), gaussian) == ()
+
+
+def test_a_panel_that_shows_both_edges_is_not_warned_of():
+    result = calibrate(panel_campaign(1.4, (0.7,)))
+    assert not any('lands further out' in warning for warning in result.warnings)
+    assert len(result.shifts) == 0
+    assert [v.sigma for v in result.parameters] == [v.sigma for v in estimates(result.fit)]
+
+
+def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(small):
+    """What the fit alone is sure of is wrong by many of its standard deviations."""
+    found = calibrate(small)
+    (warning,) = (line for line in found.warnings if 'lands further out' in line)
+    assert warning.startswith('panel: the readings end 0.23 and 0.23 m to the sides of a pass')
+    assert 'on a larger panel if need be' in warning
+    assert 'intervals are widened' in warning
+    assert sum(covered(estimates(found.fit))) <= 2
+    assert all(covered(found.parameters))
+    at = found.posterior.names.index('r_m')
+    widths = {v.name: v.sigma for v in found.parameters}
+    assert np.sqrt(found.posterior.matrix[at, at]) == pytest.approx(widths['r_m'], rel=0.05)
+
+
+def test_a_comparison_with_a_pattern_fitted_to_such_a_panel_warns(small):
+    (warning,) = pd.compare(small).warnings
+    assert 'the edges of the pattern are extrapolated' in warning
+    assert pd.compare(small, pd.DepositionModel(planar=WIDE)).warnings == ()

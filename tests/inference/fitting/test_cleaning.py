@@ -5,12 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes
-from paint_deposition.api.inference import compare
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.effects.library.edge_build import EdgeBuild
-from paint_deposition.effects.library.faraday_shielding import FaradayShielding
+import paint_deposition as pd
+from inference.fitting.panels import ORDERS, column, grid_m, painted_by, passes, reading
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.inference.diagnosis.procedure import diagnose
 from paint_deposition.inference.diagnosis.state import trouble_with
 from paint_deposition.inference.fitting.cleaning import (
@@ -26,14 +23,13 @@ from paint_deposition.inference.fitting.outliers import (
     Outlier,
     find_outliers,
 )
-from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate
-from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.report.words import count_words
 from small_campaign import small_campaign
 
 FILM_UM, GAUGE_UM = 30.0, 0.7
 COUNT = 96
+MODEL = pd.DepositionModel()
 
 
 def scattered(seed: int, texture: float = 0.005) -> FittedPoints:
@@ -131,47 +127,37 @@ def test_the_texture_is_estimated_beside_a_missing_effect(texture):
     assert np.mean(shares) == pytest.approx(texture, abs=0.006)
 
 
-@pytest.fixture(scope='module')
-def campaign(tmp_path_factory):
-    """A door with edge build, 97 readings, of which one is a typing error."""
-    good = small_campaign(
-        tmp_path_factory.mktemp('edge'), seed=5, truth='edge_build', amplitude=0.5,
-        experiments=('door',), readings=97, repeats=20, style='random', parcels=2_000_000,
-    )  # fmt: skip
-    (door,) = good.experiments
-    row = int(np.flatnonzero(door.means.repeats[door.means.owner] == 1)[10])
-    thickness = door.readings.thickness_um.copy()
-    thickness[row] *= 10.0
-    return row, Campaign((door.with_readings(replace(door.readings, thickness_um=thickness)),))
-
-
 @pytest.mark.slow
-def test_a_typing_error_does_not_change_the_verdict(campaign):
-    row, bad = campaign
-    library = {e.id: e for e in (AirDrift, EdgeBuild, FaradayShielding)}
-    found = diagnose(bad, DepositionModel(), library)
+def test_a_typing_error_does_not_change_the_verdict(tmp_path):
+    """A door with edge build, 97 readings, of which one is ten times too large."""
+    (door,) = small_campaign(
+        tmp_path, seed=5, truth='edge_build', amplitude=0.5, experiments=('door',),
+        readings=97, repeats=20, style='random', parcels=2_000_000,
+    ).experiments  # fmt: skip
+    row = int(np.flatnonzero(door.means.repeats[door.means.owner] == 1)[10])
+    factor = np.where(np.arange(len(door.readings)) == row, 10.0, 1.0)
+    bad = pd.Campaign((reading(door, factor * door.readings.thickness_um),))
+    library = {name: EFFECTS[name] for name in ('air_drift', 'edge_build', 'faraday_shielding')}
+    found = diagnose(bad, pd.DepositionModel(), library)
     assert found.verdict == 'effect_missing'
     assert found.accepted == ('edge_build',)
     (outlier,) = found.to_dict()['left_out']
     assert outlier['thickness_um'] == bad.readings.thickness_um[row]
     assert outlier['guess_um'] == pytest.approx(0.1 * outlier['thickness_um'])
-    assert (
-        sum("point 'door: " in note and 'left out of the fit' in note for note in found.notes) == 1
-    )
-    label = str(bad.readings.point[row])
-    compared = compare(bad, found.history[0].model)
-    assert [one.point for one in compared.study.outliers] == [label]
+    left_out = [note for note in found.notes if "point 'door: " in note]
+    assert ['left out of the fit' in note for note in left_out] == [True]
+    compared = pd.compare(bad, found.history[0].model)
+    assert [one.point for one in compared.study.outliers] == [str(bad.readings.point[row])]
 
 
 def test_a_thick_film_without_texture_is_no_broken_fit():
     """A gauge of 0.5 µm on 80 µm of even film: the usual texture alone would be 0.8 µm."""
-    model, path = DepositionModel(), passes([0.2, 0.6, 1.0, 1.4, 1.8])
-    at = grid_m(8, 24)
-    even = painted_by(model, path, at, noise_um=0.0, repeats=1)
+    at, path = grid_m(8, 24), passes([0.2, 0.6, 1.0, 1.4, 1.8])
+    even = painted_by(MODEL, path, at, noise_um=0.0, repeats=1)
     film = even.readings.thickness_um * 80.0 / even.readings.thickness_um.mean()
     readings = film + 0.5 * np.random.default_rng(8).normal(size=len(film))
-    stated = Readings.of(at, readings, sigma_um=np.full(len(film), 0.5))
-    study, fit = clean_and_fit(Campaign((even.with_readings(stated),)), model, starts=1)
+    stated = pd.Readings.of(at, readings, sigma_um=np.full(len(film), 0.5))
+    study, fit = clean_and_fit(pd.Campaign((even.with_readings(stated),)), MODEL, starts=1)
     assert trouble_with(study, fit) == ''
     assert study.texture.source == 'neighbours'
     assert study.texture.share < 0.004
@@ -179,45 +165,43 @@ def test_a_thick_film_without_texture_is_no_broken_fit():
 
 
 def test_an_assumed_noise_leaves_the_texture_assumed():
-    experiment = painted_by(DepositionModel(), passes([0.55, 1.35]), grid_m(), repeats=1)
-    study, _ = clean_and_fit(Campaign((experiment,)), DepositionModel(), starts=1)
+    experiment = painted_by(MODEL, passes([0.55, 1.35]), grid_m(), repeats=1)
+    study, _ = clean_and_fit(pd.Campaign((experiment,)), MODEL, starts=1)
     assert (study.texture.share, study.texture.source) == (0.01, 'assumed')
 
 
-MODEL, NOISE_UM, SCANNED = DepositionModel(), 0.4, 6000
+NOISE_UM, SCANNED = 0.4, 6000
 
 
 @pytest.fixture(scope='module')
-def scan() -> Campaign:
+def scan() -> pd.Campaign:
     """A panel read at random places, denser than any cell."""
     places = np.random.default_rng(5).uniform((-0.35, 0.05), (0.35, 1.95), (SCANNED, 2))
     points_m = np.column_stack([places[:, 0], np.zeros(SCANNED), places[:, 1]])
     motion = passes(ORDERS[0], samples=80)
-    return Campaign((painted_by(MODEL, motion, points_m, noise_um=NOISE_UM, repeats=1),))
+    return pd.Campaign((painted_by(MODEL, motion, points_m, noise_um=NOISE_UM, repeats=1),))
 
 
 def test_the_mean_of_a_cell_is_the_film_at_its_middle_within_the_noise_of_a_mean(scan):
     # Off by a tenth of the film, as a rough fit may be.
     planar = MODEL.planar.model_copy(update={'K1_cm3_per_s': 1.1 * MODEL.planar.K1_cm3_per_s})
-    rough = MODEL.model_copy(update={'planar': planar})
-    cells = condensed(scan, rough)
+    cells = condensed(scan, MODEL.model_copy(update={'planar': planar}))
     assert 0.8 * CELLS < len(cells) <= CELLS
     sigma_um = cells.readings.sigma_um
-    each = SCANNED / len(cells)
-    assert np.median(sigma_um) == pytest.approx(NOISE_UM / np.sqrt(each), rel=0.1)
+    expected_um = NOISE_UM / np.sqrt(SCANNED / len(cells))
+    assert np.median(sigma_um) == pytest.approx(expected_um, rel=0.1)
     off_um = cells.means.mean_um - Forward(cells, ()).predict_um(MODEL)
     # Chi-square of that many cells: within five of its standard deviations.
-    assert np.sum((off_um / sigma_um) ** 2) / len(cells) == pytest.approx(
-        1.0, abs=5.0 * np.sqrt(2.0 / len(cells))
-    )
+    five_sd = 5.0 * np.sqrt(2.0 / len(cells))
+    assert np.mean((off_um / sigma_um) ** 2) == pytest.approx(1.0, abs=five_sd)
 
 
 def test_a_few_readings_by_hand_beside_a_scan_are_kept_and_what_became_of_it_is_said(scan):
     motion = passes(ORDERS[1], samples=80)
-    hand = replace(painted_by(MODEL, motion, column(), noise_um=NOISE_UM), name='by hand')
-    study = compare(Campaign((*scan.experiments, hand)), MODEL).study
-    assert np.array_equal(study.campaign.experiments[1].readings.thickness_um,
-                          hand.readings.thickness_um)  # fmt: skip
+    hand = painted_by(MODEL, motion, column(), name='by hand', noise_um=NOISE_UM)
+    study = pd.compare(pd.Campaign((*scan.experiments, hand)), MODEL).study
+    kept = study.campaign.experiments[1].readings
+    assert np.array_equal(kept.thickness_um, hand.readings.thickness_um)
     read = SCANNED + len(hand.readings)
     told = f'{read} readings were condensed to the means of {len(study)} cells'
     assert any(note.startswith(told) for note in study.notes)

@@ -5,26 +5,26 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from booth import MODEL, painted, path_of, serpentine
+from inference.fitting.panels import reading
 from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.random_effects import amounts
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import Readings
-from paint_deposition.part.surface import Surface
+from paint_deposition.inference.readings.campaign import Experiment
 from surfaces import triangulated
 
 RADIUS_M, HALF_M, COARSE_M, FINE_M = 0.15, 0.1, 0.05, 0.004
 PATH = path_of(serpentine((0.06, -0.04), opens_at_m=0.3, period_s=0.05))
 
 
-def fold(edge_m: float) -> Surface:
+def fold(edge_m: float) -> pd.Surface:
     """Flat below, part of a pipe above."""
 
     def depth(x, z):
         return RADIUS_M - np.sqrt(RADIUS_M**2 - np.maximum(z, 0.0) ** 2)
 
-    return Surface.from_triangles(*triangulated(depth, edge_m, HALF_M, jitter=0.2), 0.008)
+    return pd.Surface.from_triangles(*triangulated(depth, edge_m, HALF_M, jitter=0.2), 0.008)
 
 
 def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int = 3) -> Experiment:
@@ -34,7 +34,7 @@ def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int =
     rng = np.random.default_rng(seed)
     at = rng.choice(np.flatnonzero(film_um > 1.0), count, replace=False)
     noisy_um = film_um[at] + sigma_um * rng.normal(size=count)
-    readings = Readings.of(
+    readings = pd.Readings.of(
         fine.vertices_m[at], noisy_um, normals=fine.normals[at],
         sigma_um=np.full(count, sigma_um),
     )  # fmt: skip
@@ -42,7 +42,7 @@ def measured(edge_m: float, sigma_um: float = 0.1, count: int = 120, seed: int =
 
 
 def study(edge_m: float) -> Study:
-    return clean_and_fit(Campaign((measured(edge_m),)), MODEL)[0]
+    return clean_and_fit(pd.Campaign((measured(edge_m),)), MODEL)[0]
 
 
 @pytest.fixture(scope='module')
@@ -50,11 +50,18 @@ def coarse() -> Study:
     return study(COARSE_M)
 
 
-def test_facets_are_told_of_and_are_noise(coarse):
+def test_facets_of_a_coarse_mesh_are_noise_which_points_keep_and_a_fine_one_has_none(coarse):
     assert any('The mesh of fold is coarser' in note for note in coarse.notes)
     assert coarse.nuisance.shape == (len(coarse), 0)
     without = replace(coarse, facet_um=None)
     assert coarse.sigma_um == pytest.approx(np.hypot(without.sigma_um, coarse.facet_um))
+    kept = np.arange(len(coarse)) % 3 > 0
+    some = coarse.of_points(kept)
+    np.testing.assert_array_equal(some.facet_um, coarse.facet_um[kept])
+    np.testing.assert_array_equal(some.sigma_um, coarse.sigma_um[kept])
+    fine = study(FINE_M)
+    assert fine.facet_um is None
+    assert not any('coarser' in note for note in fine.notes)
 
 
 def test_the_noise_is_what_the_facets_cost(coarse):
@@ -65,27 +72,13 @@ def test_the_noise_is_what_the_facets_cost(coarse):
     assert np.var(left_um - amount * coarse.facet_um) < 0.7 * np.var(left_um)
 
 
-def test_points_keep_their_facets_when_others_are_left_out(coarse):
-    kept = np.arange(len(coarse)) % 3 > 0
-    some = coarse.of_points(kept)
-    np.testing.assert_array_equal(some.facet_um, coarse.facet_um[kept])
-    np.testing.assert_array_equal(some.sigma_um, coarse.sigma_um[kept])
-
-
-def test_a_fine_mesh_has_none():
-    fine = study(FINE_M)
-    assert fine.facet_um is None
-    assert not any('coarser' in note for note in fine.notes)
-
-
 def test_levels_of_parts_are_told_beside_their_facets():
     """Two parts 3 % off either way, on a mesh whose facets cost more than the gauge's noise."""
     parts = []
     for seed, (name, level) in enumerate((('thick', 1.03), ('thin', 0.97))):
-        part = measured(COARSE_M, seed=seed)
-        changed = replace(part.readings, thickness_um=level * part.readings.thickness_um)
-        parts.append(replace(part.with_readings(changed), name=name))
-    found, fit = clean_and_fit(Campaign(tuple(parts)), MODEL)
+        part = replace(measured(COARSE_M, seed=seed), name=name)
+        parts.append(reading(part, level * part.readings.thickness_um))
+    found, fit = clean_and_fit(pd.Campaign(tuple(parts)), MODEL)
     assert np.abs(found.facet_um).max() > 3.0 * found.gauge_um.max()
     by_name = {(a.kind, a.of): a for a in amounts(fit, found.random_effects)}
     for name, level in (('thick', 3.0), ('thin', -3.0)):

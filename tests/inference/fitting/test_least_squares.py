@@ -1,13 +1,11 @@
 """The fit: a known pattern from readings without noise, and uncertainties as wide as they are."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from inference.fitting.panels import PANEL, grid_m, painted_by, passes
+import paint_deposition as pd
+from inference.fitting.panels import PANEL, column, grid_m, painted_by, passes
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.overspray_fog import OversprayFog
 from paint_deposition.film.integrator import FilmIntegrator
@@ -15,15 +13,13 @@ from paint_deposition.inference.fitting.estimates import scaled_covariance
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import derivatives, fit_readings
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.random_effects import LEVEL_SHARE, SESSION_UM
 from paint_deposition.inference.fitting.study import FOLDS, TEXTURE_SHARE, Study
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
 
-TRUTH = DepositionModel(
+BASE = pd.DepositionModel()
+TRUTH = pd.DepositionModel(
     planar=PlanarPattern(
         K1_cm3_per_s=1.6, K2=0.3, K3=0.25, phi_rad=0.9, r_m=0.17, sigma1_m=0.07, sigma2_m=0.12
     )
@@ -32,12 +28,11 @@ SIGMA_UM = 0.15
 
 
 @pytest.fixture(scope='module')
-def spotted() -> Campaign:
+def spotted() -> pd.Campaign:
     """Two short strokes that do not meet, so that the whole pattern shows, not its collapse."""
     path, _ = spray_path(passes([0.55, 1.35]))
     path = path.with_(flow=np.where(np.abs(path.position_m[:, 0]) < 0.1, 8.0 * path.flow, 0.0))
-    bare = Readings.of(grid_m(), np.zeros(len(grid_m())))
-    return Campaign((Experiment.of('panel', PANEL, path, bare),))
+    return pd.Campaign((painted_by(TRUTH, path, grid_m()),))
 
 
 @pytest.fixture(scope='module')
@@ -60,7 +55,11 @@ def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
 
 def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
     fit = fit_readings(
-        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(DepositionModel()), starts=6
+        forward,
+        exact,
+        np.full(len(exact), 0.003),
+        FreeParameters.of(BASE),
+        starts=6,
     )
     assert fit.converged
     assert fit.chi_square < 1.0
@@ -73,12 +72,9 @@ def test_derivatives_are_those_of_the_prediction(forward, exact):
     vector = parameters.encode(parameters.start)
     found = derivatives(forward, parameters, vector, np.full(len(exact), SIGMA_UM))
     for k in range(len(vector)):
-        ends = []
-        for step in (-1e-4, 1e-4):
-            moved = vector.copy()
-            moved[k] += step
-            ends.append(forward.predict_um(parameters.decode(moved)))
-        slope = (ends[1] - ends[0]) / 2e-4 / SIGMA_UM
+        step = 1e-4 * (np.arange(len(vector)) == k)
+        low, high = (forward.predict_um(parameters.decode(vector + s)) for s in (-step, step))
+        slope = (high - low) / 2e-4 / SIGMA_UM
         assert found[:, k] == pytest.approx(slope, abs=1e-5 * np.abs(slope).max()), k
 
 
@@ -104,7 +100,7 @@ def test_the_covariance_is_the_scatter_of_repeated_campaigns(forward, exact):
 
 
 def test_readings_that_say_nothing_leave_the_priors(forward, exact):
-    parameters = FreeParameters.of(DepositionModel())
+    parameters = FreeParameters.of(BASE)
     fit = fit_readings(forward, exact, np.full(len(exact), 1e9), parameters)
     prior = parameters.prior
     assert fit.vector == pytest.approx(prior.centre, abs=1e-3)
@@ -112,7 +108,6 @@ def test_readings_that_say_nothing_leave_the_priors(forward, exact):
 
 
 def test_nuisance_directions_are_allowed_for(forward, exact):
-    """A common error of all readings, allowed for, moves the fit by no more than it may."""
     parameters = FreeParameters.of(TRUTH)
     sigma = np.full(len(exact), SIGMA_UM)
     wrong = exact + 1.5
@@ -131,7 +126,7 @@ def test_nuisance_directions_are_allowed_for(forward, exact):
 
 def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     experiment = painted_by(TRUTH, passes([0.55, 1.35]), grid_m(), repeats=4, noise_um=0.6)
-    study = Study.of(Campaign((experiment,)))
+    study = Study.of(pd.Campaign((experiment,)))
     assert study.noise.source == 'repeats'
     assert study.noise.degrees_of_freedom == 3 * len(study)
     gauge = study.noise.sigma_um[: len(study)]
@@ -141,27 +136,9 @@ def test_a_point_is_as_certain_as_its_repeats_and_the_films_texture():
     assert study.nuisance.shape == (len(study), 0)
 
 
-def test_each_of_several_parts_has_a_level_and_a_zero_of_its_own():
-    parts = tuple(
-        replace(painted_by(TRUTH, passes([height, height + 0.8]), grid_m(3, 6)), name=name)
-        for name, height in (('low', 0.4), ('high', 0.6))
-    )
-    study = Study.of(Campaign(parts))
-    sigma = study.sigma_um[:18]
-    level, zero = LEVEL_SHARE * study.measured_um[:18] / sigma, SESSION_UM / sigma
-    here = np.column_stack([level, -level, zero, -zero]) / 2.0
-    assert study.nuisance[:18] == pytest.approx(here)
-    film = study.measured_um * study.sigma_um
-    assert (film @ study.nuisance[:, :2]).sum() == pytest.approx(0.0)
-    # Each is left out as a whole.
-    assert np.array_equal(study.folds(), study.campaign.experiment_of)
-
-
 def test_of_one_part_patches_are_left_out(spotted):
     """A neighbour would tell what the model cannot."""
-    one = spotted.experiments[0]
-    readings = Readings.of(grid_m(), np.full(len(grid_m()), 20.0))
-    study = Study.of(Campaign((Experiment.of('panel', PANEL, one.path, readings),)))
+    study = Study.of(spotted)
     folds, places_m = study.folds(), study.campaign.positions_m
     assert len(np.unique(folds)) == FOLDS
     centres_m = np.array([places_m[folds == k].mean(axis=0) for k in range(FOLDS)])
@@ -186,9 +163,8 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
 def test_a_model_without_a_law_of_the_study_does_not_have_it():
     """Laws of one model are compiled for all, and absent in a model that has others."""
     law = LEARNED['incidence_deg'](low=0.0, high=60.0, learned=(0.1, 0.4))
-    points_m = np.column_stack([np.linspace(-0.3, 0.3, 9), np.zeros(9), np.linspace(0.5, 1.5, 9)])
-    campaign = Campaign((painted_by(DepositionModel(), passes([0.7, 1.3]), points_m),))
-    other = DepositionModel(effects=(EFFECTS['pattern_spread'].typical(),))
+    campaign = pd.Campaign((painted_by(BASE, passes([0.7, 1.3]), column(0.5, 1.5, 9)),))
+    other = pd.DepositionModel(effects=(EFFECTS['pattern_spread'].typical(),))
     np.testing.assert_array_equal(
         Forward(campaign, (law,)).predict_um(other), Forward(campaign).predict_um(other)
     )

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import EFFECTS, LEARNED
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.inference.fitting.parameters import SHAPE_DEVIATIONS, FreeParameters
@@ -20,7 +20,7 @@ PATTERNS = st.builds(
 
 @given(PATTERNS, st.floats(-0.1, 0.1), st.floats(0.0, 2.0))
 def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
-    model = DepositionModel(
+    model = pd.DepositionModel(
         planar=planar,
         effects=(AirDrift(shift_across_m=shift_m), CornerSlowdown(gain=gain, length_m=0.2)),
     )
@@ -36,7 +36,7 @@ def test_a_model_survives_the_way_there_and_back(planar, shift_m, gain):
 
 def test_shapes_are_varied_on_a_logarithmic_scale():
     """Neutral is the centre; the whole physical range is a few widths of the prior."""
-    parameters = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5))
+    parameters = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5))
     assert parameters.names[len(PATTERN) :] == ('corner_slowdown.gain', 'corner_slowdown.length_m')
     vector = parameters.encode(parameters.start)
     info = CornerSlowdown.parameters()['length_m']
@@ -57,14 +57,14 @@ def test_shapes_are_varied_on_a_logarithmic_scale():
 
 def test_a_learned_law_has_nothing_to_vary():
     law = LEARNED['time_s'](low=0.0, high=9.0, learned=(0.1, 0.0, -0.1))
-    parameters = FreeParameters.of(DepositionModel(), law)
+    parameters = FreeParameters.of(pd.DepositionModel(), law)
     assert len(parameters) == len(PATTERN)
     assert parameters.decode(parameters.encode(parameters.start)).effect(law.id) == law
 
 
 @pytest.mark.parametrize('effect', EFFECTS.values(), ids=EFFECTS.keys())
 def test_bounds_and_prior_suit_every_effect(effect):
-    parameters = FreeParameters.of(DepositionModel(), effect())
+    parameters = FreeParameters.of(pd.DepositionModel(), effect())
     low, high = parameters.bounds
     prior = parameters.prior
     assert (low <= prior.centre).all()

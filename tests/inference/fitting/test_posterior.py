@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.stats import chi2, kstest, truncnorm
 
+import paint_deposition as pd
 from inference.diagnosis.linear import KNOWN, PARAMETERS, correlated, linear_fit
 from inference.fitting.panels import painted_by, passes
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.errors import ModelError
 from paint_deposition.inference.fitting.estimates import scaled_covariance
@@ -20,17 +20,27 @@ from paint_deposition.inference.fitting.posterior import (
     prior_for,
 )
 from paint_deposition.inference.posterior import Posterior
-from paint_deposition.inference.readings.campaign import Campaign
+from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.model.eq1_pattern import EFFECT_BETWEEN_JOBS, PATTERN
 
-WITH_EFFECT = FreeParameters.of(DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
+WITH_EFFECT = FreeParameters.of(pd.DepositionModel(), CornerSlowdown(gain=0.5, length_m=0.2))
 
 
 @pytest.fixture(scope='module')
-def campaign():
+def panel() -> Experiment:
     grid = np.array([[0.1 * k, 0.0, 1.0] for k in range(-3, 4)])
-    part = painted_by(DepositionModel(), passes([1.0]), grid)
-    return Campaign((replace(part, name='panel'),))
+    return painted_by(pd.DepositionModel(), passes([1.0]), grid)
+
+
+@pytest.fixture(scope='module')
+def campaign(panel) -> pd.Campaign:
+    return pd.Campaign((panel,))
+
+
+def thicker(panel: Experiment, **settings) -> pd.Campaign:
+    """Another job, painted at other settings."""
+    taken = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
+    return pd.Campaign((replace(panel, taken=taken, settings=settings),))
 
 
 @pytest.mark.parametrize('parameters', [PARAMETERS, WITH_EFFECT], ids=['pattern', 'effect'])
@@ -53,7 +63,7 @@ def test_effects_are_told_in_their_own_units(campaign):
     told = posterior_of(replace(fit, vector=vector), campaign).mean
     assert told['corner_slowdown.gain'] == pytest.approx(0.5)
     assert np.exp(told['corner_slowdown.log_length_m']) == pytest.approx(0.2)
-    assert np.exp(told['log_K1']) == pytest.approx(DepositionModel().planar.K1_cm3_per_s)
+    assert np.exp(told['log_K1']) == pytest.approx(pd.DepositionModel().planar.K1_cm3_per_s)
 
 
 def test_what_nothing_is_known_of_keeps_its_weak_prior():
@@ -66,37 +76,30 @@ def test_what_nothing_is_known_of_keeps_its_weak_prior():
     assert not both.factor[count:, :count].any()
 
 
-def test_no_reading_counts_twice(campaign):
+def test_no_reading_counts_twice(panel, campaign):
     fit = linear_fit(np.random.default_rng(4), 60)
     posterior = posterior_of(fit, campaign)
-    (panel,) = campaign.experiments
     assert posterior.readings == (panel.taken.fingerprint,)
     known, remarks = prior_for(posterior, campaign)
     assert known is None
     assert 'panel' in remarks[0]
-    thicker = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
-    other = Campaign((replace(panel, taken=thicker),))
+    other = thicker(panel)
     assert prior_for(posterior, other) == (posterior, ())
     assert prior_for(None, campaign) == (None, ())
     later = replace(fit, parameters=replace(fit.parameters, known=posterior))
-    assert posterior_of(later, other).readings == (*posterior.readings, thicker.fingerprint)
+    (added,) = (part.taken.fingerprint for part in other.experiments)
+    assert posterior_of(later, other).readings == (*posterior.readings, added)
 
 
-def test_other_settings_of_the_process_are_told(campaign):
-    def at(**settings) -> Campaign:
-        (panel,) = campaign.experiments
-        other = replace(panel.taken, thickness_um=panel.taken.thickness_um + 0.01)
-        return Campaign((replace(panel, taken=other, settings=settings),))
-
-    (panel,) = campaign.experiments
-    calibrated = Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
+def test_other_settings_of_the_process_are_told(panel):
+    calibrated = pd.Campaign((replace(panel, settings={'voltage_kv': 60.0, 'flow': 1.0}),))
     posterior = posterior_of(linear_fit(np.random.default_rng(4), 60), calibrated)
     assert posterior.process == {'voltage_kv': 60.0, 'flow': 1.0}
-    known, (remark,) = prior_for(posterior, at(voltage_kv=0.0, flow=1.01))
+    known, (remark,) = prior_for(posterior, thicker(panel, voltage_kv=0.0, flow=1.01))
     assert known == posterior
     assert 'calibrated at voltage_kv 60, this job was painted at 0:' in remark
-    assert prior_for(posterior, at(voltage_kv=61.0)) == (posterior, ())
-    assert prior_for(posterior, at()) == (posterior, ())
+    for settings in ({'voltage_kv': 61.0}, {}):
+        assert prior_for(posterior, thicker(panel, **settings)) == (posterior, ())
 
 
 # How far a pattern moved from the calibration.
@@ -128,12 +131,8 @@ def test_jobs_that_differ_as_assumed_are_as_far_as_told():
     assert kstest(first, 'norm').pvalue > 0.01
     assert np.mean(np.sqrt(squares) < shifts[0].usual) == pytest.approx(0.95, abs=0.03)
     assert sum(shift.is_alarming for shift in shifts) <= 5
-
-
-def test_a_bell_of_another_kind_is_warned_of_by_what_differs_most():
-    away = np.zeros(len(PATTERN))
-    away[4] = 8.0 * PRIOR.width[4]
-    other = moved_by(away)
+    # A bell of another kind is warned of by what differs most.
+    other = moved_by(8.0 * PRIOR.width[4] * (np.arange(len(PATTERN)) == 4))
     assert other.is_alarming
     assert 'most in r_m (+8.0)' in other.warning
     assert other.to_dict()['by_coordinate']['r_m'] == pytest.approx(8.0)
@@ -141,7 +140,7 @@ def test_a_bell_of_another_kind_is_warned_of_by_what_differs_most():
 
 COUNT = 4000
 GAIN = 'corner_slowdown.gain'
-MODEL = DepositionModel(effects=(CornerSlowdown(gain=0.1, length_m=0.1),))
+MODEL = pd.DepositionModel(effects=(CornerSlowdown(gain=0.1, length_m=0.1),))
 
 
 def known(means: dict[str, float], deviations: dict[str, float]) -> Posterior:

@@ -1,14 +1,17 @@
-"""Levels of parts and zeros of gauge sessions, found back where they were put in."""
+"""Levels of parts and zeros of gauge sessions, and what is predicted of a part left out."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from inference.diagnosis.linear import fit_linear
-from inference.fitting.panels import grid_m, painted_by, passes
+from inference.fitting.panels import gauged, grid_m, painted_by, passes, reading
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.library.edge_build import EdgeBuild
+from paint_deposition.inference.diagnosis.verdict import Step
+from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.fitting.random_effects import (
     LEVEL_SHARE,
     OTHER_LEVEL_SHARE,
@@ -17,15 +20,22 @@ from paint_deposition.inference.fitting.random_effects import (
     random_effects,
 )
 from paint_deposition.inference.fitting.study import Study
-from paint_deposition.inference.readings.campaign import Campaign, Experiment
+from paint_deposition.inference.readings.campaign import Experiment
+from paint_deposition.inference.readings.readings import root_mean_square
 from paint_deposition.model.eq1_pattern import PATTERN
 
 
-def part(name: str, session: str = '') -> Experiment:
+def part(name: str, session: str | np.ndarray = '') -> Experiment:
     """Read from the middle of the pass to where hardly any paint arrives."""
-    one = painted_by(DepositionModel(), passes([1.0]), grid_m(4, 10, 1.0, 1.5))
-    readings = replace(one.readings, session=np.full(len(one.readings), session))
-    return Experiment.of(name, one.surface, one.path, readings)
+    places = grid_m(4, 10, 1.0, 1.5)
+    one = painted_by(pd.DepositionModel(), passes([1.0]), places, name=name)
+    return one.with_readings(
+        replace(one.readings, session=np.broadcast_to(session, len(one.readings)))
+    )
+
+
+def study_of(*parts: Experiment) -> Study:
+    return Study.of(pd.Campaign(parts))
 
 
 def estimated(study: Study, change_um: np.ndarray) -> dict:
@@ -37,7 +47,7 @@ def estimated(study: Study, change_um: np.ndarray) -> dict:
 
 
 def test_a_level_and_a_zero_come_back_with_their_uncertainty():
-    study = Study.of(Campaign((part('left'), part('right'))))
+    study = study_of(part('left'), part('right'))
     left = study.campaign.experiment_of == 0
     sign = np.where(left, 1.0, -1.0)
     found = estimated(study, sign * (0.03 * study.measured_um + 0.4))
@@ -51,20 +61,16 @@ def test_a_level_and_a_zero_come_back_with_their_uncertainty():
     assert 0.0 < level.sd < 100.0 * LEVEL_SHARE / np.sqrt(2.0)
     assert 0.0 < zero.sd < SESSION_UM / np.sqrt(2.0)
     assert f'{level}'.startswith(f'part level of left: +{level.value:.2f} ± ')
-
-
-def test_the_one_residual_is_beside_the_levels_of_the_parts():
-    study = Study.of(Campaign((part('left'), part('right'))))
+    # The one residual is beside these levels; what all parts have in common is the model's.
     film_um = study.measured_um
-    off_um = np.where(study.campaign.experiment_of == 0, 0.03, -0.03) * film_um
-    left = study.residuals(film_um - off_um).rmse_um
-    assert left < 0.2 * np.sqrt(np.mean(off_um**2))
-    # What all parts have in common is the model's.
+    assert study.residuals((1.0 - 0.03 * sign) * film_um).rmse_um < 0.006 * np.sqrt(
+        np.mean(film_um**2)
+    )
     assert study.residuals(0.97 * film_um).residual_um == pytest.approx(0.03 * film_um)
 
 
 def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
-    study = Study.of(Campaign((part('left', 'Monday'), part('right', 'Monday'), part('roof'))))
+    study = study_of(part('left', 'Monday'), part('right', 'Monday'), part('roof'))
     level, zero = study.random_effects
     assert level.names == ('left', 'right', 'roof')
     assert zero.names == ('Monday', 'roof')
@@ -72,9 +78,7 @@ def test_sessions_run_across_parts_and_those_without_a_name_are_their_own():
 
 
 def test_a_part_without_voltage_has_a_level_of_its_own():
-    usual = part('usual')
-    off = replace(part('off'), switched_off=frozenset(['voltage']))
-    study = Study.of(Campaign((usual, off)))
+    study = study_of(part('usual'), replace(part('off'), switched_off=frozenset(['voltage'])))
     level, _ = study.random_effects
     first, other = level.columns.T
     assert not first.any()  # there is no other part that it could differ from
@@ -88,7 +92,7 @@ def test_a_part_without_voltage_has_a_level_of_its_own():
 
 
 def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
-    study = Study.of(Campaign((part('left'), part('roof'), part('right'))))
+    study = study_of(part('left'), part('roof'), part('right'))
     owner = study.campaign.experiment_of
     level, zero = random_effects(study.campaign, study.measured_um, study.sigma_um, owner != 1)
     others = np.array([[0.5, 0.0, -0.5], [0.0, 0.0, 0.0], [-0.5, 0.0, 0.5]])
@@ -101,13 +105,85 @@ def test_a_part_left_out_has_no_level_and_the_others_differ_among_themselves():
 
 
 def test_two_sessions_on_one_part_differ_by_their_zero():
-    one = part('door')
-    evening = np.arange(len(one)) % 2 == 0
-    session = np.where(evening, 'evening', 'noon')[one.means.owner]
-    readings = replace(one.readings, session=session)
-    study = Study.of(Campaign((Experiment.of('door', one.surface, one.path, readings),)))
+    evening = np.arange(40) % 2 == 0
+    study = study_of(part('door', np.tile(np.where(evening, 'evening', 'noon'), 2)))
     (zero,) = study.random_effects
     assert zero.kind == 'gauge zero'
     found = estimated(study, np.where(evening, 0.5, -0.5))
     assert found['gauge zero', 'evening'].value == pytest.approx(0.5, abs=0.1)
     assert found['gauge zero', 'noon'].is_notable
+
+
+# The error on parts left out is that of really refitting without them.
+
+BASE = pd.DepositionModel()
+# Heights of the passes on each panel [m], and how much more paint it got than the model says.
+PASSES_M = ((0.3, 1.1, 0.7, 1.5), (1.6, 0.6, 1.1), (0.2, 1.0, 1.8))
+LEVELS = (1.03, 0.97, 1.04)
+MISSING = BASE.with_effect(EdgeBuild(gain=1.0, length_m=0.08))
+
+
+def levelled(truth: pd.DepositionModel) -> pd.Campaign:
+    """Panels, each with passes of its own and more or less paint than the others."""
+    panels = gauged(truth, seed=4, orders=PASSES_M).experiments
+    return pd.Campaign(tuple(
+        reading(panel, level * panel.readings.thickness_um)
+        for panel, level in zip(panels, LEVELS, strict=True)
+    ))  # fmt: skip
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize('truth', [BASE, MISSING], ids=['clean', 'an effect missing'])
+def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth):
+    """Also where the model misses much: then the fit without a part is far from that with it."""
+    campaign = levelled(truth)
+    study, fit = clean_and_fit(campaign, BASE, starts=6)
+    owner = study.campaign.experiment_of
+    found_um, anew_um = [], []
+    for number, part in enumerate(campaign.experiments):
+        out = owner == number
+        left_um = (study.measured_um - study.predicted_without_um(fit, out))[out]
+        others = pd.Campaign(tuple(one for one in campaign.experiments if one is not part))
+        model = pd.refit(others, None, BASE).model
+        other_um = pd.compare(pd.Campaign((part,)), model).points.residual_um
+        assert root_mean_square(left_um) == pytest.approx(root_mean_square(other_um), rel=0.03)
+        found_um.append(left_um)
+        anew_um.append(other_um)
+    step = Step.of(study, '', fit)
+    assert np.array_equal(study.folds(), owner)
+    found, anew = (root_mean_square(np.concatenate(each)) for each in (found_um, anew_um))
+    assert step.holdout_rmse_um == pytest.approx(found)
+    assert step.holdout_rmse_um == pytest.approx(anew, rel=0.02)
+    # The level of a part is not known beforehand.
+    assert step.holdout_rmse_um > step.rmse_um
+
+
+@pytest.fixture(scope='module')
+def study_and_fit():
+    return clean_and_fit(levelled(MISSING), BASE)
+
+
+def test_readings_left_out_have_no_part_in_what_is_predicted(study_and_fit):
+    """However wrong they are: neither by themselves nor by the level of their part."""
+    study, fit = study_and_fit
+    out = study.campaign.experiment_of == 1
+    first, part, last = study.campaign.experiments
+    wrong = reading(part, part.readings.thickness_um + 100.0)
+    other = replace(study, campaign=pd.Campaign((first, wrong, last)))
+    assert (other.measured_um[out] > study.measured_um[out] + 99.0).all()
+    before, after = (one.predicted_without_um(fit, out) for one in (study, other))
+    assert after == pytest.approx(before, rel=1e-4, abs=1e-3)
+
+
+def test_a_direction_that_is_fitted_too_counts_as_predicted(study_and_fit):
+    """What is learned beside the model from the other parts is predicted on the last."""
+    study, fit = study_and_fit
+    out = study.campaign.experiment_of == 2
+    predict = study.forward.predict_um
+    edge_um = predict(fit.model.with_effect(MISSING.effects[0])) - predict(fit.model)
+    free = (edge_um / study.sigma_um)[:, np.newaxis]
+    without_it, with_it = (
+        root_mean_square((study.measured_um - study.predicted_without_um(fit, out, each))[out])
+        for each in (None, free)
+    )
+    assert with_it < 0.6 * without_it

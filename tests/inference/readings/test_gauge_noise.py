@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.gauge_noise import (
     ASSUMED_FREEDOM,
@@ -14,7 +15,6 @@ from paint_deposition.inference.readings.gauge_noise import (
 )
 from paint_deposition.inference.readings.readings import (
     PointMeans,
-    Readings,
     Residuals,
     require_repeats_close,
 )
@@ -30,20 +30,20 @@ def usual_noise_um(film_um: np.ndarray) -> np.ndarray:
 
 def campaigns(
     layout: str, noise: Callable[[int], np.ndarray]
-) -> Iterator[tuple[Readings, np.ndarray]]:
+) -> Iterator[tuple[pd.Readings, np.ndarray]]:
     """Readings of 20 to 60 um and the film below them; `noise(count)` is in usual noises."""
     repeats = LAYOUTS[layout]
     owner = np.repeat(np.arange(len(repeats)), repeats)
     film = np.linspace(20.0, 60.0, len(repeats))[owner]
     for _ in range(CAMPAIGNS):
         thickness = film + usual_noise_um(film) * noise(len(owner))
-        yield Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
+        yield pd.Readings.of(np.zeros((len(owner), 3)), thickness, point=owner.astype(str)), film
 
 
-def at_points(points: str, thickness_um, sigma_um=np.nan) -> Readings:
+def at_points(points: str, thickness_um, sigma_um=np.nan) -> pd.Readings:
     """Readings at points of one letter each."""
     count = len(thickness_um)
-    return Readings.of(
+    return pd.Readings.of(
         np.zeros((count, 3)), thickness_um, point=np.array(list(points)),
         sigma_um=np.broadcast_to(sigma_um, count).astype(float),
     )  # fmt: skip
@@ -69,12 +69,6 @@ def test_normal_readings_stay_and_their_noise_is_unbiased(layout):
     assert np.mean(dropped) < 2e-3
 
 
-def test_a_display_in_whole_micrometres_makes_no_outliers():
-    """Nine pairs in ten without any scatter are no reason to doubt the tenth."""
-    labels, _ = honest_pairs()
-    assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
-
-
 def test_one_slip_does_not_raise_the_noise():
     labels, thickness = honest_pairs()
     readings = at_points(labels + 'xxx', [*thickness, 15.5, 26.6, 26.1])
@@ -98,9 +92,11 @@ def test_one_slip_does_not_raise_the_noise():
 )
 def test_the_minority_at_a_point_is_wrong(thickness, gross):
     labels, others = honest_pairs()
+    # Nine pairs in ten without any scatter are no reason to doubt the tenth.
+    assert not gross_outliers(at_points(labels, [26.0] * 19 + [27.0])).any()
     # The point is on another part, which has a point of the name 'A' as well.
     found = gross_outliers(
-        Readings.joined(
+        pd.Readings.joined(
             {'rest': at_points(labels, others), 'here': at_points('A' * len(gross), thickness)}
         )
     )
@@ -108,10 +104,13 @@ def test_the_minority_at_a_point_is_wrong(thickness, gross):
     assert not found[:20].any()
 
 
-def test_without_enough_repeats_only_what_no_gauge_reads_is_gross():
-    assert gross_outliers(at_points('aab', [26.0, 45.0, 20.0])).tolist() == [True, True, False]
-    assert not gross_outliers(at_points('aab', [26.0, 32.0, 20.0])).any()
-    assert not gross_outliers(at_points('', [])).any()
+@pytest.mark.parametrize(
+    ('points', 'thickness', 'gross'),
+    [('aab', [26.0, 45.0, 20.0], [True, True, False]), ('aab', [26.0, 32.0, 20.0], [False] * 3),
+     ('', [], [])],
+)  # fmt: skip
+def test_without_enough_repeats_only_what_no_gauge_reads_is_gross(points, thickness, gross):
+    assert gross_outliers(at_points(points, thickness)).tolist() == gross
 
 
 def test_what_is_left_out_is_named():
@@ -135,20 +134,9 @@ def test_repeats_are_averaged_in_order_of_first_appearance():
 def test_one_label_at_two_places_is_refused():
     places = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.02], [0.0, 0.0, 0.05]])
     labels = np.array(['A', 'A', 'A'])
-    require_repeats_close(Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
+    require_repeats_close(pd.Readings.of(places[:2], [1.0, 2.0], point=labels[:2]))
     with pytest.raises(ReadingsError, match=r"point 'A' is used 0\.050 m apart"):
-        require_repeats_close(Readings.of(places, [1.0, 2.0, 3.0], point=labels))
-
-
-def test_noise_is_pooled_within_points():
-    """At zero film the usual gauge's noise is its floor, so pooling is the textbook formula."""
-    values = np.array([-1.0, 0.3, 0.7, 1.2, -1.2, 0.5, 0.1, -0.6, 0.0])
-    labels = 'aaabbbccc'
-    noise = gauge_noise(at_points(labels, values))
-    squares = sum(np.var(values[k : k + 3], ddof=1) * 2 for k in (0, 3, 6))
-    assert noise.source == 'repeats'
-    assert noise.degrees_of_freedom == 6
-    assert noise.sigma_um == pytest.approx(np.sqrt(squares / 6), rel=1e-3)
+        require_repeats_close(pd.Readings.of(places, [1.0, 2.0, 3.0], point=labels))
 
 
 @pytest.mark.parametrize('thickness', [[20.0, 30.0], [20.0] * 9])
@@ -160,13 +148,20 @@ def test_without_scatter_to_go_by_the_usual_noise_is_assumed(thickness):
     assert noise.sigma_um == pytest.approx(np.hypot(0.7, 0.01 * np.array(thickness)))
 
 
-def test_repeats_of_stated_readings_say_nothing_of_the_others():
-    """A precise instrument for some points must not make the gauge look precise."""
+def test_noise_is_pooled_within_points_beside_those_whose_noise_is_stated():
+    """At zero film the usual gauge's noise is its floor: pooling is the textbook formula.
+
+    A precise instrument for some points must not make the gauge look precise.
+    """
+    values = np.array([-1.0, 0.3, 0.7, 1.2, -1.2, 0.5, 0.1, -0.6, 0.0])
+    noise = gauge_noise(at_points('aaabbbccc', values))
+    squares = sum(np.var(values[k : k + 3], ddof=1) * 2 for k in (0, 3, 6))
+    assert (noise.source, noise.degrees_of_freedom) == ('repeats', 6)
+    assert noise.sigma_um == pytest.approx(np.sqrt(squares / 6), rel=1e-3)
     values = [5.0, 5.001, 4.999] * 3 + [0.0, 2.0, -2.0, 1.0, -1.0, 2.0, -2.0]
     stated = [0.001] * 9 + [np.nan] * 7
     noise = gauge_noise(at_points('aaaaaaaaabbbbbbb', values, stated))
-    assert noise.source == 'repeats'
-    assert noise.degrees_of_freedom == 6
+    assert (noise.source, noise.degrees_of_freedom) == ('repeats', 6)
     assert noise.sigma_um[:9] == pytest.approx(0.001)
     assert noise.sigma_um[-1] == pytest.approx(np.std(values[9:], ddof=1), rel=0.01)
 

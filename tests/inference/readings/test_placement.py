@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from booth import panel, path_of, serpentine
 from paint_deposition.errors import ReadingsError
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.placement import columns_or_rows, unit_in_doubt
-from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.path import SprayPath
 
 # On the booth's panel, one metre by one about the origin in x-z.
@@ -15,7 +15,7 @@ PLACES_M = np.array([[-0.4, 0.0, -0.3], [0.1, 0.0, 0.2], [0.3, 0.0, 0.45], [-0.2
 
 
 def placed(positions_m: np.ndarray) -> Experiment:
-    readings = Readings.of(positions_m, np.full(len(positions_m), 20.0))
+    readings = pd.Readings.of(positions_m, np.full(len(positions_m), 20.0))
     return Experiment.of('panel', panel(), SprayPath.empty(), readings)
 
 
@@ -54,7 +54,7 @@ def test_a_small_cluster_of_readings_is_none_of_these():
     ],
 )
 def test_a_guessed_unit_is_doubted_where_another_fits(factor, guessed, words):
-    readings = Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
+    readings = pd.Readings.of(factor * PLACES_M, np.full(4, 20.0), unit_is_guessed=guessed)
     doubt = unit_in_doubt(panel(), readings)
     assert words in doubt
     assert bool(doubt) == bool(words)
@@ -73,37 +73,25 @@ def grid(columns_m, rows_m, stray_m=0.0) -> np.ndarray:
     return np.stack([x + stray[0], np.zeros(len(x)), z + stray[1]], axis=1)
 
 
-@pytest.fixture(scope='module')
-def level() -> SprayPath:
-    return path_of(serpentine())
+X, Z = np.linspace(-0.4, 0.4, 9), np.linspace(-0.4, 0.4, 8)
 
 
-@pytest.mark.parametrize('stray_m', [0.0, 0.01])
-def test_a_grid_is_read_across_the_passes(level, stray_m):
-    places = grid([-0.3, 0.0, 0.2], [-0.3, -0.2, -0.1, 0.0, 0.1], stray_m)
-    labels = columns_or_rows(panel(), level, places)
-    assert labels.tolist() == ['column 1'] * 5 + ['column 2'] * 5 + ['column 3'] * 5
-
-
-def test_rows_serve_where_there_are_no_columns(level):
-    x = np.linspace(-0.4, 0.4, 9)
-    places = np.concatenate([grid(x, [0.2]), grid(x + 0.043, [-0.1])])
-    labels = columns_or_rows(panel(), level, places)
-    assert labels.tolist() == ['row 1'] * 9 + ['row 2'] * 9
-
-
-def test_one_line_is_one_group(level):
-    labels = columns_or_rows(panel(), level, grid([0.1], np.linspace(-0.4, 0.4, 12), 0.004))
-    assert set(labels) == {'column 1'}
-
-
-@pytest.mark.parametrize('seed', range(5))
-def test_scattered_places_have_no_lines(level, seed):
-    scattered = np.random.default_rng(seed).uniform(-0.4, 0.4, (40, 3)) * [1.0, 0.0, 1.0]
-    assert not any(columns_or_rows(panel(), level, scattered))
-
-
-def test_a_few_strays_belong_to_no_line(level):
-    places = grid([-0.3, 0.3], np.linspace(-0.4, 0.4, 8))
-    labels = columns_or_rows(panel(), level, np.vstack([places, [[0.05, 0.0, 0.33]]]))
-    assert labels.tolist() == ['column 1'] * 8 + ['column 2'] * 8 + ['']
+@pytest.mark.parametrize(
+    ('places', 'lines'),
+    [
+        *((grid([-0.3, 0.0, 0.2], Z[:5], stray_m), [(f'column {k}', 5) for k in (1, 2, 3)])
+          for stray_m in (0.0, 0.01)),
+        # Rows serve where there are no columns.
+        (np.concatenate([grid(X, [0.2]), grid(X + 0.043, [-0.1])]), [('row 1', 9), ('row 2', 9)]),
+        (grid([0.1], np.linspace(-0.4, 0.4, 12), 0.004), [('column 1', 12)]),
+        # A stray belongs to no line.
+        (np.vstack([grid([-0.3, 0.3], Z), [[0.05, 0.0, 0.33]]]),
+         [('column 1', 8), ('column 2', 8), ('', 1)]),
+        *((np.random.default_rng(seed).uniform(-0.4, 0.4, (40, 3)) * [1.0, 0.0, 1.0], [('', 40)])
+          for seed in range(5)),
+    ],
+    ids=['grid', 'by hand', 'rows', 'one line', 'stray', *5 * ['scattered']],
+)  # fmt: skip
+def test_a_grid_is_read_across_the_passes(places, lines):
+    labels = columns_or_rows(panel(), path_of(serpentine()), places)
+    assert labels.tolist() == [label for label, count in lines for _ in range(count)]
