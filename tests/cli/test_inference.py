@@ -1,6 +1,7 @@
 """`paint demo`, `compare`, `diagnose` and `refit` as a user runs them, on the sample door."""
 
 import csv
+import html
 import json
 import os
 import re
@@ -84,9 +85,9 @@ def test_the_demo_finds_the_hidden_effect(demo):
 def test_the_page_of_the_demo_has_the_figures_of_the_files(demo):
     """As does what is printed; the later models and films are the better ones."""
     printed, folder = demo
-    page = (folder / 'demo.html').read_text()
+    page = html.unescape((folder / 'demo.html').read_text().replace('&rarr;', '->'))
     shown = re.findall(
-        r'class="label">([^<]*)</span>\s*(?:<span class="was">([^<]*) &rarr; </span>)?'
+        r'class="label">([^<]*)</span>\s*(?:<span class="was">([^<]*) -> </span>)?'
         r'<span class="value">([^<]*)</span>', page
     )  # fmt: skip
     shown = {label: (before, after) for label, before, after in shown}

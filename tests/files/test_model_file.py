@@ -132,7 +132,10 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: time_s, sd: [1]', 'sd has 1 values and learned 2; give one for each'),
         ('covariate: time_s, sd: [0.1, -0.2]', 'sd has -0.2; a standard deviation is 0 or more'),
         ('covariate: edge_distance_m, low: 0.4, high: 0.5', 'must be above low'),
-        ('covariate: height_fraction, kind: sum', "kind is 'sum'; expected 'factor' 1 + h on"),
+        (
+            'covariate: height_fraction, kind: sum',
+            "kind is 'sum'; expected 'factor' or 'addition': 1 + h times",
+        ),
         ('covariate: time_s, learned: [0.1, .nan]', 'learned.1 is nan; expected a list'),
         ('covariate: time_s, kind: addition', "kind is 'addition'; over time_s give factor"),
         ('covariate: place, learned: [1, 2, 3]', 'has 3 values; its maps have 4 knots'),

@@ -38,7 +38,7 @@ class LearnedLaw(Effect):
     kinds: ClassVar[tuple[str, ...]] = ('factor',)
 
     kind: Literal['factor', 'addition'] = Field(
-        'factor', description="'factor' 1 + h on what arrives, or 'addition' of h um to the film"
+        'factor', description='1 + h times what arrives, or h um added to the film'
     )
     learned: tuple[float, ...] = Field((0.0, 0.0), description='a list of numbers: h at the knots')
 
