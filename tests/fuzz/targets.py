@@ -10,7 +10,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
 
@@ -20,7 +19,7 @@ from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBO
 from paint_deposition.api.shown_results import results_scenes
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.atomic import json_text, write_parquet
+from paint_deposition.files.atomic import json_text
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
 from paint_deposition.files.meshes import read_mesh, write_mesh_ply
@@ -150,12 +149,6 @@ def _written(write: Callable[[Path], object], name: str) -> bytes:
         return (Path(folder) / name).read_bytes()
 
 
-def _batch(path: Path) -> None:
-    with zipfile.ZipFile(path, 'w') as package:
-        package.writestr('B1/header.txt', 'Name,B1\n')
-        package.writestr('B1/readings.txt', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n0,0,1,21\n')
-
-
 def _entries(ros1: bool = False) -> list[tuple[str, int, object]]:
     """Poses, states, transforms and joints of a moment."""
     motion, messages = straight_pass(5), Messages(ros1)
@@ -224,11 +217,6 @@ def _metadata(path: Path) -> object:
         return planned_model(run), _bag(run)
 
 
-def _parquet(path: Path) -> None:
-    films = {'x_m': [0.1, 0.2], 'y_m': [0.0, 0.0], 'z_m': [0.2, 0.2], 'thickness_um': [24.5, 9.0]}
-    write_parquet(path, pa.table(films | {'point': ['P1', 'P2']}))
-
-
 @cache
 def targets() -> dict[str, Target]:
     """All readers by name."""
@@ -255,13 +243,11 @@ def targets() -> dict[str, Target]:
         'gauge_json': Target(
             '.json', read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
         ),
-        'gauge_zip': Target('.zip', read_readings, [_written(_batch, 'B1.zip')]),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),
         'points': Target('.csv', read_points, [points], cells),
         'poses': Target('.csv', read_recording, [*POSES], cells),
-        'parquet': Target('.parquet', read_readings, [_written(_parquet, 'readings.parquet')]),
         'workbook': Target('.xlsx', read_readings, [book]),
         'worksheet': Target(
             '.xlsx', read_readings, [_member(book, 'sheet1.xml')],

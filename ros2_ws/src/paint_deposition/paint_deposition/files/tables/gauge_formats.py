@@ -76,19 +76,6 @@ FORMATS = (
     GaugeFormat('coordinate measuring machine', ('x', 'y', 'z', 'i', 'j', 'k'),
                 {'nx': 'i', 'ny': 'j', 'nz': 'k'}),
 )  # fmt: skip
-UNIT = r'(?P<unit>mils?|thou|µm|μm|um|microns?|mm)'
-# Lines without headings, as gauges print or send them: the groups are the headings.
-LINES = {
-    'PosiTector, serial': re.compile(
-        rf'\x02?\s*(?P<thickness>[\d.,]+|-+)\s*{UNIT}?\s+(?P<probe>[FN]\w*)\s*', re.IGNORECASE
-    ),
-    'Fischer, printed': re.compile(
-        rf'\s*n\.?\s*=\s*(?P<number>\d+)\s+(?P<thickness>[\d.,]+|-+)\s*{UNIT}\s*', re.IGNORECASE
-    ),
-}
-# The files of a folder, or of its zip, that are one table, one below the other.
-FOLDERS = {'PosiTector batch': ('header.txt', 'readings.txt')}
-
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(
     r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE

@@ -10,7 +10,6 @@ from paint_deposition.errors import PaintError, some
 from paint_deposition.files.tables.sheets import (
     Cell,
     Sheet,
-    cell_at,
     is_comment,
     is_value,
     read_sheets,
@@ -137,20 +136,11 @@ def find_table(
         sheets = named
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
-        above = one.rows[:MOST_LINES_ABOVE]
-        ranked = [
-            (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
-        ]
-        ranked += [
-            (known(headings_in(two.rows[k])), True, two, k)
-            for k in range(min(len(above) - 1, 40))
-            if (two := _on_two_rows(one, k))
-        ]
-        if not ranked:
-            continue
-        count, _, best, row = max(ranked, key=lambda rank: rank[:2])
-        if count and _is_split_alike(best.rows, row):
-            found.append((best, row))
+        above = enumerate(one.rows[:MOST_LINES_ABOVE])
+        ranked = [(known(headings_in(row)), not is_comment(row), -k) for k, row in above]
+        count, _, row = max(ranked, default=(0, False, 0))
+        if count and _is_split_alike(one.rows, -row):
+            found.append((one, -row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
         raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
@@ -161,27 +151,7 @@ def find_table(
     wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
     if columns and wide_enough:
         return wide_enough[0], None
-    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
-    by_marks = [s for s in apart if not s.form.startswith('blanks')]
-    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
-
-
-def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
-    """The sheet with two rows as one of headings, None where they hold numbers.
-
-    A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
-    one above it.
-    """
-    upper, lower = sheet.rows[first], sheet.rows[first + 1]
-    if any(map(is_value, [*upper, *lower])) or len(lower) < 2:
-        return None
-    texts, last = list[Cell](), ''
-    for k in range(max(len(upper), len(lower))):
-        above, below = text_of(cell_at(upper, k)), text_of(cell_at(lower, k))
-        last = above or (last if below else '')
-        texts.append(f'{last} {below}'.strip())
-    rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
-    return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
+    return max(sheets, key=lambda s: len(widest(s))), None
 
 
 def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:

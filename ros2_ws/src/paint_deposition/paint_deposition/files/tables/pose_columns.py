@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.tables import pose_columns
 from paint_deposition.files.tables.headings import (
     ANGLES,
     BESIDE,
@@ -39,23 +38,21 @@ ROTATED = {
     **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
     **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
 }
+# The columns of a log of abb_libegm; others of its kinds hold nothing more of the motion.
 EGM_LOG = {
     'TIMESTAMP': 'time [ms]',
     **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
     **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
     **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
 }
+EGM_KINDS = ('R_FB_', 'R_PL_', 'S_REF_')
 
 
 @dataclass
 class PoseTable(Table):
-    """A table whose columns are found by their names, see ``column_name``.
-
-    ``log`` says whose log it is, '' for a table with usual headings.
-    """
+    """A table whose columns are found by their names, see ``column_name``."""
 
     names: list[str] = field(default_factory=list)
-    log: str = ''
 
     @staticmethod
     def read(path: Path, robot: 'Robot | None' = None) -> 'PoseTable':
@@ -72,18 +69,17 @@ class PoseTable(Table):
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
                 'joints are read with --urdf'
             )
-        headings, log = translated(headings_in(sheet.rows[header]))
+        headings = usual_headings(headings_in(sheet.rows[header]))
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
-            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names,
-            log=log,
-        ).select(below)  # fmt: skip
+            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
+        ).select(below)
         if not len(table):
             raise table.error('no poses below the row of headings')
         for k, row in enumerate(table.rows):
             if any(cell != '' for cell in row[len(headings) :]):
-                table.complain_of_width(k)
+                table.add_width_error(k)
         table.refuse_errors()
         table = table.without_units_in_cells(range(len(headings)))
         if not sheet.form.startswith('commas'):
@@ -108,9 +104,8 @@ class PoseTable(Table):
     def joints(self, robot: 'Robot') -> tuple[np.ndarray, dict[str, str]]:
         """The values (N, J) of a robot's moving joints [rad or m], and their headings."""
         columns = robot.recorded_joints(_by_text(self.headings), str(self.path), numbered=True)
-        of_each = [columns[joint] for joint in robot.moving_joints]
-        units = [self.headings[column].unit for column in of_each]
-        values = robot.in_si(self.values(of_each), str(self.path), units)
+        units = [self.headings[column].unit for column in columns.values()]
+        values = robot.in_si(self.values([*columns.values()]), str(self.path), units)
         return values, {joint: self.headings[column].text for joint, column in columns.items()}
 
     def units(self, columns: Sequence[int]) -> set[str]:
@@ -170,7 +165,7 @@ def _by_text(headings: Sequence[Heading]) -> dict[str, int]:
 
 
 def _known(headings: list[Heading], robot: 'Robot | None') -> int:
-    headings, _ = translated(headings)
+    headings = usual_headings(headings)
     names = {column_name(heading) for heading in headings}
     if robot is None:
         return len(names - {''}) if {*POSITION} <= names else 0
@@ -180,22 +175,21 @@ def _known(headings: list[Heading], robot: 'Robot | None') -> int:
         return 0
 
 
-def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
-    """The headings with the usual words and units for a log that is known, and a note; else ''.
+def is_egm_log(headings: Sequence[Heading]) -> bool:
+    """Whether these are the columns of a log of abb_libegm."""
+    return not {'R_FB_POS_X', 'R_FB_POS_RJ1'}.isdisjoint(heading.text for heading in headings)
 
-    What else such a log holds of the motion has no words left.
-    """
-    if not {'R_FB_POS_X', 'R_FB_POS_RJ1'} & {heading.text for heading in headings}:
-        return list(headings), ''
+
+def usual_headings(headings: Sequence[Heading]) -> list[Heading]:
+    """The headings, with the usual words and units for those of a log of abb_libegm."""
+    if not is_egm_log(headings):
+        return [*headings]
     usual = []
     for heading in headings:
-        if meaning := EGM_LOG.get(heading.text):
-            words = Heading.of(meaning)
-            heading = Heading(heading.text, words.words, words.unit)
-        elif heading.text.startswith(('R_FB_', 'R_PL_', 'S_REF_')):
-            heading = Heading(heading.text, ())
-        usual.append(heading)
-    return usual, 'a log of abb_libegm: what the robot measured (R_FB)'
+        of_others = '' if heading.text.startswith(EGM_KINDS) else heading.text
+        words = Heading.of(EGM_LOG.get(heading.text, of_others))
+        usual.append(replace(words, text=heading.text))
+    return usual
 
 
 EULER = ('ex', 'ey', 'ez')
@@ -260,14 +254,14 @@ def read_rotations(
 
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
-    if columns := table.find_all(pose_columns.ROTATION_VECTOR):
+    if columns := table.find_all(ROTATION_VECTOR):
         if rotation is None and 'deg' in table.units(columns):
             raise RecordingError(
                 f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
                 f'give --rotation: {ROTATION_WORDS}'
             )
         return columns, True, rotation or ROTVEC
-    if columns := table.find_all(pose_columns.ROLL_PITCH_YAW):
+    if columns := table.find_all(ROLL_PITCH_YAW):
         return columns, True, rotation or 'rpy'
     for names, usual in IN_ORDER.items():
         if columns := table.find_all(names):

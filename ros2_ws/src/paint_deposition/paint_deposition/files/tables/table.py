@@ -18,7 +18,7 @@ from paint_deposition.files.tables.sheets import (
     text_of,
 )
 
-MOST_COMPLAINTS_SHOWN, MOST_REPEATS = 8, 50
+MOST_ERRORS_SHOWN = 8
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 Kind = TypeVar('Kind', bound='Table')
@@ -55,9 +55,9 @@ class Table:
     def numbers(
         self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
     ) -> np.ndarray:
-        """A column (N,) as written; what is no number is complained of.
+        """A column (N,) as written; what is no number is an error.
 
-        Blank cells may give nan without a complaint, nan and inf may be taken (not ``finite``),
+        Blank cells may give nan, nan and inf may be taken (not ``finite``),
         and with ``switch`` on, off, yes, no, true and false are numbers too.
         """
         values = np.full(len(self), np.nan)
@@ -74,9 +74,9 @@ class Table:
                 wanted = f'expected a number with a decimal {mark}'
                 wanted += ', or n/a where there is none' if may_be_empty else ''
                 wanted += '; write the one unit in the heading' if _behind(cell) else ''
-                self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
+                self.add_error(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
-                self.complain(index, f'{name} is {cell}; expected a finite number')
+                self.add_error(index, f'{name} is {cell}; expected a finite number')
             else:
                 values[index] = value
         return values
@@ -93,17 +93,17 @@ class Table:
         """Headings as the file has them; of all columns where none are given."""
         return ' '.join(self.headings[k].text for k in columns or range(len(self.headings)))
 
-    def complain(self, row: int, text: str) -> None:
+    def add_error(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
         self._errors.setdefault(self.lines[row], text)
 
-    def complain_of_width(self, row: int) -> None:
+    def add_width_error(self, row: int) -> None:
         """Note that a row has not as many values as there are headings."""
         cells = self.rows[row]
         text = f'{len(cells)} values under {len(self.headings)} column names'
         if self.form.startswith('commas') and len(cells) > len(self.headings):
             text += '; with decimal commas, put semicolons between the columns'
-        self.complain(row, text)
+        self.add_error(row, text)
 
     def error(self, text: str) -> PaintError:
         """What is wrong with the file as a whole, as an error to raise."""
@@ -115,8 +115,8 @@ class Table:
             return
         lines = [f'line {line}: {text}' for line, text in sorted(self._errors.items())]
         count = f'{len(lines)} errors: ' if len(lines) > 1 else ''
-        if (more := len(lines) - MOST_COMPLAINTS_SHOWN) > 0:
-            lines[MOST_COMPLAINTS_SHOWN:] = [f'and {more} more']
+        if (more := len(lines) - MOST_ERRORS_SHOWN) > 0:
+            lines[MOST_ERRORS_SHOWN:] = [f'and {more} more']
         raise self.error(count + '; '.join(lines))
 
     def select(self: Kind, rows: Sequence[int]) -> Kind:
@@ -139,36 +139,10 @@ class Table:
         """Whether a cell is the number 0."""
         return self._number(cell) == 0.0
 
-    def with_repeats_apart(self: Kind, at: dict[str, list[int]]) -> Kind:
-        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.
-
-        ``at`` gets the new columns of the thickness.
-        """
-        width, extra = len(self.headings), list[int]()
-        cells = [
-            [text_of(cell_at(row, k)).split(';') for k in at['thickness']] for row in self.rows
-        ]
-        most = max((len(parts) for row in cells for parts in row), default=1)
-        if not 1 < most <= MOST_REPEATS or max(map(len, self.rows)) > width:
-            return self
-        headings, rows = [*self.headings], [[*r, *[''] * (width - len(r))] for r in self.rows]
-        for place, k in enumerate(at['thickness']):
-            for number in range(most):
-                column = k if number == 0 else len(headings)
-                if number:
-                    text = f'{self.headings[k].text} ({number + 1})'
-                    headings.append(replace(self.headings[k], text=text))
-                    extra.append(column)
-                for row, parts in zip(rows, cells, strict=True):
-                    part = parts[place][number].strip() if number < len(parts[place]) else ''
-                    row[column : column + 1] = [part]
-        at['thickness'] = [*at['thickness'], *extra]
-        return replace(self, headings=headings, rows=rows)
-
     def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
         """The table with the units behind all numbers of a column in its heading instead.
 
-        Units that differ, also from the heading's, stay where they are, to be complained of.
+        Units that differ, also from the heading's, stay where they are, and are errors there.
         """
         headings, rows = [*self.headings], self.rows
         for k in columns:
