@@ -9,9 +9,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.rapid import interpreter
 from paint_deposition.files.rapid.program import RapidProgram, module_text, read_program
-from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.motion.programmed import GunSwitch, Move
-from robot_arm import TIP_M, urdf
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
 
@@ -46,7 +44,7 @@ def test_the_real_program(shared_data):
     program = read_program(shared_data / 'rapid/ECL_Grey_T_ROB1.mod')
     assert len(program.moves) == 10
     assert program.notes == [
-        'line 13: moveabsj skipped: joint angles need the robot',
+        'line 13: moveabsj skipped: joint angles are no pose',
         'passed over, neither motion nor paint: confl (line 11), syncmoveon (line 12), '
         'syncmoveoff (line 24)',
     ]
@@ -186,7 +184,7 @@ def test_conditions_without_moves_do_no_harm(read):
         (r'MoveL p,v100,fine,tBell\Corr;', r'movel has no option \corr'),
         ('SetDO \\SDelay:=0.1,doGun,1;', 'line 4: setdo of the gun by time is not followed'),
         ('Set doGun;\nWaitDI di,1;', 'line 5: waitdi waits with the gun open'),
-        ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and joint'),
+        ('Set doGun;\nMoveAbsJ [[0],[0]],v1,fine,tBell;', 'moveabsj sprays, and its joint ang'),
         (f'PaintL {target(1)},v100,bdMain,z10,tBell;', 'line 4: paintl takes bdmain beside'),
         ('UseBrushTab a;\nUseBrushTab b;', 'line 5: the brush table b after a: a number would'),
         ('SetBrush 1\\T:=3;', 'line 4: setbrush with t: give one of X, Y and Z'),
@@ -216,16 +214,6 @@ def test_loops_in_loops_end(read, monkeypatch):
     monkeypatch.setattr(interpreter, 'MOST_STATEMENTS', 1000)
     loops = 'FOR i FROM 1 TO 99 DO\nFOR j FROM 1 TO 99 DO\nreg1:=j;\nENDFOR\nENDFOR'
     assert 'line 6: 1000 statements have run; check the loops' in refusal(read, loops)
-
-
-def test_joint_angles_give_the_tip_of_the_robot(read, tmp_path):
-    """The arm at rest, turned by a quarter about its upright axis; the gun may be open."""
-    (tmp_path / 'arm.urdf').write_text(urdf())
-    body = 'Set doGun;\nMoveAbsJ [[90,0,0,0,0,0],[9E9,0,0,0,0,0]],v100,fine,tBell;'
-    (move,) = read(body, robot=Robot.read(tmp_path / 'arm.urdf')).moves
-    x, y, z = TIP_M
-    np.testing.assert_allclose(move.position_m, [-y, x, z], atol=1e-12)
-    assert move.spraying
 
 
 @pytest.mark.parametrize(

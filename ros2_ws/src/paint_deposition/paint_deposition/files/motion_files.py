@@ -72,9 +72,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        robot = _robot(path, source)
-        program = read_program(path, source.gun_signal, source.procedure, robot)
-        recorded = program_trajectory(program)
+        recorded = program_trajectory(read_program(path, source.gun_signal, source.procedure))
     elif is_tool_path(path):
         source.require_kind(path, 'a tool path')
         recorded = read_tool_path(path)
@@ -115,10 +113,8 @@ def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
 
 def holds_joints(path: Path) -> bool:
     """Whether the motion in a file may be that of joints, for which the robot has to be known."""
-    if is_tool_path(path) or is_pose_table(path):
+    if is_tool_path(path) or is_pose_table(path) or is_rapid(path):
         return False
-    if is_rapid(path):
-        return True
     with open_bag(path) as bag:
         return bool(bag.topics_of(JOINT_TYPE))
 

@@ -91,6 +91,8 @@ PLURAL = {
 MOTION_KINDS = {
     'pose_topic': 'bags', 'tf': 'bags', 'state_topic': 'bags and tables', 'rotation': 'tables',
     **dict.fromkeys(('gun_signal', 'procedure'), 'RAPID modules'),
-    **dict.fromkeys(('urdf', 'tip_link', 'base_link'), 'bags, tables and RAPID modules'),
-    **dict.fromkeys(('joint_prefix', 'pose_unit', 'angle_unit'), 'bags and tables'),
+    **dict.fromkeys(
+        ('urdf', 'tip_link', 'base_link', 'joint_prefix', 'pose_unit', 'angle_unit'),
+        'bags and tables',
+    ),
 }  # fmt: skip

@@ -2,14 +2,15 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
 from lark import Token
 
 from paint_deposition.errors import did_you_mean
-from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine, line_of
-from paint_deposition.files.rapid.values import Datum, Unknown, Values
+from paint_deposition.files.rapid.parser import Datum, Instruction, Node, Routine, line_of
+from paint_deposition.files.rapid.values import Unknown, Values
 
 MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
@@ -67,7 +68,7 @@ class Interpreter(Values):
         self.only_options(routine.name, options, optional)
         given = dict(zip(needed, values, strict=True)) | options
         own = {
-            one.name: Datum(one.type, self.value(given[one.name]))
+            one.name: Datum(one.name, one.type, self.value(given[one.name]))
             for one in routine.parameters if one.name in given
         }  # fmt: skip
         caller, result = (self._local, self.source, self.line, self._running), None
@@ -163,8 +164,8 @@ class Interpreter(Values):
         self.line = reference.children[0].line
         self.assign(reference, self.value(node))
 
-    def _declaration(self, *data: Declared) -> None:
-        self._local |= {datum.name: Datum.of(datum) for datum in data}
+    def _declaration(self, *data: Datum) -> None:
+        self._local |= {datum.name: replace(datum) for datum in data}
 
     def _label(self, name: Token) -> None:
         """Only GOTO needs it, which is refused."""
@@ -218,7 +219,7 @@ class Interpreter(Values):
         outer = self._local
         for turn in range(int(turns + 1e-9) + 1 if turns >= 0.0 else 0):
             self._step()
-            self._local = outer | {name: Datum('num', first + turn * step)}
+            self._local = outer | {name: Datum(name, 'num', first + turn * step)}
             self._execute(body)
         self._local = outer
         return None

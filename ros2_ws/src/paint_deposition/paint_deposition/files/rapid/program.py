@@ -5,7 +5,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -20,9 +19,6 @@ from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
 
-if TYPE_CHECKING:
-    from paint_deposition.files.recordings.joint_states import Robot
-
 MODULES = ('.mod', '.prg', '.sys')
 LIST_OF_MODULES = '.pgf'
 
@@ -31,7 +27,6 @@ def read_program(
     path: Path | str,
     gun_signal: str | None = None,
     procedure: str | None = None,
-    robot: 'Robot | None' = None,
 ) -> RapidProgram:
     """Run a RAPID program, and read its moves.
 
@@ -41,8 +36,6 @@ def read_program(
         gun_signal: the digital output that opens the gun; None: the only one set, or SetBrush
             where there are paint moves.
         procedure: where it starts; None: `main`, or the only procedure.
-        robot: gives the TCP for joint angles; without it such moves are left out, and refused
-            with the gun open.
 
     Raises:
         RecordingError: what is no RAPID, what depends on values that only the robot knows, and
@@ -52,7 +45,7 @@ def read_program(
     try:
         modules = [m for file in _files(path) for m in parse_modules(_text(file), str(file))]
         start = _start(modules, procedure, path)
-        painting = Painting(modules, start, gun_signal, robot)
+        painting = Painting(modules, start, gun_signal)
         painting.run(start)
         program = painting.program
         if not program.moves:
