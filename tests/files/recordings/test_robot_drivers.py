@@ -22,7 +22,6 @@ POSITIONS, QUATERNIONS = tip_poses(SWEEP)
 RAIL_M = np.linspace(0.0, 0.6, len(TIMES_S))
 ABB_JOINTS = [f'joint_{k}' for k in range(1, 7)]
 LAG_NS = 12_000_000
-ARRAY = 'geometry_msgs/msg/PoseArray'
 
 
 def abb_urdf(rail: bool) -> str:
@@ -76,9 +75,6 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
                 message = stamped
             elif kind == 'PoseWithCovarianceStamped':
                 message = make['geometry_msgs/msg/PoseWithCovarianceStamped'](head, covered)
-            elif kind == 'PoseArray':
-                other = messages.pose(stamp, -position, quaternion).pose
-                message = make[ARRAY](head, [other, pose])
             elif kind == 'TransformStamped':
                 row = (stamp, frame_id, 'bell', [*position, *quaternion])
                 message = messages.transforms(row).transforms[0]
@@ -160,7 +156,6 @@ DRIVERS = {
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
     'transform': ((poses('/vicon/bell', 'TransformStamped'),), {}, ''),
-    'array': ((poses('/poses', 'PoseArray'),), {'pose_topic': '/poses[1]'}, 'as /poses[0]'),
     'abb_libegm': (egm_log, {}, ''),
     'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
     'abb_motion_program_exec': (
@@ -231,16 +226,14 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
 def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path):
     run = bag(
         tmp_path / 'run', MILLIMETRES, DEGREES, poses('/odom', 'Odometry'),
-        poses('/poses', 'PoseArray'), joints('/slow', ABB_JOINTS, SWEEP, every=50),
+        joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
     found = {source.topic: source for source in summarise(run, 0.25).pose_streams}
     assert {topic: source.unit for topic, source in found.items()} == {
-        '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm', '/poses': '',
+        '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm',
         '/slow': 'rad', '/twice': 'rad',
     }  # fmt: skip
-    assert not found['/poses'].will_do
-    assert '2 poses in a message' in found['/poses'].faults[0]
     assert 'only 5 samples' in found['/slow'].faults[0]
     assert found['/twice'].quality.repeated_samples == 355
     assert found['/twice'].quality.new_rate_hz == pytest.approx(125.0)

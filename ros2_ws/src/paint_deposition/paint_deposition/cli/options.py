@@ -165,8 +165,8 @@ PAINT_MOVES = click.option(
 # How the motion is read and brought to the part: the fields of MotionSource.
 MOTION = (
     click.option('--pose-topic',
-                 help='Poses in the bag; default: its only PoseStamped topic. Of an array: '
-                 '/poses[2]. With --urdf: joint states, several with blanks between them.'),
+                 help='Poses in the bag; default: its only PoseStamped topic. With --urdf: joint '
+                 'states, several with blanks between them.'),
     click.option(
         '--state-topic', '--trigger', 'state_topic',
         help='Trigger of the gun: a topic of AtomizerState or Bool, a number in a field of any '
@@ -185,7 +185,7 @@ MOTION = (
     ),
     click.option(
         '--urdf', type=click.Path(),
-        help='Take the poses from this robot and its joints in a bag, a table or RAPID.',
+        help='Take the poses from this robot and its joints in a bag or a table.',
     ),
     click.option('--tip', '--tip-link', 'tip_link',
                  help='Link of the URDF that is the TCP; default: tool0, else its last link.'),

@@ -83,10 +83,7 @@ class MotionSource(BaseModel, extra='forbid'):
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
-PLURAL = {
-    'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules',
-    'a tool path': 'tool paths',
-}  # fmt: skip
+PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
     'pose_topic': 'bags', 'tf': 'bags', 'state_topic': 'bags and tables', 'rotation': 'tables',

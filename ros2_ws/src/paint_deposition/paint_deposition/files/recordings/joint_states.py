@@ -29,23 +29,20 @@ T = TypeVar('T')
 
 
 @dataclass(frozen=True)
-class JointNotation:
-    """How a recording writes joints: what precedes the URDF's names, and units; None is usual."""
-
-    prefix: str | None = None
-    angle_unit: str | None = None
-    length_unit: str | None = None
-
-
-@dataclass(frozen=True)
 class Robot:
-    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d."""
+    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d.
+
+    A recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
+    angles and lengths in other units than rad and m, where it does not say them itself.
+    """
 
     path: Path
     base: str
     tip: str
     chain: list[Any]
-    recorded_as: JointNotation = JointNotation()
+    joint_prefix: str = ''
+    angle_unit: str | None = None
+    length_unit: str | None = None
 
     @staticmethod
     def read(path: Path, tip: str | None = None, base: str | None = None) -> 'Robot':
@@ -119,7 +116,7 @@ class Robot:
         Case and marks do not count, as in joint1 for joint_1; with ``numbered``, J1 is the first
         joint that moves, if no name is known. Raises RecordingError that names the joints.
         """
-        prefix = _plain(self.recorded_as.prefix or '')
+        prefix = _plain(self.joint_prefix)
         plain = {_plain(name): value for name, value in names.items()}
         found: dict[str, T] = {}
         for joint in self.moving_joints:
@@ -165,7 +162,7 @@ class Robot:
         scales = []
         for joint, column, its in zip(moving, values.T, units or [''] * len(moving), strict=True):
             slides = joint.joint_type == 'prismatic'
-            said = self.recorded_as.length_unit if slides else self.recorded_as.angle_unit
+            said = self.length_unit if slides else self.angle_unit
             known, unit = LENGTHS if slides else ANGLES, its or said
             if unit and unit not in known:
                 wanted = 'm or mm' if slides else 'deg or rad'
