@@ -229,7 +229,7 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
         joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
-    found = {source.topic: source for source in summarise(run, 0.25).pose_streams}
+    found = {source.topic: source for source in summarise(run, 0.25)[1]}
     assert {topic: source.unit for topic, source in found.items()} == {
         '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm',
         '/slow': 'rad', '/twice': 'rad',
@@ -240,7 +240,7 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
     assert found['/odom'].quality.lag_s == pytest.approx(0.012)
     assert (found['/arm_PoseStamped'].frame_id, found['/odom'].frame_id) == ('', 'base_link')
     for source in found.values():
-        if source.will_do:
+        if source.quality:
             words = shlex.split(source.options.replace('ROBOT', str(folder / 'arm.urdf')))
             options = {k[2:].replace('-', '_'): v for k, v in zip(*[iter(words)] * 2, strict=True)}
             ends = read_recording(run, **options).positions_m[[0, -1]]

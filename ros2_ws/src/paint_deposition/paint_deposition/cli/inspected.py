@@ -65,10 +65,10 @@ def mesh_in(path: Path) -> tuple[dict[str, Any], str]:
     from paint_deposition.files.meshes import LARGEST_M
     from paint_deposition.part.points import box_words
 
-    bodies, scale, unit = read_bodies(path), 1.0, ''
+    ((vertices, faces), *_), scale, unit = read_bodies(path), 1.0, ''
     if path.suffix.lower() not in WITH_UNIT:
         unit = 'it has no unit and is taken for metres'
-        largest = float(np.ptp(bodies.vertices, axis=0).max()) if len(bodies.vertices) else 0.0
+        largest = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
         if largest > LARGEST_M:
             scale, unit = 1e-3, (
                 f'it has no unit and looks like millimetres, else it would be {largest:.4g} m '
@@ -78,11 +78,11 @@ def mesh_in(path: Path) -> tuple[dict[str, Any], str]:
     low, high = surface.vertices_m.min(axis=0), surface.vertices_m.max(axis=0)
     area_m2 = float(surface.vertex_areas_m2.sum())
     figures = {
-        'triangles': len(bodies.faces), 'low_m': low.tolist(), 'high_m': high.tolist(),
+        'triangles': len(faces), 'low_m': low.tolist(), 'high_m': high.tolist(),
         'area_m2': area_m2, 'mesh_scale': scale, 'notes': list(surface.notes),
     }  # fmt: skip
     size = ' x '.join(f'{side:.3f}' for side in high - low)
-    what = f'{path.name}: a mesh of {len(bodies.faces)} triangles, {size} m, {area_m2:.3g} m2'
+    what = f'{path.name}: a mesh of {len(faces)} triangles, {size} m, {area_m2:.3g} m2'
     return figures, '\n'.join(
         filter(None, [what, unit, box_words(surface.vertices_m), *surface.notes])
     )

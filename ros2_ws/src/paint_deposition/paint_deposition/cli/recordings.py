@@ -17,7 +17,8 @@ from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
-    from paint_deposition.files.recordings.bag_summary import BagSummary, PoseSource
+    from paint_deposition.files.recordings.bag_files import BagTopic
+    from paint_deposition.files.recordings.bag_summary import PoseSource
     from paint_deposition.motion.stream_quality import StreamQuality
 
 
@@ -80,6 +81,8 @@ def _contents(
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
+    from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+    from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
     from paint_deposition.files.tables.readings import holds_readings
     from paint_deposition.request import validate
@@ -103,9 +106,13 @@ def _contents(
     if is_rapid(path):
         program = read_program(path, **of_program)
         return asdict(program), program_as_text(program)
-    summary = summarise(path, max_pose_gap_s)
-    streams = [source.to_dict() for source in summary.pose_streams]
-    return asdict(summary) | {'pose_streams': streams}, _bag_contents(summary)
+    topics, sources = summarise(path, max_pose_gap_s)
+    triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
+    figures = {
+        'path': str(path), 'topics': [asdict(topic) for topic in topics],
+        'pose_streams': [source.to_dict() for source in sources], 'triggers': triggers,
+    }  # fmt: skip
+    return figures, _bag_contents(path, topics, sources, triggers)
 
 
 def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, str]:
@@ -129,19 +136,21 @@ def _table_contents(poses: pd.Trajectory, max_pose_gap_s: float) -> tuple[dict, 
     return figures, '\n'.join([line, *poses.notes, _stream_words(quality)])
 
 
-def _bag_contents(summary: BagSummary) -> str:
+def _bag_contents(
+    path: Path, topics: list[BagTopic], sources: list[PoseSource], triggers: list[str]
+) -> str:
     from paint_deposition.files.recordings.message_definitions import TF_TYPES
 
-    lines = [summary.path]
-    width = max((len(topic.name) for topic in summary.topics), default=0)
-    lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
-    for source in summary.pose_streams:
+    lines = [str(path)]
+    width = max((len(topic.name) for topic in topics), default=0)
+    lines += [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in topics]
+    for source in sources:
         lines += _source_lines(source)
-    if not summary.pose_streams:
+    if not sources:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
-    if {topic.type for topic in summary.topics} & {*TF_TYPES}:
+    if {topic.type for topic in topics} & {*TF_TYPES}:
         lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
-    lines.append(f'triggers: {" ".join(summary.triggers) or "none"}')
+    lines.append(f'triggers: {" ".join(triggers) or "none"}')
     return '\n'.join(lines)
 
 

@@ -91,7 +91,8 @@ class Gun(Interpreter):
 
     def do_triggio(self, i: Instruction) -> None:
         """Note in the triggdata what of the gun it switches, and to what."""
-        what, value = self.commanded(i), None
+        what = self.commanded(i)
+        value: Any = None
         if what == 'gun':
             if i.options.get('time'):
                 self.fail(f'{i.name} by time is not followed; give a distance')
