@@ -99,28 +99,6 @@ def bag(path, *streams):
     return write_bag(path, sorted(entries, key=lambda entry: entry[1]), 'mcap', messages)
 
 
-def egm_log(path):
-    """What ``EGMLogger`` writes: ms, mm and degrees; measured, planned and asked for."""
-    groups = {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}
-    columns = {'TIMESTAMP': np.round(1e3 * TIMES_S)}
-    quaternion = QUATERNIONS[:, [3, 0, 1, 2]]
-    for group, scale in groups.items():
-        for place in ('POS', 'VEL'):
-            for axis in ('RJ', 'EJ'):
-                own = np.degrees(SWEEP) if (place, axis) == ('POS', 'RJ') else 0.0 * SWEEP
-                columns |= {f'{group}_{place}_{axis}{k + 1}': scale * own[:, k] for k in range(6)}
-            if place == 'VEL':
-                columns |= {
-                    f'{group}_POS_{a}': scale * 1e3 * POSITIONS[:, k] for k, a in enumerate('XYZ')
-                }
-                columns |= {f'{group}_EULER_{a}': 0.0 * TIMES_S for a in 'XYZ'}
-                columns |= {f'{group}_QUAT_U{k}': scale * quaternion[:, k] for k in range(4)}
-                columns |= {
-                    f'{group}_VEL_{kind}{a}': 0.0 * TIMES_S for kind in 'LA' for a in 'XYZ'
-                }
-    return table(path, columns)
-
-
 def program_log(path):
     """What abb_motion_program_exec logs: seconds, the command's number, degrees."""
     columns = {'timestamp': TIMES_S, 'cmdnum': 0.0 * TIMES_S + 2}
@@ -156,8 +134,6 @@ DRIVERS = {
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
     'transform': ((poses('/vicon/bell', 'TransformStamped'),), {}, ''),
-    'abb_libegm': (egm_log, {}, ''),
-    'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
     'abb_motion_program_exec': (
         program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'
     ),

@@ -1,7 +1,7 @@
 """The coats of a campaign's experiment: which guns laid each, and what its readings are of."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,16 +9,13 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.motion_source import MotionSource, Number, Text
-from paint_deposition.film.common_film import TOTAL, Coats, WetFilms
-from paint_deposition.inference.readings.readings import Readings
+from paint_deposition.files.motion_source import MotionSource, Text
+from paint_deposition.film.common_film import Coats, WetFilms
 from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.request import validate
 
-# Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.
-TOOTH_UM, FEWEST_TEETH = 5.0, 3
 # A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 
@@ -38,9 +35,6 @@ class PaintJob(_Gun):
     name: Name = ''
     guns: list[Any] = Field(
         [], description='a list of guns that painted together, each with its motion'
-    )
-    solids: Number | None = Field(
-        None, gt=0.0, le=1.0, description='share of solids in the volume of the wet paint [1]'
     )
 
 
@@ -78,7 +72,6 @@ class LaidCoats:
 
     coats: Coats
     guns: tuple[GunMotionFile, ...]
-    solids: tuple[float | None, ...]  # (C,) of each coat, where known
 
     @staticmethod
     def of(folder: Path, entry: PaintJob, written: Sequence[Any]) -> 'LaidCoats':
@@ -106,8 +99,7 @@ class LaidCoats:
                 guns.append(_motion(folder, (gun, coat, entry), whose))
             names += [coat.name] * len(given) * bool(coats)
         on_wet = {coat.name for coat in coats if coat.wet_on_wet}
-        solids = tuple(entry.solids if coat.solids is None else coat.solids for coat in jobs)
-        return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns), solids)
+        return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns))
 
     def painted(self, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
         """The path of the guns that laid a layer, and the wet films that it is the sum of."""
@@ -120,57 +112,6 @@ class LaidCoats:
             (sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films
         )
         return SprayPath.of_guns([paths[k] for k in chosen]), steps
-
-    def dry(self, readings: Readings, layer: str, wet: bool, under_um: float) -> Readings:
-        """Readings of a layer as its dry film alone.
-
-        Args:
-            wet: whether they were taken wet. Where all are teeth of a comb, the film is as likely
-                anywhere between the tooth that is read and the next.
-            under_um: film that was there before the first coat, part of all total readings [um].
-
-        Raises:
-            ReadingsError: taken wet, of coats whose solids are not known or differ.
-        """
-        film_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
-        if wet:
-            share = self._solids(layer)
-            if (step_um := _comb_step_um(film_um)) and np.isnan(sigma_um).all():
-                film_um, sigma_um = (
-                    film_um + 0.5 * step_um,
-                    np.full(len(film_um), step_um / 12**0.5),
-                )
-                words += f'; a comb in steps of {step_um:g} µm, half of which is added'
-            film_um, sigma_um = share * film_um, share * sigma_um
-            words += f'; wet film, times {share:g} solids'
-        if under_um and layer == TOTAL:
-            film_um, words = film_um - under_um, f'{words}; less {under_um:g} µm below'
-        return replace(
-            readings, thickness_um=film_um, sigma_um=sigma_um,
-            understood=f'{readings.understood}{words}',
-            layer=readings.layer if self.coats.names == ('',) else np.array(layer),
-        )  # fmt: skip
-
-    def _solids(self, layer: str) -> float:
-        coats = layer.split('+') if layer != TOTAL else self.coats.names
-        known = {self.solids[self.coats.names.index(coat)] for coat in coats}
-        share = known.pop()
-        if share is None or known:
-            of = 'the paint' if self.coats.names == ('',) else f"layer '{layer}'"
-            what = f'of {of} differ' if known else f'of {of} are not said'
-            raise ReadingsError(
-                f'the readings are wet, and the solids {what}; give each coat its solids, 0.45 '
-                'say, and name the one that was read in the column layer'
-            )
-        return share
-
-
-def _comb_step_um(thickness_um: np.ndarray) -> float:
-    """The least step between the teeth of a comb [um], 0 where the readings are no teeth."""
-    teeth = np.unique(thickness_um)
-    if len(teeth) < FEWEST_TEETH or np.any(teeth % TOOTH_UM):
-        return 0.0
-    return float(np.diff(teeth).min())
 
 
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:

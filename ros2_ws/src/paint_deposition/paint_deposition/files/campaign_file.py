@@ -90,9 +90,6 @@ class _Entry(PaintJob, OnePart, _Band):
     coats: list[Any] = Field(
         [], description='a list of coats in the order of painting, each with its name'
     )
-    wet: bool = Field(
-        False, description='true or false, whether the readings are of wet film, which solids dry'
-    )
     under_um: Number = Field(
         0.0, ge=0.0, description='film that was there before, part of all total readings [um]'
     )
@@ -200,7 +197,13 @@ def _read_experiments(
     made = []
     for layer, rows in laid.coats.by_layer(readings.layer).items():
         path, films = laid.painted(layer, paths)
-        of_layer = laid.dry(readings.select(rows), layer, entry.wet, entry.under_um)
+        of_layer = readings.select(rows)
+        if entry.under_um and layer == TOTAL:
+            film_um = of_layer.thickness_um - entry.under_um
+            understood = f'{readings.understood}; less {entry.under_um:g} µm below'
+            of_layer = replace(of_layer, thickness_um=film_um, understood=understood)
+        if laid.coats.names != ('',):
+            of_layer = replace(of_layer, layer=np.array(layer))
         experiment = Experiment.of(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
             surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,

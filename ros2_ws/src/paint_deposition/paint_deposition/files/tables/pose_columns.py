@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from pathlib import Path
@@ -38,14 +38,6 @@ ROTATED = {
     **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
     **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
 }
-# The columns of a log of abb_libegm; others of its kinds hold nothing more of the motion.
-EGM_LOG = {
-    'TIMESTAMP': 'time [ms]',
-    **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
-    **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
-    **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
-}
-EGM_KINDS = ('R_FB_', 'R_PL_', 'S_REF_')
 
 
 @dataclass
@@ -69,7 +61,7 @@ class PoseTable(Table):
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
                 'joints are read with --urdf'
             )
-        headings = usual_headings(headings_in(sheet.rows[header]))
+        headings = headings_in(sheet.rows[header])
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
@@ -165,7 +157,6 @@ def _by_text(headings: Sequence[Heading]) -> dict[str, int]:
 
 
 def _known(headings: list[Heading], robot: 'Robot | None') -> int:
-    headings = usual_headings(headings)
     names = {column_name(heading) for heading in headings}
     if robot is None:
         return len(names - {''}) if {*POSITION} <= names else 0
@@ -173,23 +164,6 @@ def _known(headings: list[Heading], robot: 'Robot | None') -> int:
         return len(robot.recorded_joints(_by_text(headings), '', numbered=True))
     except RecordingError:
         return 0
-
-
-def is_egm_log(headings: Sequence[Heading]) -> bool:
-    """Whether these are the columns of a log of abb_libegm."""
-    return not {'R_FB_POS_X', 'R_FB_POS_RJ1'}.isdisjoint(heading.text for heading in headings)
-
-
-def usual_headings(headings: Sequence[Heading]) -> list[Heading]:
-    """The headings, with the usual words and units for those of a log of abb_libegm."""
-    if not is_egm_log(headings):
-        return [*headings]
-    usual = []
-    for heading in headings:
-        of_others = '' if heading.text.startswith(EGM_KINDS) else heading.text
-        words = Heading.of(EGM_LOG.get(heading.text, of_others))
-        usual.append(replace(words, text=heading.text))
-    return usual
 
 
 EULER = ('ex', 'ey', 'ez')

@@ -15,9 +15,7 @@ from paint_deposition.files.tables.pose_columns import (
     ROTATION_VECTOR,
     PoseTable,
     column_name,
-    is_egm_log,
     read_rotations,
-    usual_headings,
 )
 from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.eq1_pattern import MOST
@@ -47,7 +45,7 @@ def may_hold_poses(path: Path) -> bool:
     names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
 
     def known(headings: list[Heading]) -> int:
-        return sum(column_name(heading) in names for heading in usual_headings(headings))
+        return sum(column_name(heading) in names for heading in headings)
 
     return find_table(path, RecordingError, known)[1] is not None
 
@@ -113,12 +111,10 @@ def _motion(
         return replace(
             programmed, frame_id=poses.frame_id, notes=(PROGRAMMED, note), warnings=warnings
         )
-    notes = [f'{note}; {table.written([time or 0])} in {unit}']
-    if is_egm_log(table.headings):
-        notes.append('a log of abb_libegm: what the robot measured (R_FB)')
+    notes = (f'{note}; {table.written([time or 0])} in {unit}',)
     values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
     faults = StreamQuality.of(stamps, values).faults(table.path.name)
-    poses = replace(poses, notes=tuple(notes), warnings=(*warnings, *faults))
+    poses = replace(poses, notes=notes, warnings=(*warnings, *faults))
     if flows is None:
         return poses
     return replace(

@@ -193,7 +193,7 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
         remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
         remedy += ', or say unit: {thickness: ...} and name it'
     elif wet := [h.text for h in headings if h.words and WET.match(' '.join(h.words))]:
-        remedy = f"'{wet[0]}' is a wet film: say wet: true, give its solids, and name it"
+        remedy = f"'{wet[0]}' is a wet film: multiply it by the solids of the paint, and name it"
     elif likely:
         remedy = f'it may be {" or ".join(repr(heading.text) for heading in likely)}: name one'
     return (
