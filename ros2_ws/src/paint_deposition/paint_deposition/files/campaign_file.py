@@ -210,17 +210,9 @@ def _read_experiments(
         )  # fmt: skip
         band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
         experiment = replace(experiment, layer=layer, target=band if band[0] else None)
-        # What is wanted is the whole film.
-        made.append(_with_zones(experiment, entry, zones) if layer == TOTAL else experiment)
+        if zones and layer == TOTAL:  # what is wanted is the whole film
+            of_part = read_zones(zones, files['mesh'], entry.mesh_scale, entry.body)
+            its_files = experiment.files | {'zones': str(zones)}
+            experiment = replace(experiment, zones=of_part.on(surface), files=its_files)
+        made.append(experiment)
     return made
-
-
-def _with_zones(experiment: Experiment, part: OnePart, file: str | Path | None) -> Experiment:
-    if not file:
-        return experiment
-    zones = read_zones(file, experiment.files['mesh'], part.mesh_scale, part.body)
-    return replace(
-        experiment,
-        zones=zones.on(experiment.surface),
-        files=experiment.files | {'zones': str(file)},
-    )

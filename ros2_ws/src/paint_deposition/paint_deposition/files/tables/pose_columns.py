@@ -166,12 +166,15 @@ def _known(headings: list[Heading], robot: 'Robot | None') -> int:
         return 0
 
 
-EULER = ('ex', 'ey', 'ez')
-# Angles in the order in which a convention takes them, and the maker who calls them so.
-IN_ORDER = {
-    ('a', 'b', 'c'): 'kuka', ('w', 'p', 'r'): 'fanuc', ('alpha', 'beta', 'gamma'): '',
-    ('phi', 'theta', 'psi'): '', ('e1', 'e2', 'e3'): '', ('o', 'a', 't'): '', EULER: '',
-}  # fmt: skip
+# Columns of angles, what they are unless the user says it ('' for not known), and whether each is
+# that of an axis, else they are in the order in which a convention takes them.
+ANGLE_COLUMNS = (
+    (ROTATION_VECTOR, 'rotvec', True), (ROLL_PITCH_YAW, 'rpy', True),
+    (('ex', 'ey', 'ez'), '', True), (('a', 'b', 'c'), 'kuka', False),
+    (('w', 'p', 'r'), 'fanuc', False), (('alpha', 'beta', 'gamma'), '', False),
+    (('phi', 'theta', 'psi'), '', False), (('e1', 'e2', 'e3'), '', False),
+    (('o', 'a', 't'), '', False),
+)  # fmt: skip
 # Makers' conventions in the letters of scipy: capital letters turn about the axes of the tool as
 # it goes, small ones about those of the world.
 CONVENTIONS = {
@@ -207,8 +210,12 @@ def read_rotations(
                 note = f'quaternion {table.written(columns)} ({order})'
                 return table.values(columns), note
     columns, by_axis, convention = _angle_columns(table, rotation)
-    written = table.written(columns)
-    unit = _unit(table, columns, convention, angle_unit)
+    written, units = table.written(columns), table.units(columns)
+    if units not in ({'deg'}, {'rad'}, {''}):
+        found = ', '.join(sorted(units))
+        raise RecordingError(f'{written} in {found}; give all in deg or in rad')
+    of_maker = 'deg' if convention in {*CONVENTIONS} - {'rpy'} else 'rad'
+    unit = units.pop() or angle_unit or of_maker
     angles = table.values(columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
     if unit == 'rad' and largest > 2.0 * np.pi + 1e-6:
@@ -228,38 +235,17 @@ def read_rotations(
 
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
-    if columns := table.find_all(ROTATION_VECTOR):
-        if rotation is None and 'deg' in table.units(columns):
-            raise RecordingError(
-                f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
-                f'give --rotation: {ROTATION_WORDS}'
-            )
-        return columns, True, rotation or ROTVEC
-    if columns := table.find_all(ROLL_PITCH_YAW):
-        return columns, True, rotation or 'rpy'
-    for names, usual in IN_ORDER.items():
+    for names, usual, by_axis in ANGLE_COLUMNS:
         if columns := table.find_all(names):
-            if not (rotation or usual):
+            doubt = '' if usual else 'are Euler angles of an unknown convention'
+            if usual == ROTVEC and 'deg' in table.units(columns):
+                doubt = 'in degrees may be Euler angles or a rotation vector'
+            if doubt and not rotation:
                 raise RecordingError(
-                    f'{table.written(columns)} are Euler angles of an unknown convention; give '
-                    f'--rotation: {ROTATION_WORDS}'
+                    f'{table.written(columns)} {doubt}; give --rotation: {ROTATION_WORDS}'
                 )
-            return columns, names == EULER, rotation or usual
+            return columns, by_axis, rotation or usual
     raise RecordingError(
         f'no orientation among the columns {table.written(())}; give qx qy qz qw, rx ry rz '
         '(rotation vector) or roll pitch yaw'
     )
-
-
-def _unit(
-    table: PoseTable, columns: Sequence[int], convention: str, angle_unit: str | None
-) -> str:
-    """The unit of the angles: their headings', else the one given, else their maker's."""
-    units = table.units(columns)
-    if units in ({'deg'}, {'rad'}):
-        return units.pop()
-    if units != {''}:
-        found = ', '.join(sorted(units))
-        raise RecordingError(f'{table.written(columns)} in {found}; give all in deg or in rad')
-    of_maker = 'deg' if convention in ('kuka', 'abb', 'fanuc', 'staubli', 'kawasaki') else 'rad'
-    return angle_unit or of_maker
