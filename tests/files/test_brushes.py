@@ -13,8 +13,8 @@ from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.files.rapid.program import module_text, program_trajectory, read_program
-from paint_deposition.motion.programmed import GunSwitch, Move
+from paint_deposition.files.rapid.program import module_text, read_program
+from paint_deposition.motion.programmed import Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
 HEAD = 'x_m,y_m,z_m,qx,qy,qz,qw'
@@ -106,36 +106,6 @@ def test_a_written_program_switches_brushes_and_reads_back(tmp_path: Path):
     assert on == [(flow, brush) for flow, brush in guns if flow]
     # A program without numbers does without the output.
     assert 'goBrush' not in module_text(moves((0, 0), (1, 0)))
-
-
-def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
-    axes = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
-    target = [f'[[{100 * k},0,0],[1,0,0,0],{axes}]' for k in range(6)]
-    path = tmp_path / 'paint.mod'
-    path.write_text(
-        'MODULE Paint\nPROC main()\n'
-        rf"""
-        PaintL {target[0]},v600,z50,tBell;
-        SetBrush 3;
-        PaintL {target[1]},v600,z50,tBell;
-        SetBrush 5\X:=150;
-        PaintL {target[2]},v600,z50,tBell;
-        SetBrush 0;
-        PaintL {target[3]},v600,z50,tBell;
-        SetGO goBrush,7;
-        PaintL {target[4]},v600,z50,tBell;
-        """
-        'ENDPROC\nENDMODULE\n'
-    )
-    program = read_program(path)
-    assert [m.brush for m in program.moves if m.spraying] == [0, 3, 3, 7]
-    assert program.moves[2].switches == (GunSwitch(0.05, True, True, 5),)
-    trajectory = program_trajectory(program)
-    changes = [(round(ns * 0.6e-6), brush) for ns, _, brush in trajectory.triggers]
-    assert changes == [(0, 3), (100, 3), (150, 5), (200, 0), (300, 7)]
-    path.write_text(path.read_text().replace('SetBrush 3', 'SetBrush 2.5'))
-    with pytest.raises(RecordingError, match=r'line 5: setbrush takes the number of a brush, not'):
-        read_program(path)
 
 
 def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: Path):

@@ -220,7 +220,7 @@ def test_loops_in_loops_end(read, monkeypatch):
     ('how', 'refused', 'noted'),
     [
         ('tBell\\WObj:=wElse', 'it sprays in frames whose relation is not known', 'are left out'),
-        ('tOther', 'it sprays with', 'are taken as those'),
+        ('tOther', 'it sprays with', 'are left out'),
     ],
 )
 def test_paint_in_two_frames_or_with_two_tools_is_refused(read, how, refused, noted):
@@ -281,6 +281,7 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
         (f'MoveL {target("1e400")},v100,z10,tool0;', '', 'is no position [x, y'),
         ('n:=1/0;', 'VAR num n;', 'line 4: division by zero'),
         ('SetBrush;', '', 'setbrush needs a number'),
+        ('SetBrush 2.5;', '', 'line 4: setbrush takes the number of a brush, not 2.5'),
         ('TriggIO t\\DOp:=doGun;', 'VAR triggdata t;', 'triggio needs a number'),
         (f'MoveL {target(0)},v100\\V:=[1],z10,tool0;', '', 'speed is [1.0]; a number expected'),
         (f'MoveL {target(0)},v100,z1,tool0;MoveL {target(9)},v100\\T:=0,z1,tool0;', '',

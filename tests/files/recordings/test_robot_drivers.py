@@ -123,7 +123,7 @@ BOTH = (EGM, joints('/joint_states', ABB_JOINTS, SWEEP, every=5))
 # What was recorded, the options that read it, and what is said without the last of them.
 DRIVERS = {
     'abb_ros2': ((EGM,), {'urdf': 'arm'}, 'give urdf'),
-    'prefix': ((PREFIXED,), {'urdf': 'arm', 'joint_prefix': 'irb_'}, 'give --joint-prefix irb_'),
+    'prefix': ((PREFIXED,), {'urdf': 'arm', 'joint_prefix': 'irb_'}, 'give --joint-prefix'),
     'degrees': ((DEGREES,), {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'),
     'rail': ((EGM, RAIL), {'urdf': 'railed'}, 'give urdf'),
     'rail in mm': ((EGM, RAIL_MM), {'urdf': 'railed', 'pose_unit': 'mm'}, ''),

@@ -32,7 +32,6 @@ class Painting(Gun):
 
     def __init__(self, modules: list[Module], start: Routine, signal: str | None) -> None:
         super().__init__(modules, start, signal)
-        self.tools: dict[str, Frame | None] = {}  # frame of each tool on the flange [mm], if known
         # Name of the frame and pose of the TCP in it [mm], None where it is not known.
         self._at: tuple[str, Frame] | None = None
         self._displacement = HOME
@@ -175,12 +174,9 @@ class Painting(Gun):
     def _tool(self, node: object) -> str:
         value, name = self.value(node), name_of(node)
         if isinstance(value, Unknown):
-            self.tools[value.name] = None
             return value.name
-        held, tool_frame, _ = self._record(value, 'tooldata')
-        if held is False:
+        if self._record(value, 'tooldata')[0] is False:
             self.fail(f'tool {name} stands still; only tools the robot holds are read')
-        self.tools[name] = self._frame(tool_frame)
         return name
 
     def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:

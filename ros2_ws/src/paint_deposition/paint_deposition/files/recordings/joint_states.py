@@ -1,7 +1,7 @@
 """Forward kinematics of recorded joint states, by the URDF of the robot."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -135,23 +135,10 @@ class Robot:
         if missing or not found:
             raise RecordingError(
                 f'{where} has nothing of {" ".join(missing) or "any joint"} of {self.path.name}; '
-                f'its joints: {" ".join(sorted(names)) or "none"}{self._prefix_hint(names)}'
+                f'its joints: {" ".join(sorted(names)) or "none"}; where they have a prefix, give '
+                '--joint-prefix'
             )
         return found
-
-    def _prefix_hint(self, names: Iterable[str]) -> str:
-        """The prefix that would do, for a message."""
-        joints = self.moving_joints
-        pairs = [(name, joint) for name in names for joint in joints]
-        pairs += [(joint, name) for name, joint in pairs]
-        for long, short in pairs:
-            prefix = long.removesuffix(short)
-            if prefix != long and (
-                {prefix + joint for joint in joints} <= {*names}
-                or {prefix + name for name in names} >= {*joints}
-            ):
-                return f'; give --joint-prefix {prefix}'
-        return ''
 
     def in_si(self, values: np.ndarray, where: str, units: Sequence[str] = ()) -> np.ndarray:
         """Recorded values (N, J) of the moving joints in rad and m; '' is a unit that is not said.
