@@ -4,7 +4,6 @@ Each holds 21.5, 22.5, 24 and 19.5 um at the points P1 to P4 of a list, in that 
 says otherwise. The layouts of the makers follow their manuals.
 """
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -26,12 +25,6 @@ COATMASTER_ROWS = [
     STATES.format('a3', 'door', 3, 0, 'NOK', 'NOK', 'fit failed'),
     STATES.format('a4', 'door', 4, 19.5, 'OK', 'OK', ''),
 ]
-COATMASTER_JSON = json.dumps({
-    'instrument': 'Flex',
-    'results': [
-        dict(zip(COATMASTER.split(','), row.split(','), strict=True)) for row in COATMASTER_ROWS
-    ],
-})  # fmt: skip
 BYK = 'Checkzone;No.;Gloss;Thickness [µm]\n' + ''.join(
     f'{zone};{number};90;{film}\n'
     for zone, number, film in zip('AABB', '1212', ('21,5', '22,5', '24', '19,5'), strict=True)
@@ -47,10 +40,9 @@ JAPANESE = '箇所名,測定値1,測定値2,平均値\nP1,21.5,21.7,21.6\nP2,22.
 
 # The file, its content, the films of each row (or FILMS_UM), and their points (or all in order).
 CASES: dict[str, tuple] = {
-    'coatmaster Flex, CSV or JSON': (
+    'coatmaster Flex': (
         'f.csv', '\n'.join([COATMASTER, *COATMASTER_ROWS]), '21.5 22.5 19.5', 'P1 P2 P4',
     ),
-    'coatmaster Flex, JSON': ('f.json', COATMASTER_JSON, '21.5 22.5 19.5', 'P1 P2 P4'),
     'BYK auto-chart': ('f.csv', BYK),
     'DeFelsko PosiTector, Value': ('f.csv', POSITECTOR),
     'DeFelsko PosiTector, Thickness': (

@@ -90,8 +90,6 @@ def _contents(
     source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         return mesh_in(path)
-    if path.suffix.lower() == '.json':
-        return readings_in(path, points_file)
     if is_pose_table(path) and (points_file or holds_readings(path) or not may_hold_poses(path)):
         return readings_in(path, points_file)
     if is_pose_table(path):

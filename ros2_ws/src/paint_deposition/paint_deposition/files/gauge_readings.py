@@ -39,11 +39,11 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT, JSON, Parquet, a workbook, or a folder or zip. The project's own
-            columns are ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
-            ``group``, ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings,
-            and the layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one
-            place are repeats.
+        path: CSV, TSV, TXT or a workbook. The project's own columns are
+            ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
+            ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings, and the
+            layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one place
+            are repeats.
         points: file of the measuring points (label, x, y, z) that readings name.
         layout: what the file does not say itself.
         surface: the part, for points that are given on its face.

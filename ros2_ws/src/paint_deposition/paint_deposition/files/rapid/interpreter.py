@@ -122,8 +122,6 @@ class Interpreter(Values):
 
     def _instruction(self, i: Instruction) -> None:
         self.line = i.line
-        options = {name: self._option(node) for name, node in i.options.items()}
-        i = i._replace(options={name: at for name, at in options.items() if at is not None})
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
         elif i.name == 'return':
@@ -137,13 +135,6 @@ class Interpreter(Values):
             self.assign(i.values[0], before + added)
         elif not self.act(i):
             self._pass_over(i)
-
-    def _option(self, node: Any) -> Any:
-        """An option; None for a conditional one, V?v, of a parameter that is not given."""
-        if isinstance(node, Node) and node.rule == 'conditional':
-            (name,) = node.children
-            return Node('reference', [name]) if name in self._local else None
-        return node
 
     def _pass_over(self, i: Instruction) -> None:
         if i.name not in PASSED_OVER:

@@ -62,7 +62,7 @@ class GaugeFormat:
 GOOD = ('', 'ok')
 FORMATS = (
     GaugeFormat(
-        'coatmaster Flex, CSV or JSON', ('fitstate', 'snrstate', 'evaluatestate'),
+        'coatmaster Flex', ('fitstate', 'snrstate', 'evaluatestate'),
         {'thickness': 'thickness', 'point': 'sampleid'}, ('id', 'configid', 'fit', 'snr'),
         {'fitstate': GOOD, 'snrstate': GOOD, 'evaluatestate': GOOD,
          'error': (*GOOD, '0', 'none', 'null', 'no error')},
@@ -87,12 +87,6 @@ STATISTIC = re.compile(
     r'(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
     r'anzahl|sum|total|moyenne|ecart|n|s|x|平均\w*|標準偏差|最大\w*|最小\w*)\b'
 )
-# What makes a thickness another figure than a reading of it.
-NO_READING = {
-    'nominal', 'nom', 'soll', 'cad', 'design', 'ziel', 'target', 'min', 'max', 'minimum',
-    'maximum', 'std', 'sd', 'sigma', 'streuung', 'toleranz', 'tolerance', 'abweichung',
-    'deviation', 'differenz', 'difference', 'nass', 'wet', 'fehler', 'error',
-}  # fmt: skip
 # Films before anything evaporates, as a comb shows them, and words that end as a thickness does.
 WET = re.compile(r'(wet|wft|nass)')
 OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')

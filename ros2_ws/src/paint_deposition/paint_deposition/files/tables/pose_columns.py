@@ -73,7 +73,6 @@ class PoseTable(Table):
             if any(cell != '' for cell in row[len(headings) :]):
                 table.add_width_error(k)
         table.refuse_errors()
-        table = table.without_units_in_cells(range(len(headings)))
         if not sheet.form.startswith('commas'):
             table = table.with_decimal(range(len(headings)), certain=False)
         return table

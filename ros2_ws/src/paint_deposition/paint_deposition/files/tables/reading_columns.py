@@ -11,7 +11,6 @@ from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
     FORMATS,
     LAYERS,
-    NO_READING,
     OTHER_DICKEN,
     OWN,
     WET,
@@ -99,8 +98,7 @@ def _known_columns(headings: list[Heading]) -> dict[str, list[int]]:
     layers = [k for k, heading in enumerate(headings) if _layer(heading)]
     if len(layers) > 1 and 'thickness' not in at:
         _assign(at, 'thickness', layers)
-    also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
-    return at if 'thickness' in at or not also else at | {'thickness': also}
+    return at
 
 
 def _assign(at: dict[str, list[int]], quantity: str, columns: list[int]) -> None:
@@ -155,18 +153,6 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
     if dicke or known == 'thickness':
         return 'thickness' if _is_of_film(heading) else None
     return known
-
-
-def _begins_as_thickness(heading: Heading) -> bool:
-    """'Schichtdicke Klarlack [µm]', and no target or statistic such as 'DFT max [µm]'.
-
-    The unit ends it: more behind that is a remark.
-    """
-    if not (heading.unit and heading.text.endswith((']', ')'))) or {*heading.words} & NO_READING:
-        return False
-    begins = [heading.words[:count] for count in (1, 2) if heading.words]
-    named = [words for words in begins if words[-1].endswith(('dicke', 'dft', 'thickness'))]
-    return bool(named) and _quantity(replace(heading, words=named[0])) == 'thickness'
 
 
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:

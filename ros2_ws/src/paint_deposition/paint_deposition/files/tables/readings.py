@@ -71,10 +71,10 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells: their unit in the heading, and n/a for those that are no reading.
+        # The cells, with n/a for those that are no reading.
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
-        table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
+        table = table.with_decimal(numeric, layout.decimal)
         failed = table._mark_failed() if films else ''
         if films and layout.zero == 'missing':
             table = table.without(thick, lambda _, cell: table.is_zero(cell))

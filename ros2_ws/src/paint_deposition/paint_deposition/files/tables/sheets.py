@@ -1,7 +1,6 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
-import json
 import re
 import zipfile
 import zlib
@@ -28,7 +27,7 @@ XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
 ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV or TXT, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -64,10 +63,11 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
-        texts = _decoded(content)
-        if content.lstrip()[:1] in (b'[', b'{') and (records := _records(texts[0][0])):
-            return [records]
-        return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
+        return [
+            sheet
+            for text, encoding in _decoded(content)
+            for sheet in _sheets_of_text(text, encoding)
+        ]
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
@@ -95,24 +95,6 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
     if not found:
         raise ValueError('text')
     return found
-
-
-def _records(text: str) -> Sheet | None:
-    """The first list of records in JSON as a table, what stands beside it above; else None."""
-    try:
-        found = json.loads(text, parse_int=float)
-    except (ValueError, RecursionError):
-        return None
-    above = list[list[Cell]]()
-    while isinstance(found, dict):
-        above += [[_cell(key), _cell(value)] for key, value in found.items()]
-        nested = (value for value in found.values() if isinstance(value, dict | list))
-        found = next(nested, None)
-    records = [one for one in found or () if isinstance(one, dict)]
-    keys = list(dict.fromkeys(key for record in records for key in record))
-    rows = [[_cell(record.get(key)) for key in keys] for record in records]
-    headings = [_cell(key) for key in keys]
-    return Sheet.of(enumerate([*above, headings, *rows], 1), 'JSON') if records else None
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
@@ -197,8 +179,6 @@ def _cells_of_open_document(content: bytes) -> int:
 def _cell(value: object) -> Cell:
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
-    if value is None or isinstance(value, dict | list):
-        return ''
     text = ' '.join(str(value).strip().splitlines())
     return text[1:].strip() if text[:1] == "'" and FORMULA.match(text[1:]) else text
 

@@ -9,12 +9,11 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
+from paint_deposition.files.tables.headings import Heading
 from paint_deposition.files.tables.sheets import (
     Cell,
     cell_at,
     is_nothing,
-    is_value,
     text_of,
 )
 
@@ -73,7 +72,11 @@ class Table:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
                 wanted += ', or n/a where there is none' if may_be_empty else ''
-                wanted += '; write the one unit in the heading' if _behind(cell) else ''
+                wanted += (
+                    '; write the one unit in the heading'
+                    if NUMBER_AND_MORE.fullmatch(text_of(cell))
+                    else ''
+                )
                 self.add_error(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
                 self.add_error(index, f'{name} is {cell}; expected a finite number')
@@ -139,31 +142,6 @@ class Table:
         """Whether a cell is the number 0."""
         return self._number(cell) == 0.0
 
-    def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
-        """The table with the units behind all numbers of a column in its heading instead.
-
-        Units that differ, also from the heading's, stay where they are, and are errors there.
-        """
-        headings, rows = [*self.headings], self.rows
-        for k in columns:
-            if not any(_behind(cell_at(row, k)) for row in rows[:MOST_LINES_ABOVE]):
-                continue
-            split = [_behind(cell_at(row, k)) for row in rows]
-            bare = any(
-                not s and is_value(cell_at(row, k)) for s, row in zip(split, rows, strict=True)
-            )
-            units = [unit_of(found[2]) for found in split if found]
-            all_units = {*units, headings[k].unit or ('' if bare else units[0])}
-            if len(all_units) > 1 or units[0] not in UNITS:
-                continue
-            text = headings[k].text if headings[k].unit else f'{headings[k].text} [{units[0]}]'
-            headings[k] = replace(headings[k], text=text, unit=units[0])
-            rows = [
-                [*row[:k], found[1], *row[k + 1 :]] if found else row
-                for row, found in zip(rows, split, strict=True)
-            ]
-        return replace(self, headings=headings, rows=rows)
-
     def with_decimal(
         self: Kind, columns: Iterable[int], given: str = '', certain: bool = True
     ) -> Kind:
@@ -197,8 +175,3 @@ class Table:
             raise self.error(doubt)
         form = self.form + (', decimal comma' if mark == ',' else '')
         return replace(self, decimal=mark, form=form)
-
-
-def _behind(cell: Cell) -> re.Match | None:
-    """A number and what stands behind it, such as its unit."""
-    return None if isinstance(cell, float) else NUMBER_AND_MORE.fullmatch(cell)
