@@ -66,52 +66,48 @@ class GunMotionFile:
         return path.with_(brush=np.full(len(path), self.brush))
 
 
-@dataclass(frozen=True)
-class LaidCoats:
-    """The coats of an experiment, with their guns in the order of painting."""
+def laid_coats(
+    folder: Path, entry: PaintJob, written: Sequence[Any]
+) -> tuple[Coats, list[GunMotionFile]]:
+    """The coats that an experiment lists, else the one that it is, and their guns in order.
 
-    coats: Coats
-    guns: tuple[GunMotionFile, ...]
+    Raises:
+        ReadingsError: naming the coat or the gun and the key at fault.
+    """
+    coats = [
+        validate(CoatEntry, f'coat {number}', one, ReadingsError)
+        for number, one in enumerate(written, start=1)
+    ]
+    called = [coat.name for coat in coats]
+    if twice := [name for name in called if called.count(name) > 1]:
+        raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
+    guns: list[GunMotionFile] = []
+    names: list[str] = []
+    jobs: Sequence[PaintJob] = coats or [entry]
+    for coat in jobs:
+        given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
+        for number, one in enumerate(given, start=1):
+            gun = validate(_Gun, f'gun {number}', one, ReadingsError)
+            whose = f"coat '{coat.name}'" if coats else 'it'
+            whose = whose if given == [{}] else f'gun {number}'
+            guns.append(_motion(folder, (gun, coat, entry), whose))
+        names += [coat.name] * len(given) * bool(coats)
+    on_wet = {coat.name for coat in coats if coat.wet_on_wet}
+    return Coats.of_guns(names, len(guns), on_wet), guns
 
-    @staticmethod
-    def of(folder: Path, entry: PaintJob, written: Sequence[Any]) -> 'LaidCoats':
-        """The coats that an experiment lists, else the one that it is.
 
-        Raises:
-            ReadingsError: naming the coat or the gun and the key at fault.
-        """
-        coats = [
-            validate(CoatEntry, f'coat {number}', one, ReadingsError)
-            for number, one in enumerate(written, start=1)
-        ]
-        called = [coat.name for coat in coats]
-        if twice := [name for name in called if called.count(name) > 1]:
-            raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
-        guns: list[GunMotionFile] = []
-        names: list[str] = []
-        jobs: Sequence[PaintJob] = coats or [entry]
-        for coat in jobs:
-            given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
-            for number, one in enumerate(given, start=1):
-                gun = validate(_Gun, f'gun {number}', one, ReadingsError)
-                whose = f"coat '{coat.name}'" if coats else 'it'
-                whose = whose if given == [{}] else f'gun {number}'
-                guns.append(_motion(folder, (gun, coat, entry), whose))
-            names += [coat.name] * len(given) * bool(coats)
-        on_wet = {coat.name for coat in coats if coat.wet_on_wet}
-        return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns))
+def laid_path(coats: Coats, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
+    """The path of the guns that laid a layer, and the wet films that it is the sum of.
 
-    def painted(self, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
-        """The path of the guns that laid a layer, and the wet films that it is the sum of."""
-        films = self.coats.films_of(layer)
-        chosen = sorted({k for _, rows in films for k in range(len(paths))[rows]})
-        ends = np.cumsum([0, *(len(paths[k]) for k in chosen)]).tolist()
-        start = {k: ends[place] for place, k in enumerate(chosen)}
-        stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
-        steps = tuple(
-            (sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films
-        )
-        return SprayPath.of_guns([paths[k] for k in chosen]), steps
+    ``paths`` are those of all guns in the order of painting.
+    """
+    films = coats.films_of(layer)
+    chosen = sorted({k for _, rows in films for k in range(len(paths))[rows]})
+    ends = np.cumsum([0, *(len(paths[k]) for k in chosen)]).tolist()
+    start = {k: ends[place] for place, k in enumerate(chosen)}
+    stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
+    steps = tuple((sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films)
+    return SprayPath.of_guns([paths[k] for k in chosen]), steps
 
 
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:

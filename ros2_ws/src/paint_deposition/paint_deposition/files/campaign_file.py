@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
-from paint_deposition.files.campaign_coats import LaidCoats, Name, PaintJob
+from paint_deposition.files.campaign_coats import Name, PaintJob, laid_coats, laid_path
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
@@ -164,15 +164,15 @@ def _read_experiments(
 ) -> list[Experiment]:
     """One for each layer that was measured; ``zones`` is the file of theirs."""
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
-    laid = LaidCoats.of(folder, entry, entry.coats)
-    for number, file in enumerate(dict.fromkeys(gun.file for gun in laid.guns), start=1):
+    coats, guns = laid_coats(folder, entry, entry.coats)
+    for number, file in enumerate(dict.fromkeys(gun.file for gun in guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
     surface = read_mesh(files['mesh'], entry.mesh_scale, 0.02, down, entry.body)
-    trajectories = [read_motion(gun.file, gun.source) for gun in laid.guns]
+    trajectories = [read_motion(gun.file, gun.source) for gun in guns]
     paths = []
-    for trajectory, gun in zip(trajectories, laid.guns, strict=True):
+    for trajectory, gun in zip(trajectories, guns, strict=True):
         path, counts, odd = checked_path(trajectory, entry.max_pose_gap_s)
         paths.append(gun.with_brush(path))
         for warning in odd:
@@ -195,14 +195,14 @@ def _read_experiments(
     for trajectory in reversed(trajectories):
         settings |= trajectory.settings
     made = []
-    for layer, rows in laid.coats.by_layer(readings.layer).items():
-        path, films = laid.painted(layer, paths)
+    for layer, rows in coats.by_layer(readings.layer).items():
+        path, films = laid_path(coats, layer, paths)
         of_layer = readings.select(rows)
         if entry.under_um and layer == TOTAL:
             film_um = of_layer.thickness_um - entry.under_um
             understood = f'{readings.understood}; less {entry.under_um:g} µm below'
             of_layer = replace(of_layer, thickness_um=film_um, understood=understood)
-        if laid.coats.names != ('',):
+        if coats.names != ('',):
             of_layer = replace(of_layer, layer=np.array(layer))
         experiment = Experiment.of(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
