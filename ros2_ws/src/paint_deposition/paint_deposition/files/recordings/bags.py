@@ -16,7 +16,7 @@ from paint_deposition.files.recordings.bag_files import Bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, unused_triggers, with_trigger
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
@@ -30,9 +30,6 @@ POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
-# For a trigger without stamps the log times are used, if those of the poses show that recorder and
-# robot have the same clock.
-MAX_CLOCK_OFFSET_S = 1.0
 
 
 def trajectory_of(
@@ -48,7 +45,7 @@ def trajectory_of(
     Args:
         pose_topic: of poses, or the robot's joint states, several with blanks between them; None:
             the only one, or the joint states that have the robot's joints.
-        state_topic: see ``read_trigger``; None: the gun always sprays, and a note lists the
+        state_topic: see ``with_trigger``; None: the gun always sprays, and a note lists the
             topics that could be its trigger.
         tf: [target, source] frames of the transforms to read instead of poses; source is the TCP.
         robot: the robot whose joint states to read instead of poses.
@@ -60,26 +57,7 @@ def trajectory_of(
     trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot, pose_unit)
     if not state_topic:
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
-    gun = read_trigger(bag, state_topic)
-    offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
-    if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
-        raise RecordingError(
-            f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
-            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
-        )
-    order: np.ndarray = np.argsort(gun.stamps_ns, kind='stable')
-    rows: np.ndarray = np.empty(0, np.int64)
-    if np.any(np.diff(trajectory.stamps_ns) < 0):
-        # Where the clock was set back, the order in which they came says of which stream they are.
-        order = np.arange(len(order))
-        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), gun.log_times_ns)
-    columns = gun.stamps_ns, gun.flow, gun.brush
-    stamps, flow, brush = (its[order] if len(its) else its for its in columns)
-    return replace(
-        trajectory, trigger_stamps_ns=stamps, trigger_flow=flow, trigger_brush=brush,
-        trigger_rows=rows, settings=gun.settings,
-        notes=(*trajectory.notes, *gun.notes),
-    )  # fmt: skip
+    return with_trigger(bag, state_topic, trajectory, log_times_ns)
 
 
 def motion_of(

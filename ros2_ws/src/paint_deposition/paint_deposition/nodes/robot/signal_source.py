@@ -14,8 +14,8 @@ from paint_msgs.msg import AtomizerState
 from rclpy.qos import qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import pose_of, stamp_ns
+from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S
 from paint_deposition.motion.stream_quality import SpeedNow
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES, POSES
 from paint_deposition.nodes.runtime.messages import header
