@@ -137,7 +137,7 @@ class MeasuringPoints:
     ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, str]:
         """Positions (N, 3) [m], normals, labels (N,) of the rows of readings, and what was done.
 
-        Rows that name no listed point are complained of in the table of readings.
+        Rows that name no listed point are errors of the table of readings.
         """
         wanted, by = self._wanted_by(readings)
         places = {label: row for row, label in enumerate(self.labels)}
