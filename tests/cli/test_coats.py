@@ -1,4 +1,4 @@
-"""Coats through the commands: films and readings of one layer or several."""
+"""Coats through the commands: films, wet films and readings of one layer or several."""
 
 import json
 
@@ -132,8 +132,18 @@ def test_a_campaign_predicts_each_layer_as_simulate_does(folder, wet_on_wet):
     assert terms_um[read.means.owner] == pytest.approx(taken_um, abs=1e-5)
 
 
-def test_a_known_film_below_is_no_part_of_all_coats(folder):
+def test_wet_readings_are_dried_by_the_solids_of_their_coat(folder):
+    taken_um = write_readings(folder, pd.DepositionModel(), LAYERS[:2])
+    solids = {'solids': 0.5}, {'solids': 0.25}
+    dried = read_campaign(campaign(folder, solids, wet=True, under_um=3.0)).readings
+    expected_um = np.repeat([0.5, 0.25], 48) * taken_um
+    assert dried.thickness_um == pytest.approx(expected_um)
+    with pytest.raises(PaintError, match="the solids of layer 'base' are not said; give"):
+        read_campaign(campaign(folder, wet=True))
     write_readings(folder, pd.DepositionModel(), ['total'])
+    with pytest.raises(PaintError, match="the solids of layer 'total' differ; give"):
+        read_campaign(campaign(folder, solids, wet=True))
+    # With a known film below: it is part of what was read of all coats.
     below = [read_campaign(campaign(folder, under_um=um)).readings for um in (0.0, 3.0)]
     assert below[0].thickness_um - below[1].thickness_um == pytest.approx(np.full(48, 3.0))
 
@@ -156,10 +166,11 @@ def test_layers_that_no_coat_has_are_refused(folder, header, layer, more, messag
 
 def test_a_column_of_wet_film_tells_the_remedy(folder):
     (folder / 'readings.csv').write_text('x_m,y_m,z_m,Nassschichtdicke [µm]\n0,0,0,40\n')
-    with pytest.raises(
-        PaintError, match='is a wet film: multiply it by the solids of the paint, and name it'
-    ):
+    with pytest.raises(PaintError, match=r'is a wet film: say wet: true, give its solids'):
         read_campaign(campaign(folder))
+    named = {'columns': {'thickness': 'Nassschichtdicke [µm]'}, 'wet': True, 'solids': 0.5}
+    readings = read_campaign(campaign(folder, **named)).readings
+    assert readings.thickness_um.tolist() == [20.0]
 
 
 def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):

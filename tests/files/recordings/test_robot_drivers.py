@@ -22,6 +22,7 @@ POSITIONS, QUATERNIONS = tip_poses(SWEEP)
 RAIL_M = np.linspace(0.0, 0.6, len(TIMES_S))
 ABB_JOINTS = [f'joint_{k}' for k in range(1, 7)]
 LAG_NS = 12_000_000
+ARRAY = 'geometry_msgs/msg/PoseArray'
 
 
 def abb_urdf(rail: bool) -> str:
@@ -75,6 +76,9 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
                 message = stamped
             elif kind == 'PoseWithCovarianceStamped':
                 message = make['geometry_msgs/msg/PoseWithCovarianceStamped'](head, covered)
+            elif kind == 'PoseArray':
+                other = messages.pose(stamp, -position, quaternion).pose
+                message = make[ARRAY](head, [other, pose])
             elif kind == 'TransformStamped':
                 row = (stamp, frame_id, 'bell', [*position, *quaternion])
                 message = messages.transforms(row).transforms[0]
@@ -97,6 +101,28 @@ def bag(path, *streams):
         for topic, stamp, message in stream(messages)
     ]
     return write_bag(path, sorted(entries, key=lambda entry: entry[1]), 'mcap', messages)
+
+
+def egm_log(path):
+    """What ``EGMLogger`` writes: ms, mm and degrees; measured, planned and asked for."""
+    groups = {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}
+    columns = {'TIMESTAMP': np.round(1e3 * TIMES_S)}
+    quaternion = QUATERNIONS[:, [3, 0, 1, 2]]
+    for group, scale in groups.items():
+        for place in ('POS', 'VEL'):
+            for axis in ('RJ', 'EJ'):
+                own = np.degrees(SWEEP) if (place, axis) == ('POS', 'RJ') else 0.0 * SWEEP
+                columns |= {f'{group}_{place}_{axis}{k + 1}': scale * own[:, k] for k in range(6)}
+            if place == 'VEL':
+                columns |= {
+                    f'{group}_POS_{a}': scale * 1e3 * POSITIONS[:, k] for k, a in enumerate('XYZ')
+                }
+                columns |= {f'{group}_EULER_{a}': 0.0 * TIMES_S for a in 'XYZ'}
+                columns |= {f'{group}_QUAT_U{k}': scale * quaternion[:, k] for k in range(4)}
+                columns |= {
+                    f'{group}_VEL_{kind}{a}': 0.0 * TIMES_S for kind in 'LA' for a in 'XYZ'
+                }
+    return table(path, columns)
 
 
 def program_log(path):
@@ -134,6 +160,9 @@ DRIVERS = {
     'odometry': ((poses('/odom', 'Odometry'),), {}, ''),
     'covariance': ((poses('/pose', 'PoseWithCovarianceStamped'),), {}, ''),
     'transform': ((poses('/vicon/bell', 'TransformStamped'),), {}, ''),
+    'array': ((poses('/poses', 'PoseArray'),), {'pose_topic': '/poses[1]'}, 'as /poses[0]'),
+    'abb_libegm': (egm_log, {}, ''),
+    'abb_libegm joints': (egm_log, {'urdf': 'arm'}, ''),
     'abb_motion_program_exec': (
         program_log, {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'
     ),
@@ -202,14 +231,16 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
 def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path):
     run = bag(
         tmp_path / 'run', MILLIMETRES, DEGREES, poses('/odom', 'Odometry'),
-        joints('/slow', ABB_JOINTS, SWEEP, every=50),
+        poses('/poses', 'PoseArray'), joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
     found = {source.topic: source for source in summarise(run, 0.25)[1]}
     assert {topic: source.unit for topic, source in found.items()} == {
-        '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm',
+        '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm', '/poses': '',
         '/slow': 'rad', '/twice': 'rad',
     }  # fmt: skip
+    assert not found['/poses'].quality
+    assert '2 poses in a message' in found['/poses'].faults[0]
     assert 'only 5 samples' in found['/slow'].faults[0]
     assert found['/twice'].quality.repeated_samples == 355
     assert found['/twice'].quality.new_rate_hz == pytest.approx(125.0)

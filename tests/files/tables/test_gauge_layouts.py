@@ -211,7 +211,9 @@ def test_a_missing_reading_keeps_its_number(file, text, measured, names):
     assert readings.point.tolist() == [names.format(k) for k in measured]
 
 
-@pytest.mark.parametrize('heading', ['DFT [mil]', 'Thickness mil', 'Schichtdicke (mils)'])
+@pytest.mark.parametrize(
+    'heading', ['DFT [mil]', 'Thickness mil', 'Schichtdicke (mils)', 'Schichtdicke Klarlack [mil]']
+)
 @pytest.mark.parametrize('mark', '.,')
 def test_a_lone_heading_keeps_its_unit(file, heading, mark):
     text = f'{heading}\n0.8\n0.9\nn/a\n\n0.7\n1.1\n1.0\nStandard Deviation 0.1\n'
@@ -245,6 +247,17 @@ def test_readings_in_order_are_refused_if_their_number_is_not_that_of_the_points
         read_readings(file('b.csv', text), file('points.csv', IN_ORDER))
 
 
+def test_blank_cells_of_a_workbook_keep_their_numbers(tmp_path, file):
+    """72 readings in one column, the 6th not measured and the 34th not available."""
+    films = [[20.0 + k] for k in range(1, 73)]
+    films[5], films[33] = [None], ['n/a']
+    path = write_workbook(tmp_path / 'door.xlsx', {'Door': [['DFT [µm]'], *films]})
+    listed = 'no,x_m,y_m,z_m\n' + ''.join(f'{k},{k},0,0\n' for k in range(1, 73))
+    readings = read_readings(path, file('points.csv', listed))
+    assert np.array_equal(readings.thickness_um, 20.0 + readings.positions_m[:, 0])
+    assert '(2 of them without a reading: 6, 34)' in readings.understood
+
+
 def test_points_that_are_not_listed_are_named_all_at_once(file):
     text = 'point,DFT\nA1,20\nB7,21\nB8,22\n'
     with pytest.raises(ReadingsError, match=r"line 3: no point 'B7' in .* line 4: no point 'B8'"):
@@ -269,16 +282,43 @@ def test_headings_of_the_film_in_english_and_german(file, heading, um):
 
 
 @pytest.mark.parametrize('axis', ['{} (ist)', '{} [nominal]', '{}_nom', '{} (soll) [mm]'])
-def test_what_stands_beside_an_axis_means_nothing(file, axis):
+@pytest.mark.parametrize('cells', ['100;0;50;0,85', '100 mm;0 mm;50 mm;0,85 mil'])
+def test_what_stands_beside_an_axis_or_behind_a_number(file, axis, cells):
     axes = ';'.join(map(axis.format, 'XYZ'))
-    readings = read_readings(file('a.csv', f'Punkt;{axes};Dicke [mil]\nA;100;0;50;0,85\n'))
+    dicke = 'Dicke' if 'mil' in cells else 'Dicke [mil]'
+    path = file('a.csv', f'Punkt;{axes};{dicke}\nA;{cells}\n')
+    readings = read_readings(path)
     assert readings.positions_m.tolist() == [[0.1, 0.0, 0.05]]
     assert readings.thickness_um == pytest.approx([21.59])
+    write_predictions(path.with_name('p.csv'), readings, np.array([20.0]))
+    assert 'mil]' in path.with_name('p.csv').read_text()
 
 
 def test_measured_places_count_before_nominal_ones(file):
     text = 'P;X soll;Y soll;Z soll;X ist;Y ist;Z ist;DFT\nA;1;2;3;4;5;6;20\n'
     assert read_readings(file('a.csv', text)).positions_m.tolist() == [[4.0, 5.0, 6.0]]
+
+
+@pytest.mark.parametrize(
+    ('films', 'doubt'),
+    [
+        ('20.1 21.2 22.4 23.1 21.7', 'its last value, 21.7, may be the mean of the rest, and cou'),
+        ('20 21 23 21.33 1.53 20 23', 'last 4 values, 21.33, 1.53, 20, 23, may be statistics of'),
+        ('20.1 21.2 22.4 23.1 21.8', ''), ('20 20 20 20', ''),
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize('more', [0, 1])
+def test_unlabelled_statistics_below_readings_are_warned_of(file, films, doubt, more):
+    """Or named where there are more readings than points."""
+    values = films.split()
+    points = ''.join(f'{k},{k},0,0\n' for k in range(len(values) - more))
+    paths = file('a.csv', '\n'.join(['DFT', *values])), file('p.csv', 'no,x_m,y_m,z_m\n' + points)
+    if more:
+        with pytest.raises(ReadingsError, match=doubt.partition(', and')[0] or 'write n/a'):
+            read_readings(*paths)
+    else:
+        assert doubt in ''.join(read_readings(*paths).doubts)
+        assert bool(doubt) == bool(read_readings(*paths).doubts)
 
 
 def test_decimal_commas_cut_by_the_commas_between_columns_are_warned_of(file):
@@ -357,6 +397,9 @@ IN_CELLS = {
         ['Schichtdicke Tür'], ['Messpunkt', 'X', 'Y', 'Z', 'Dicke'],
         [None, 'mm', 'mm', 'mm', 'µm'],
         ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, '22,1'],
+    ],
+    'statistics without labels': [
+        SHEET, ['A1', 100, 0, 50, 21.5], ['A2', 100, 0, 200, 22.1], [], [None] * 4 + [21.8],
     ],
 }  # fmt: skip
 REFUSED_CELLS = {

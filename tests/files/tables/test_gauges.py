@@ -4,6 +4,8 @@ Each holds 21.5, 22.5, 24 and 19.5 um at the points P1 to P4 of a list, in that 
 says otherwise. The layouts of the makers follow their manuals.
 """
 
+import json
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +13,9 @@ import pytest
 
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.gauge_readings import read_readings
-from paint_deposition.files.tables.gauge_formats import FORMATS
+from paint_deposition.files.tables.gauge_formats import FOLDERS, FORMATS, LINES
 from paint_deposition.files.tables.reading_columns import Layout
+from workbook import write_workbook
 
 FILMS_UM = [21.5, 22.5, 24.0, 19.5]
 COATMASTER = (
@@ -25,11 +28,22 @@ COATMASTER_ROWS = [
     STATES.format('a3', 'door', 3, 0, 'NOK', 'NOK', 'fit failed'),
     STATES.format('a4', 'door', 4, 19.5, 'OK', 'OK', ''),
 ]
+COATMASTER_JSON = json.dumps({
+    'instrument': 'Flex',
+    'results': [
+        dict(zip(COATMASTER.split(','), row.split(','), strict=True)) for row in COATMASTER_ROWS
+    ],
+})  # fmt: skip
 BYK = 'Checkzone;No.;Gloss;Thickness [µm]\n' + ''.join(
     f'{zone};{number};90;{film}\n'
     for zone, number, film in zip('AABB', '1212', ('21,5', '22,5', '24', '19,5'), strict=True)
 )
-POSITECTOR = 'Reading,Value (mils)\n1,0.8465\n2,0.8858\n3,0.9449\n4,0.7677\n'
+BATCH = {
+    'header.txt': 'Name,B1\nSerial,784001\nUnits,mil\n',
+    'readings.txt': 'Reading,Value\n1,0.8465\n2,0.8858\n3,0.9449\n4,0.7677\n',
+    'statistics.txt': 'Set,Mean,Min,Max\n1,0.86,0.77,0.94\n',
+    'B1.json': '{"readings": [{"reading": 1, "value": 0.8465}]}',
+}
 SPOTS = 'Spot,Gage 1,Gage 2,Gage 3,Spot Avg\nP1,21,22,21.5,21.5\nP2,22.5,22.5,,22.5\n'
 MEASURED = 'X;Y;Z;I;J;K;Thickness\n100;0;0;0;-1;0;21,5\n200;0;0;0;-1;0;22,5\n'
 STATISTICS = ('Durchschnitt', 'STABW', 'StdAbw', 'Streuung', 'VK', 'Cpk', 'Cp')
@@ -37,30 +51,64 @@ GERMAN = 'Messpunkt;Schichtdicke [µm]\nP1;21,5\nP2;22,5\nP3;24\nP4;19,5\n' + ''
     f'{name};1,2\n' for name in STATISTICS
 )
 JAPANESE = '箇所名,測定値1,測定値2,平均値\nP1,21.5,21.7,21.6\nP2,22.5,22.3,22.4\n平均,22,22,22\n'
+PRINTED = 'Appl.: 3\nBlock: 1\n' + ''.join(
+    f'n.= {k}   {film} µm\n' for k, film in enumerate(FILMS_UM, 1)
+)
+SERIAL = ''.join(f'\x02   {film / 25.4:.4f} mil  N1\r\n' for film in FILMS_UM)
+MERGED = [
+    ['Messpunkt', 'Koordinaten [mm]', None, None, 'Schichtdicke [µm]', None],
+    [None, 'X', 'Y', 'Z', 'Ist', 'Soll'],
+    ['P1', 100, 0, 0, 21.5, 45], ['P2', 200, 0, 0, 22.5, 45],
+]  # fmt: skip
 
 # The file, its content, the films of each row (or FILMS_UM), and their points (or all in order).
 CASES: dict[str, tuple] = {
-    'coatmaster Flex': (
+    'coatmaster Flex, CSV or JSON': (
         'f.csv', '\n'.join([COATMASTER, *COATMASTER_ROWS]), '21.5 22.5 19.5', 'P1 P2 P4',
     ),
+    'coatmaster Flex, JSON': ('f.json', COATMASTER_JSON, '21.5 22.5 19.5', 'P1 P2 P4'),
     'BYK auto-chart': ('f.csv', BYK),
-    'DeFelsko PosiTector, Value': ('f.csv', POSITECTOR),
+    'DeFelsko PosiTector, Value': (
+        'f.csv', BATCH['readings.txt'].replace('Value', 'Value (mils)'),
+    ),
     'DeFelsko PosiTector, Thickness': (
         'f.csv', 'Reading,Thickness\n1,21.5\n2,22.5\n3,24\n4,19.5\n',
     ),
+    'PosiTector batch, folder': ('B1', BATCH),
+    'PosiTector batch, zip': ('B1.zip', BATCH),
+    'PosiTector, serial': ('f.txt', SERIAL),
+    'PosiTector, serial with a missing one': (
+        'f.txt', '21.5um NONFE\n---um NONFE\n24.0um NONFE\n19.5um NONFE\n', '21.5 24 19.5',
+        'P1 P3 P4',
+    ),
+    'Fischer, printed': ('f.txt', PRINTED),
     'spots of SSPC-PA 2': ('f.csv', SPOTS, '21 22 21.5 22.5 22.5', 'P1 P1 P1 P2 P2'),
     'German statistics': ('f.csv', GERMAN),
     'Japanese': ('f.csv', JAPANESE.encode('cp932'), '21.5 21.7 22.5 22.3', 'P1 P1 P2 P2'),
+    'two rows of headings': ('f.xlsx', MERGED, '21.5 22.5', 'P1 P2'),
+    'repeats in a cell': ('f.csv', 'Punkt,Dicke\nP1,21.5; 22.1;21\nP2,22.5\n',
+                          '21.5 22.1 21 22.5', 'P1 P1 P1 P2'),
 }  # fmt: skip
 
 
 @pytest.fixture
 def written(tmp_path):
-    """`written(name, content)`: the path of a new file."""
+    """`written(name, content)`: a text, a workbook's rows, or the files of a folder or a zip."""
 
-    def write(name: str, content: str | bytes) -> Path:
+    def write(name: str, content) -> Path:
         path = tmp_path / name
-        path.write_bytes(content.encode() if isinstance(content, str) else content)
+        if isinstance(content, list):
+            return write_workbook(path, {'Messung': content})
+        if isinstance(content, str | bytes):
+            path.write_bytes(content.encode() if isinstance(content, str) else content)
+        elif path.suffix == '.zip':
+            with zipfile.ZipFile(path, 'w') as package:
+                for file, text in content.items():
+                    package.writestr(f'B1/{file}', text)
+        else:
+            path.mkdir()
+            for file, text in content.items():
+                (path / file).write_text(text)
         return path
 
     return write
@@ -78,7 +126,8 @@ def points(tmp_path):
 def test_a_layout_is_read_as_it_is_written(name, written, points):
     file, content, *expected = CASES[name]
     films, labels = expected or (' '.join(map(str, FILMS_UM)), 'P1 P2 P3 P4')
-    readings = read_readings(written(file, content), points)
+    placed = name == 'two rows of headings'
+    readings = read_readings(written(file, content), None if placed else points)
     assert readings.thickness_um == pytest.approx([*map(float, films.split())], abs=2e-3)
     assert readings.point.tolist() == labels.split()
     x_m = [int(label[1]) / 10 for label in labels.split()]
@@ -86,7 +135,7 @@ def test_a_layout_is_read_as_it_is_written(name, written, points):
 
 
 def test_each_known_layout_has_its_case():
-    layouts = {one.name for one in FORMATS} - {'coordinate measuring machine'}
+    layouts = {*(one.name for one in FORMATS), *LINES, *FOLDERS} - {'coordinate measuring machine'}
     assert not [name for name in layouts if not any(case.startswith(name) for case in CASES)]
 
 
@@ -178,3 +227,8 @@ def test_rounds_over_all_points_are_repeats(written, points):
 def test_a_template_of_which_little_was_measured_is_warned_of(written, points):
     (doubt,) = read_readings(written('f.csv', 'Point;DFT\nP1;20\nP1;21\n'), points).doubts
     assert doubt.startswith('only 1 of the 4 points in points.csv have a reading; see whether')
+
+
+def test_a_folder_with_several_tables_is_refused(written):
+    with pytest.raises(ReadingsError, match=r'B2 holds a\.csv, b\.csv; name the one with the tab'):
+        read_readings(written('B2', {'a.csv': 'DFT\n1\n', 'b.csv': 'DFT\n2\n'}))

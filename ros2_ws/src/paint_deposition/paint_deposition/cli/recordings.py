@@ -84,12 +84,14 @@ def _contents(
     from paint_deposition.files.recordings.message_definitions import STATE_TYPE
     from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
-    from paint_deposition.files.tables.readings import holds_readings
+    from paint_deposition.files.tables.readings import holds_readings, is_gauge_file
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
     if path.suffix.lower() in SUFFIXES:
         return mesh_in(path)
+    if is_gauge_file(path):
+        return readings_in(path, points_file)
     if is_pose_table(path) and (points_file or holds_readings(path) or not may_hold_poses(path)):
         return readings_in(path, points_file)
     if is_pose_table(path):

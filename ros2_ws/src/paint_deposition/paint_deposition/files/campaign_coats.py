@@ -1,7 +1,7 @@
 """The coats of a campaign's experiment: which guns laid each, and what its readings are of."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -9,13 +9,16 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.motion_source import MotionSource, Text
-from paint_deposition.film.common_film import Coats, WetFilms
+from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.film.common_film import TOTAL, Coats, WetFilms
+from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 from paint_deposition.request import validate
 
+# Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.
+TOOTH_UM, FEWEST_TEETH = 5.0, 3
 # A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 
@@ -35,6 +38,9 @@ class PaintJob(_Gun):
     name: Name = ''
     guns: list[Any] = Field(
         [], description='a list of guns that painted together, each with its motion'
+    )
+    solids: Number | None = Field(
+        None, gt=0.0, le=1.0, description='share of solids in the volume of the wet paint [1]'
     )
 
 
@@ -68,8 +74,10 @@ class GunMotionFile:
 
 def laid_coats(
     folder: Path, entry: PaintJob, written: Sequence[Any]
-) -> tuple[Coats, list[GunMotionFile]]:
+) -> tuple[Coats, list[GunMotionFile], list[float | None]]:
     """The coats that an experiment lists, else the one that it is, and their guns in order.
+
+    Then the share of solids in the paint of each coat, None where it is not said.
 
     Raises:
         ReadingsError: naming the coat or the gun and the key at fault.
@@ -93,7 +101,8 @@ def laid_coats(
             guns.append(_motion(folder, (gun, coat, entry), whose))
         names += [coat.name] * len(given) * bool(coats)
     on_wet = {coat.name for coat in coats if coat.wet_on_wet}
-    return Coats.of_guns(names, len(guns), on_wet), guns
+    solids = [entry.solids if coat.solids is None else coat.solids for coat in jobs]
+    return Coats.of_guns(names, len(guns), on_wet), guns, solids
 
 
 def laid_path(coats: Coats, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
@@ -108,6 +117,44 @@ def laid_path(coats: Coats, layer: str, paths: Sequence[SprayPath]) -> tuple[Spr
     stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
     steps = tuple((sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films)
     return SprayPath.of_guns([paths[k] for k in chosen]), steps
+
+
+def solids_of(layer: str, coats: Coats, solids: Sequence[float | None]) -> float:
+    """The share of solids in the paint of a layer, whose coats have these where they are known.
+
+    Raises:
+        ReadingsError: the solids of the coats are not known or differ.
+    """
+    its = layer.split('+') if layer != TOTAL else coats.names
+    shares = {solids[coats.names.index(coat)] for coat in its}
+    share = shares.pop()
+    if share is None or shares:
+        of = 'the paint' if coats.names == ('',) else f"layer '{layer}'"
+        raise ReadingsError(
+            f'the readings are wet, and the solids of {of} {"differ" if shares else "are not said"}'
+            '; give each coat its solids, 0.45 say, and name the one that was read in the column '
+            'layer'
+        )
+    return share
+
+
+def dried(readings: Readings, share: float) -> Readings:
+    """Readings of a wet film as the dry film that a share of solids leaves.
+
+    Where all are teeth of a comb, the film is as likely anywhere between the tooth that is read
+    and the next.
+    """
+    wet_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
+    teeth = np.unique(wet_um)
+    is_comb = len(teeth) >= FEWEST_TEETH and not np.any(teeth % TOOTH_UM)
+    if is_comb and np.isnan(sigma_um).all():
+        step_um = float(np.diff(teeth).min())
+        wet_um, sigma_um = wet_um + 0.5 * step_um, np.full(len(wet_um), step_um / 12**0.5)
+        words = f'; a comb in steps of {step_um:g} µm, half of which is added'
+    return replace(
+        readings, thickness_um=share * wet_um, sigma_um=share * sigma_um,
+        understood=f'{readings.understood}{words}; wet film, times {share:g} solids',
+    )  # fmt: skip
 
 
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:

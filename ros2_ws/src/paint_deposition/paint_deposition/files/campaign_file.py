@@ -9,7 +9,14 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
-from paint_deposition.files.campaign_coats import Name, PaintJob, laid_coats, laid_path
+from paint_deposition.files.campaign_coats import (
+    Name,
+    PaintJob,
+    dried,
+    laid_coats,
+    laid_path,
+    solids_of,
+)
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
@@ -90,6 +97,9 @@ class _Entry(PaintJob, OnePart, _Band):
     coats: list[Any] = Field(
         [], description='a list of coats in the order of painting, each with its name'
     )
+    wet: bool = Field(
+        False, description='true or false, whether the readings are of wet film, which solids dry'
+    )
     under_um: Number = Field(
         0.0, ge=0.0, description='film that was there before, part of all total readings [um]'
     )
@@ -164,7 +174,7 @@ def _read_experiments(
 ) -> list[Experiment]:
     """One for each layer that was measured; ``zones`` is the file of theirs."""
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
-    coats, guns = laid_coats(folder, entry, entry.coats)
+    coats, guns, solids = laid_coats(folder, entry, entry.coats)
     for number, file in enumerate(dict.fromkeys(gun.file for gun in guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
@@ -198,9 +208,11 @@ def _read_experiments(
     for layer, rows in coats.by_layer(readings.layer).items():
         path, films = laid_path(coats, layer, paths)
         of_layer = readings.select(rows)
+        if entry.wet:
+            of_layer = dried(of_layer, solids_of(layer, coats, solids))
         if entry.under_um and layer == TOTAL:
             film_um = of_layer.thickness_um - entry.under_um
-            understood = f'{readings.understood}; less {entry.under_um:g} µm below'
+            understood = f'{of_layer.understood}; less {entry.under_um:g} µm below'
             of_layer = replace(of_layer, thickness_um=film_um, understood=understood)
         if coats.names != ('',):
             of_layer = replace(of_layer, layer=np.array(layer))

@@ -39,7 +39,7 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT or a workbook. The project's own columns are
+        path: CSV, TSV, TXT, JSON, a workbook, or a folder or zip. The project's own columns are
             ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
             ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings, and the
             layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one place
@@ -165,7 +165,8 @@ class MeasuringPoints:
 
         A gauge's own count of its readings is their order: it knows nothing of a point left out.
         """
-        labels, by, order = readings.labels, readings.named_by, [*map(str, readings.order)]
+        labels, by = readings.labels, readings.named_by
+        orders = [([*map(str, order)], count) for order, count in readings.orders]
         if labels and {*labels}.isdisjoint(self.labels) and len({*labels}) == 1:
             # The name of the part, or none.
             labels = labels if labels[0] and not format_of(readings.headings) else None
@@ -174,20 +175,23 @@ class MeasuringPoints:
             if {*labels}.isdisjoint(self.labels):
                 labels, by = readings.of('number'), ('number',)
             again = _counts_anew(readings) if by == ('number',) else ''
-            if by == ('number',) and (labels == order or (again and {*self.labels} - {*labels})):
+            if by == ('number',) and (labels == orders[0][0] or (again and {*self.labels} - {*labels})):
                 labels = None
         if labels is not None:
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
-        if readings.count == len(self.labels):
-            if not {*order} <= {*self.labels}:
-                order = [self.labels[number - 1] for number in readings.order]
-            return order, 'by the order of the readings'
+        for order, count in orders:
+            if count == len(self.labels):
+                if not {*order} <= {*self.labels}:
+                    order = [self.labels[int(number) - 1] for number in order]
+                return order, 'by the order of the readings'
         if again:
             raise readings.error(f"{again}; give a column 'point' with the labels of the points")
+        figures = readings.figures_at_end
+        unknown = 'which is missing is not known; write n/a in its place'
         raise readings.error(
-            f'{readings.count} readings in order for the {len(self.labels)} points in '
-            f'{self.path.name}: which is missing is not known; write n/a in its place, or give a '
-            "column 'point' with the labels of the points"
+            f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
+            f'{self.path.name}: {f"{figures}; delete it if so" if figures else unknown}, or give '
+            "a column 'point' with the labels of the points"
         )
 
 

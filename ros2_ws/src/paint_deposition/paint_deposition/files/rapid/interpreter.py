@@ -122,6 +122,7 @@ class Interpreter(Values):
 
     def _instruction(self, i: Instruction) -> None:
         self.line = i.line
+        i = i._replace(options=dict(self._given(i.options)))
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
         elif i.name == 'return':
@@ -135,6 +136,14 @@ class Interpreter(Values):
             self.assign(i.values[0], before + added)
         elif not self.act(i):
             self._pass_over(i)
+
+    def _given(self, options: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+        """The options without those handed on, V?v, of a parameter that is not given."""
+        for name, node in options.items():
+            if not (isinstance(node, Node) and node.rule == 'conditional'):
+                yield name, node
+            elif (parameter := node.children[0]) in self._local:
+                yield name, Node('reference', [parameter])
 
     def _pass_over(self, i: Instruction) -> None:
         if i.name not in PASSED_OVER:

@@ -62,7 +62,7 @@ class GaugeFormat:
 GOOD = ('', 'ok')
 FORMATS = (
     GaugeFormat(
-        'coatmaster Flex', ('fitstate', 'snrstate', 'evaluatestate'),
+        'coatmaster Flex, CSV or JSON', ('fitstate', 'snrstate', 'evaluatestate'),
         {'thickness': 'thickness', 'point': 'sampleid'}, ('id', 'configid', 'fit', 'snr'),
         {'fitstate': GOOD, 'snrstate': GOOD, 'evaluatestate': GOOD,
          'error': (*GOOD, '0', 'none', 'null', 'no error')},
@@ -76,6 +76,19 @@ FORMATS = (
     GaugeFormat('coordinate measuring machine', ('x', 'y', 'z', 'i', 'j', 'k'),
                 {'nx': 'i', 'ny': 'j', 'nz': 'k'}),
 )  # fmt: skip
+UNIT = r'(?P<unit>mils?|thou|µm|μm|um|microns?|mm)'
+# Lines without headings, as gauges print or send them: the groups are the headings.
+LINES = {
+    'PosiTector, serial': re.compile(
+        rf'\x02?\s*(?P<thickness>[\d.,]+|-+)\s*{UNIT}?\s+(?P<probe>[FN]\w*)\s*', re.IGNORECASE
+    ),
+    'Fischer, printed': re.compile(
+        rf'\s*n\.?\s*=\s*(?P<number>\d+)\s+(?P<thickness>[\d.,]+|-+)\s*{UNIT}\s*', re.IGNORECASE
+    ),
+}
+# The files of a folder, or of its zip, that are one table, one below the other.
+FOLDERS = {'PosiTector batch': ('header.txt', 'readings.txt')}
+
 # Cells with which a gauge says that it has no reading.
 NOTHING = re.compile(
     r'[-–—.*]*|n\.?/?a\.?|#n/a|k\.?a\.?|nan|none|null|ol|o\.l\.?|err(or)?', re.IGNORECASE
@@ -87,6 +100,12 @@ STATISTIC = re.compile(
     r'(high|low|upper|lower) limit|coef\w*|vari\w*|statist\w*|number of|count|'
     r'anzahl|sum|total|moyenne|ecart|n|s|x|平均\w*|標準偏差|最大\w*|最小\w*)\b'
 )
+# What makes a thickness another figure than a reading of it.
+NO_READING = {
+    'nominal', 'nom', 'soll', 'cad', 'design', 'ziel', 'target', 'min', 'max', 'minimum',
+    'maximum', 'std', 'sd', 'sigma', 'streuung', 'toleranz', 'tolerance', 'abweichung',
+    'deviation', 'differenz', 'difference', 'nass', 'wet', 'fehler', 'error',
+}  # fmt: skip
 # Films before anything evaporates, as a comb shows them, and words that end as a thickness does.
 WET = re.compile(r'(wet|wft|nass)')
 OTHER_DICKEN = ('nass', 'soll', 'ziel', 'mindest', 'blech', 'wand', 'material', 'substrat')

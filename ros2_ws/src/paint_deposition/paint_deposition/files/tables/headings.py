@@ -10,6 +10,7 @@ from paint_deposition.errors import PaintError, some
 from paint_deposition.files.tables.sheets import (
     Cell,
     Sheet,
+    cell_at,
     is_comment,
     is_value,
     read_sheets,
@@ -18,6 +19,7 @@ from paint_deposition.files.tables.sheets import (
 
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
+MOST_LINES_ABOVE_TWO = 40  # of headings on two rows
 
 # The ways to write a unit, by its metres, seconds, radians, or metres a second.
 WAYS_TO_WRITE: dict[str, dict[float, str]] = {
@@ -136,11 +138,15 @@ def find_table(
         sheets = named
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
-        above = enumerate(one.rows[:MOST_LINES_ABOVE])
-        ranked = [(known(headings_in(row)), not is_comment(row), -k) for k, row in above]
-        count, _, row = max(ranked, default=(0, False, 0))
-        if count and _is_split_alike(one.rows, -row):
-            found.append((one, -row))
+        above = [(one, k) for k in range(min(len(one.rows), MOST_LINES_ABOVE))]
+        above += [(two, k) for k in range(MOST_LINES_ABOVE_TWO) if (two := _on_two_rows(one, k))]
+        ranked = [
+            (known(headings_in(its.rows[k])), not is_comment(its.rows[k]), -place)
+            for place, (its, k) in enumerate(above)
+        ]
+        count, _, place = max(ranked, default=(0, False, 0))
+        if count and _is_split_alike(above[-place][0].rows, above[-place][1]):
+            found.append(above[-place])
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
         raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')
@@ -152,6 +158,24 @@ def find_table(
     if columns and wide_enough:
         return wide_enough[0], None
     return max(sheets, key=lambda s: len(widest(s))), None
+
+
+def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
+    """The sheet with two rows as one of headings, None where they hold numbers.
+
+    A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
+    one above it.
+    """
+    upper, lower = [*sheet.rows[first : first + 2], [], []][:2]
+    if len(lower) < 2 or any(map(is_value, [*upper, *lower])):
+        return None
+    texts, last = list[Cell](), ''
+    for k in range(max(len(upper), len(lower))):
+        above, below = text_of(cell_at(upper, k)), text_of(cell_at(lower, k))
+        last = above or (last if below else '')
+        texts.append(f'{last} {below}'.strip())
+    rows = [*sheet.rows[:first], texts, *sheet.rows[first + 2 :]]
+    return replace(sheet, rows=rows, lines=[*sheet.lines[:first], *sheet.lines[first + 1 :]])
 
 
 def _is_split_alike(rows: list[list[Cell]], header: int) -> bool:

@@ -16,6 +16,7 @@ from paint_deposition.files.tables.pose_columns import (
     PoseTable,
     column_name,
     read_rotations,
+    translated,
 )
 from paint_deposition.files.tables.table import SWITCHED
 from paint_deposition.model.eq1_pattern import MOST
@@ -45,7 +46,7 @@ def may_hold_poses(path: Path) -> bool:
     names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
 
     def known(headings: list[Heading]) -> int:
-        return sum(column_name(heading) in names for heading in headings)
+        return sum(column_name(heading) in names for heading in translated(headings))
 
     return find_table(path, RecordingError, known)[1] is not None
 

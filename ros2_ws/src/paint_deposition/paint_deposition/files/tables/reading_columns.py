@@ -11,6 +11,7 @@ from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
     FORMATS,
     LAYERS,
+    NO_READING,
     OTHER_DICKEN,
     OWN,
     WET,
@@ -98,7 +99,8 @@ def _known_columns(headings: list[Heading]) -> dict[str, list[int]]:
     layers = [k for k, heading in enumerate(headings) if _layer(heading)]
     if len(layers) > 1 and 'thickness' not in at:
         _assign(at, 'thickness', layers)
-    return at
+    also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
+    return at if 'thickness' in at or not also else at | {'thickness': also}
 
 
 def _assign(at: dict[str, list[int]], quantity: str, columns: list[int]) -> None:
@@ -155,6 +157,21 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
     return known
 
 
+def _begins_as_thickness(heading: Heading) -> bool:
+    """'Schichtdicke Klarlack [µm]', and no target or statistic such as 'DFT max [µm]'.
+
+    The unit ends it: more behind that is a remark.
+    """
+    if not (heading.unit and heading.text.endswith((']', ')'))) or {*heading.words} & NO_READING:
+        return False
+    return any(
+        words[-1].endswith(('dicke', 'dft', 'thickness'))
+        and _quantity(replace(heading, words=words)) == 'thickness'
+        for words in (heading.words[:1], heading.words[:2])
+        if words
+    )
+
+
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
     """Why a file has no such table, and what to do.
 
@@ -179,7 +196,7 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
         remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
         remedy += ', or say unit: {thickness: ...} and name it'
     elif wet := [h.text for h in headings if h.words and WET.match(' '.join(h.words))]:
-        remedy = f"'{wet[0]}' is a wet film: multiply it by the solids of the paint, and name it"
+        remedy = f"'{wet[0]}' is a wet film: say wet: true, give its solids, and name it"
     elif likely:
         remedy = f'it may be {" or ".join(repr(heading.text) for heading in likely)}: name one'
     return (

@@ -1,13 +1,14 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.tables.gauge_formats import ALIASES, STATISTIC
+from paint_deposition.files.tables.gauge_formats import ALIASES, FOLDERS, STATISTIC
 from paint_deposition.files.tables.headings import (
     UNIT_NAMES,
     Heading,
@@ -32,10 +33,11 @@ from paint_deposition.files.tables.reading_columns import (
     plain,
     refuse_misleading,
 )
-from paint_deposition.files.tables.sheets import Sheet, is_nothing, is_value, text_of
+from paint_deposition.files.tables.sheets import Sheet, cell_at, is_nothing, is_value, text_of
 from paint_deposition.files.tables.table import Table
 
 GUESSED = 'no unit is given'
+MOST_REPEATS, MOST_FIGURES = 50, 6
 
 
 @dataclass
@@ -45,9 +47,9 @@ class ReadingTable(Table):
     # Columns of each quantity; several of the thickness where each row holds repeats or layers.
     at: dict[str, list[int]] = field(default_factory=dict)
     layout: Layout = field(default_factory=Layout)
-    # Number of each row from 1, those without a reading counted, and of all of them.
-    order: list[int] = field(default_factory=list)
-    count: int = 0
+    # Number of each row from 1, those without a reading counted, and of all of them; of a workbook
+    # with one column then the same with blank rows, which are its empty cells.
+    orders: list[tuple[list[int], int]] = field(default_factory=list)
     # Metres in the unit of the thickness where a line above or a column has it.
     film_unit_m: float | None = None
     # What each column of the thickness is a layer of; none where it is not.
@@ -71,10 +73,13 @@ class ReadingTable(Table):
         thick = table.at['thickness'] if films else []
         table.layers = layers_of(table.headings, layout, thick)
         refuse_misleading(table, table.at, layout, table.layers, bare)
-        # The cells, with n/a for those that are no reading.
+        # The cells: one reading in each, its unit in the heading, and n/a for what is none.
+        if films and not table.layers:
+            table = table._with_repeats_apart()
+            thick = table.at['thickness']
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
-        table = table.with_decimal(numeric, layout.decimal)
+        table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
         failed = table._mark_failed() if films else ''
         if films and layout.zero == 'missing':
             table = table.without(thick, lambda _, cell: table.is_zero(cell))
@@ -84,11 +89,33 @@ class ReadingTable(Table):
         if not kept:
             table.refuse_errors()
             raise table.error('no readings below the header')
-        numbered = {k: number for number, k in enumerate(sorted([*kept, *missing]), start=1)}
-        table.order, table.count = [numbered[k] for k in kept], len(numbered)
+        begin = table.lines[0] if bare else sheet.lines[header or 0] + 1
+        table.orders = [*table._orders(kept, missing, begin)]
         table = table.select(kept)
         table.film_unit_m = table._unit_beside(sheet, header or 0)
         return table
+
+    def _with_repeats_apart(self) -> 'ReadingTable':
+        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'."""
+        headings, films = [*self.headings], [*self.at['thickness']]
+        width = len(headings)
+        if max(map(len, self.rows), default=0) > width:
+            return self
+        rows = [[*row, *[''] * (width - len(row))] for row in self.rows]
+        for k in self.at['thickness']:
+            cells = [[part.strip() for part in text.split(';')] for text in self.texts(k)]
+            most = max(map(len, cells), default=1)
+            if not 1 < most <= MOST_REPEATS:
+                continue
+            films += range(len(headings), len(headings) + most - 1)
+            headings += [
+                replace(headings[k], text=f'{headings[k].text} ({number})')
+                for number in range(2, most + 1)
+            ]
+            for row, parts in zip(rows, cells, strict=True):
+                row[k] = parts[0]
+                row += [*parts[1:], *[''] * (most - len(parts))]
+        return replace(self, headings=headings, rows=rows, at=self.at | {'thickness': films})
 
     def _mark_failed(self) -> str:
         """Write n/a for the readings that the gauge itself marks as none; how many, in words.
@@ -158,8 +185,37 @@ class ReadingTable(Table):
                 missing.append(k)
             else:
                 kept.append(k)
+        apart = self._apart_below(kept, places)
+        kept = kept[: len(kept) - apart]
+        count['of statistics'] += apart
         parts = [f'{n} row{"s" * (n > 1)} {what}' for what, n in count.items() if n]
         return kept, missing, f'left out: {", ".join(parts)}' if parts else ''
+
+    def _apart_below(self, kept: list[int], places: list[int]) -> int:
+        """How many last rows are statistics: apart from the table, without place or label."""
+        columns = [*places, *(self.at[name][0] for name in self.named_by[-1:])]
+        nameless = [
+            *takewhile(
+                lambda k: columns and all(cell_at(self.rows[k], c) == '' for c in columns),
+                reversed(kept),
+            )
+        ]
+        first = nameless[-1] if nameless else 0
+        return len(nameless) * bool(first and self.lines[first] > self.lines[first - 1] + 1)
+
+    def _orders(
+        self, kept: list[int], missing: list[int], begin: int
+    ) -> Iterator[tuple[list[int], int]]:
+        """Numbers of the kept rows from 1 and the number of all; of cells also with blank rows.
+
+        A blank line of a text, or a blank row beside other columns, may part two groups.
+        """
+        counted = {self.lines[k] for k in (*kept, *missing)}
+        blank = {*range(begin, self.lines[max(kept)])} - {*self.lines}
+        of_cells = self.form.startswith('sheet') and sum(bool(h.text) for h in self.headings) == 1
+        for lines in (counted, counted | blank)[: 1 + of_cells]:
+            number = {line: place for place, line in enumerate(sorted(lines), start=1)}
+            yield [number[self.lines[k]] for k in kept], len(lines)
 
     def _unit_beside(self, sheet: Sheet, header: int) -> float | None:
         """Metres in the unit of the thickness that a column, or a line above the table, has."""
@@ -257,8 +313,40 @@ class ReadingTable(Table):
         words = f'thickness in {UNIT_NAMES[unit]}{how}{source}'
         return values[row, which] * round(unit * 1e6, 9), row, layers, words
 
+    @property
+    def figures_at_end(self) -> str:
+        """What could be statistics of the rest at the end of readings in order, '' for nothing.
+
+        One of them is the mean of the rest, as exactly as it is written.
+        """
+        texts = [text.replace(',', '.') for text in self.of('thickness')]
+        several = len(self.at['thickness']) > 1 or self.has(*AXES) or self.has(*ON_FACE)
+        if several or self.labels or any(map(is_nothing, texts)):
+            return ''
+        values = np.array([*map(float, texts)])
+        decimals = [len(text.partition('.')[2]) for text in texts]
+        for count in range(min(MOST_FIGURES, len(values) - 3), 0, -1):
+            rest, last = values[:-count], values[-count:]
+            least, most, mean = rest.min(), rest.max(), rest.mean()
+            figures = np.array([
+                mean, rest.std(), rest.std(ddof=1), np.median(rest), least, most, most - least,
+                rest.sum(), len(rest),
+            ])  # fmt: skip
+            finest = np.maximum(decimals[-count:], max(decimals[:-count]))
+            alike = abs(last[:, None] - figures) <= 0.5 * 10.0 ** -finest[:, None] + 1e-9
+            if least < most and alike.any(axis=1).all() and alike[:, 0].any():
+                what = f'last {count} values' if count > 1 else 'last value'
+                kind = 'statistics' if count > 1 else 'the mean'
+                return f'its {what}, {", ".join(texts[-count:])}, may be {kind} of the rest'
+        return ''
+
     def doubts(self) -> Iterator[str]:
         """What may have been meant otherwise, for the user."""
+        if figures := self.figures_at_end:
+            yield (
+                f"'{self.heading('thickness')}': {figures}, and counts as a reading; delete it if "
+                "so, or give a column 'point' with the labels of the points"
+            )
         beside = max(self.at['thickness']) + 1
         known = {column for columns in self.at.values() for column in columns}
         if not self.form.startswith('commas') or beside in {*known, len(self.headings)}:
@@ -270,6 +358,14 @@ class ReadingTable(Table):
                 f"'{self.headings[beside].text}' beside it: if decimal commas are cut, put "
                 'semicolons between the columns'
             )
+
+
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() in ('.json', '.zip')
 
 
 def holds_readings(path: Path) -> bool:

@@ -1,17 +1,18 @@
 """Sheets of cells, from text files of any usual encoding and separator and from workbooks."""
 
 import csv
+import json
 import re
 import zipfile
 import zlib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO, StringIO
 from pathlib import Path
 
-from paint_deposition.errors import PaintError
+from paint_deposition.errors import PaintError, some
 from paint_deposition.files.atomic import read_file, require_small_package
-from paint_deposition.files.tables.gauge_formats import NOTHING
+from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
@@ -27,7 +28,7 @@ XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
 ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV or TXT, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -55,22 +56,51 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
     A file that is neither raises ``refusal``.
     """
     try:
-        content = read_file(path, refusal, MOST_TABLE_MB)
+        content = _content(path, refusal)
     except FileNotFoundError:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, ValueError) as error:  # also encrypted
+        raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
-        return [
-            sheet
-            for text, encoding in _decoded(content)
-            for sheet in _sheets_of_text(text, encoding)
-        ]
+        texts = _decoded(content)
+        if records := _records(texts[0][0]):
+            return [records]
+        return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
     except ValueError as error:
         reason = ' '.join(str(error).split())
         raise refusal(f'{path}: cannot be read as {reason}; {EXPECTED}') from None
+
+
+def _content(path: Path, refusal: type[PaintError]) -> bytes:
+    """What a file holds, or the files of a folder or a zip that are its one table."""
+    if path.is_dir():
+        files = {file.name: file for file in path.iterdir() if file.is_file()}
+        wanted = _table_in(files, path, refusal)
+        return b'\n'.join(read_file(files[name], refusal, MOST_TABLE_MB) for name in wanted)
+    content = read_file(path, refusal, MOST_TABLE_MB)
+    if not zipfile.is_zipfile(BytesIO(content)):
+        return content
+    with zipfile.ZipFile(BytesIO(content)) as package:
+        names = {Path(name).name: name for name in package.namelist() if name[-1:] != '/'}
+        if {'[Content_Types].xml', 'content.xml'} & {*names}:
+            return content  # a workbook
+        require_small_package(package)
+        return b'\n'.join(package.read(names[name]) for name in _table_in(names, path, refusal))
+
+
+def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> Sequence[str]:
+    """The names of those that ``FOLDERS`` has, one below the other, else of the only file."""
+    for wanted in FOLDERS.values():
+        if {*wanted} <= {*names}:
+            return wanted
+    visible = sorted(name for name in names if not name.startswith('.'))
+    if len(visible) != 1:
+        raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
+    return visible
 
 
 def text_of(cell: Cell) -> str:
@@ -97,6 +127,24 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
     return found
 
 
+def _records(text: str) -> Sheet | None:
+    """The first list of records in JSON as a table, what stands beside it above; else None."""
+    try:
+        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
+    except (ValueError, RecursionError):
+        return None
+    above: list[list[Cell]] = []
+    while isinstance(found, dict):
+        above += [[_cell(key), _cell(value)] for key, value in found.items()]
+        found = next((value for value in found.values() if isinstance(value, list | dict)), None)
+    records = [one for one in found or () if isinstance(one, dict)]
+    if not records:
+        return None
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    rows = [[_cell(record.get(key)) for key in keys] for record in records]
+    return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
+
+
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     sheets = []
     for mark, name in SEPARATORS.items():
@@ -111,8 +159,13 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     lines = text.splitlines()
     by_blanks = enumerate((list[Cell](line.split()) for line in lines), 1)
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
-    sheets.append(Sheet.of(by_blanks, f'blanks, {encoding}'))
-    return [*sheets, Sheet.of(by_lines, f'one column, {encoding}')]
+    whole = Sheet.of(by_lines, f'one column, {encoding}')
+    for name, pattern in LINES.items():
+        found = [(number, pattern.fullmatch(line)) for number, line in enumerate(lines, 1)]
+        rows = [(number, [_cell(part or '') for part in one.groups()]) for number, one in found if one]
+        if 2 * len(rows) > len(whole.rows):
+            sheets.append(Sheet.of([(0, [*pattern.groupindex]), *rows], f'{name}, {encoding}'))
+    return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
 
 
 def _sheets_of_workbook(content: bytes) -> list[Sheet]:
@@ -177,6 +230,9 @@ def _cells_of_open_document(content: bytes) -> int:
 
 
 def _cell(value: object) -> Cell:
+    """A value as a cell; nothing of what JSON has nested."""
+    if value is None or isinstance(value, list | dict):
+        return ''
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())

@@ -9,11 +9,12 @@ from typing import TypeVar
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.tables.headings import Heading
+from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
 from paint_deposition.files.tables.sheets import (
     Cell,
     cell_at,
     is_nothing,
+    is_value,
     text_of,
 )
 
@@ -141,6 +142,34 @@ class Table:
     def is_zero(self, cell: Cell) -> bool:
         """Whether a cell is the number 0."""
         return self._number(cell) == 0.0
+
+    def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
+        """The table with the unit behind the numbers of a column in its heading instead.
+
+        Units that differ, also from the heading's, stay where they are, to be refused.
+        """
+        headings, rows = [*self.headings], self.rows
+        for k in columns:
+            texts, heading = self.texts(k), self.headings[k]
+            split = [NUMBER_AND_MORE.fullmatch(text) for text in texts]
+            if not any(split[:MOST_LINES_ABOVE]):
+                continue
+            units = {
+                unit_of(one[2]) if one else heading.unit
+                for one, text in zip(split, texts, strict=True)
+                if one or is_value(text)
+            }
+            units |= {heading.unit} - {''}
+            if len(units) > 1 or not units <= {*UNITS}:
+                continue
+            (unit,) = units
+            text = heading.text if heading.unit else f'{heading.text} [{unit}]'
+            headings[k] = replace(heading, text=text, unit=unit)
+            rows = [
+                [*row[:k], one[1], *row[k + 1 :]] if one else row
+                for row, one in zip(rows, split, strict=True)
+            ]
+        return replace(self, headings=headings, rows=rows)
 
     def with_decimal(
         self: Kind, columns: Iterable[int], given: str = '', certain: bool = True
