@@ -90,6 +90,15 @@ def test_a_table_of_readings_says_its_zeros_repeats_and_gaps(tmp_path):
     figures = json.loads(done.stdout)
     assert (figures['zeros'], figures['repeated'], figures['readings']) == (['2'], ['1'], 4)
     assert_refused(paint('inspect', 'door.csv', cwd=tmp_path), 'have no coordinates', '--points')
+    batch = tmp_path / 'B1'
+    batch.mkdir()
+    (batch / 'header.txt').write_text('Name,B1\n')
+    (batch / 'readings.txt').write_text('Reading,Value\n1,20\n2,21\n3,22\n4,21\n')
+    films = ', '.join(f'{{"thickness": {film}}}' for film in (20, 21, 22, 21))
+    (tmp_path / 'b.json').write_text(f'[{films}]')
+    for name in ('B1', 'b.json'):
+        done = paint('inspect', name, '--points', 'points.csv', cwd=tmp_path)
+        assert '4 readings at 4 points' in done.stdout
 
 
 def test_a_point_read_in_two_layers_is_not_measured_again(tmp_path):

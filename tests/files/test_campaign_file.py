@@ -169,6 +169,18 @@ def test_readings_join_their_listed_points(campaign, folder):
     assert joined.point.tolist() == as_before.point.tolist()
 
 
+def test_teeth_of_a_comb_read_low_and_as_likely_anywhere_in_their_step(campaign, folder):
+    def tooth(row):
+        return [str(float(v) // 5 * 5) if k == 'thickness_um' else v for k, v in row.items()]
+
+    comb = changed_readings(folder, tooth)
+    dry = read_campaign(campaign(measurements=comb)).readings
+    read = read_campaign(campaign(measurements=comb, wet=True, solids=0.4))
+    assert read.readings.thickness_um == pytest.approx(0.4 * (dry.thickness_um + 2.5))
+    assert read.readings.sigma_um == pytest.approx(0.4 * 5.0 / 12**0.5)
+    assert 'a comb in steps of 5 µm, half of which is added' in read.understood[0]
+
+
 def test_an_experiment_has_its_own_target(campaign):
     read = read_campaign(campaign(top={'target_um': 25, 'tolerance_um': 4}))
     assert read.target_of(read.experiments[0]) == (25.0, 4.0)

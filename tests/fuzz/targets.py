@@ -35,6 +35,10 @@ from paint_deposition.report.live.scene import FIGURES
 from robot_arm import urdf
 from workbook import write_workbook
 
+GAUGE_JSON = (
+    b'{"unit": "um", "results": [{"x_m": 0, "y_m": 0, "z_m": 0, "thickness_um": 20, "id": "a"}, '
+    b'{"x_m": 0, "y_m": 0, "z_m": 1, "thickness_um": 21.5, "id": null}]}'
+)
 RAPID = rb"""MODULE Door
   PERS wobjdata wobjDoor:=[FALSE,TRUE,"",[[900,0,600],[1,0,0,0]],[[0,0,0],[1,0,0,0]]];
   CONST robtarget p1:=[[0,0,0],[1,0,0,0],[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]];
@@ -145,6 +149,12 @@ def _written(write: Callable[[Path], object], name: str) -> bytes:
         return (Path(folder) / name).read_bytes()
 
 
+def _batch(path: Path) -> None:
+    with zipfile.ZipFile(path, 'w') as package:
+        package.writestr('B1/header.txt', 'Name,B1\n')
+        package.writestr('B1/readings.txt', 'x_m,y_m,z_m,thickness_um\n0,0,0,20\n0,0,1,21\n')
+
+
 def _entries(ros1: bool = False) -> list[tuple[str, int, object]]:
     """Poses, states, transforms and joints of a moment."""
     motion, messages = straight_pass(5), Messages(ros1)
@@ -236,6 +246,10 @@ def targets() -> dict[str, Target]:
             '{1} .trans /0 not 9E9 - FOR WHILE TRUE DO ENDFOR IF TEST RETURN Incr UseBrushTab ,',
         ),
         'readings': Target('.csv', read_readings, readings, cells),
+        'gauge_json': Target(
+            '.json', read_readings, [GAUGE_JSON], '[ ] { } , : " null NaN 1e999 -1 "x": [[ []',
+        ),
+        'gauge_zip': Target('.zip', read_readings, [_written(_batch, 'B1.zip')]),
         'measuring_points': Target(
             '.csv', lambda path: MeasuringPoints.read(path, Layout(), None), [points], cells
         ),

@@ -13,7 +13,14 @@ from generated.markdown import table
 from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
 from paint_deposition.files.motion_source import MotionSource, OnePart
-from paint_deposition.files.tables.gauge_formats import ALIASES, FORMATS, LAYERS, OWN
+from paint_deposition.files.tables.gauge_formats import (
+    ALIASES,
+    FOLDERS,
+    FORMATS,
+    LAYERS,
+    LINES,
+    OWN,
+)
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
 
@@ -65,7 +72,7 @@ def written(page: str) -> str:
 
 
 def _layouts() -> list[tuple[str, str, str, str]]:
-    return [
+    rows = [
         (
             one.name, ', '.join(one.shown_by),
             ', '.join(f'{quantity}: {heading}' for quantity, heading in one.columns.items()),
@@ -73,6 +80,8 @@ def _layouts() -> list[tuple[str, str, str, str]]:
         )
         for one in FORMATS
     ]  # fmt: skip
+    rows += [(n, 'its lines', ', '.join(line.groupindex), '') for n, line in LINES.items()]
+    return rows + [(f'{n}, folder or zip', ', '.join(f), '', '') for n, f in FOLDERS.items()]
 
 
 def _keys(model: type[BaseModel], without: set[str] = frozenset()) -> str:

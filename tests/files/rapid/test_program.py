@@ -197,6 +197,12 @@ def test_what_cannot_be_followed_is_named(read, body, says):
     assert says in refusal(read, body)
 
 
+def test_an_option_is_handed_on_where_it_is_given(read):
+    passes = rf'PROC Pass(num x \num Speed)\nMoveL {target("x")},v600\V?Speed,z1,tBell;\nENDPROC'
+    program = read(r'Pass 1\Speed:=300;Pass 2;', procedures=passes)
+    assert [move.speed_m_per_s for move in program.moves] == [0.3, 0.6]
+
+
 def test_a_misspelt_option_of_a_procedure_is_refused(read):
     procedure = 'PROC rPaint(num n \\num Brush)\nSetBrush Brush;\nENDPROC'
     says = refusal(read, 'rPaint 1\\Bursh:=2;', procedures=procedure)

@@ -130,10 +130,10 @@ def solids_of(layer: str, coats: Coats, solids: Sequence[float | None]) -> float
     share = shares.pop()
     if share is None or shares:
         of = 'the paint' if coats.names == ('',) else f"layer '{layer}'"
+        what = 'differ' if shares else 'are not said'
         raise ReadingsError(
-            f'the readings are wet, and the solids of {of} {"differ" if shares else "are not said"}'
-            '; give each coat its solids, 0.45 say, and name the one that was read in the column '
-            'layer'
+            f'the readings are wet, and the solids of {of} {what}; give each coat its solids, '
+            '0.45 say, and name the one that was read in the column layer'
         )
     return share
 

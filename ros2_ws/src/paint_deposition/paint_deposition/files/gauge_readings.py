@@ -174,9 +174,10 @@ class MeasuringPoints:
         if labels is not None and by[-1] == 'number':
             if {*labels}.isdisjoint(self.labels):
                 labels, by = readings.of('number'), ('number',)
-            again = _counts_anew(readings) if by == ('number',) else ''
-            if by == ('number',) and (labels == orders[0][0] or (again and {*self.labels} - {*labels})):
-                labels = None
+            if by == ('number',):
+                again = _counts_anew(readings)
+                in_order = labels == orders[0][0] or (again and {*self.labels} - {*labels})
+                labels = None if in_order else labels
         if labels is not None:
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
         for order, count in orders:

@@ -161,8 +161,11 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
     whole = Sheet.of(by_lines, f'one column, {encoding}')
     for name, pattern in LINES.items():
-        found = [(number, pattern.fullmatch(line)) for number, line in enumerate(lines, 1)]
-        rows = [(number, [_cell(part or '') for part in one.groups()]) for number, one in found if one]
+        rows = [
+            (number, [_cell(part or '') for part in found.groups()])
+            for number, line in enumerate(lines, 1)
+            if (found := pattern.fullmatch(line))
+        ]
         if 2 * len(rows) > len(whole.rows):
             sheets.append(Sheet.of([(0, [*pattern.groupindex]), *rows], f'{name}, {encoding}'))
     return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
