@@ -198,7 +198,8 @@ def test_what_cannot_be_followed_is_named(read, body, says):
 
 
 def test_an_option_is_handed_on_where_it_is_given(read):
-    passes = rf'PROC Pass(num x \num Speed)\nMoveL {target("x")},v600\V?Speed,z1,tBell;\nENDPROC'
+    move = f'MoveL {target("x")},v600\\V?Speed,z1,tBell;'
+    passes = f'PROC Pass(num x \\num Speed)\n{move}\nENDPROC'
     program = read(r'Pass 1\Speed:=300;Pass 2;', procedures=passes)
     assert [move.speed_m_per_s for move in program.moves] == [0.3, 0.6]
 

@@ -22,7 +22,6 @@ POSITIONS, QUATERNIONS = tip_poses(SWEEP)
 RAIL_M = np.linspace(0.0, 0.6, len(TIMES_S))
 ABB_JOINTS = [f'joint_{k}' for k in range(1, 7)]
 LAG_NS = 12_000_000
-ARRAY = 'geometry_msgs/msg/PoseArray'
 
 
 def abb_urdf(rail: bool) -> str:
@@ -78,7 +77,7 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
                 message = make['geometry_msgs/msg/PoseWithCovarianceStamped'](head, covered)
             elif kind == 'PoseArray':
                 other = messages.pose(stamp, -position, quaternion).pose
-                message = make[ARRAY](head, [other, pose])
+                message = make['geometry_msgs/msg/PoseArray'](head, [other, pose])
             elif kind == 'TransformStamped':
                 row = (stamp, frame_id, 'bell', [*position, *quaternion])
                 message = messages.transforms(row).transforms[0]
@@ -105,23 +104,16 @@ def bag(path, *streams):
 
 def egm_log(path):
     """What ``EGMLogger`` writes: ms, mm and degrees; measured, planned and asked for."""
-    groups = {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}
+    quaternion, none = QUATERNIONS[:, [3, 0, 1, 2]], 0.0 * TIMES_S
+    own = {f'POS_RJ{k + 1}': column for k, column in enumerate(np.degrees(SWEEP).T)}
+    own |= {f'POS_EJ{k}': none for k in range(1, 7)}
+    own |= {f'POS_{axis}': 1e3 * POSITIONS[:, k] for k, axis in enumerate('XYZ')}
+    own |= {f'EULER_{axis}': none for axis in 'XYZ'}
+    own |= {f'QUAT_U{k}': quaternion[:, k] for k in range(4)}
+    own |= {f'VEL_{kind}': none for kind in ('RJ1', 'EJ1', 'LX', 'LY', 'LZ', 'AX', 'AY', 'AZ')}
     columns = {'TIMESTAMP': np.round(1e3 * TIMES_S)}
-    quaternion = QUATERNIONS[:, [3, 0, 1, 2]]
-    for group, scale in groups.items():
-        for place in ('POS', 'VEL'):
-            for axis in ('RJ', 'EJ'):
-                own = np.degrees(SWEEP) if (place, axis) == ('POS', 'RJ') else 0.0 * SWEEP
-                columns |= {f'{group}_{place}_{axis}{k + 1}': scale * own[:, k] for k in range(6)}
-            if place == 'VEL':
-                columns |= {
-                    f'{group}_POS_{a}': scale * 1e3 * POSITIONS[:, k] for k, a in enumerate('XYZ')
-                }
-                columns |= {f'{group}_EULER_{a}': 0.0 * TIMES_S for a in 'XYZ'}
-                columns |= {f'{group}_QUAT_U{k}': scale * quaternion[:, k] for k in range(4)}
-                columns |= {
-                    f'{group}_VEL_{kind}{a}': 0.0 * TIMES_S for kind in 'LA' for a in 'XYZ'
-                }
+    for group, scale in {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}.items():
+        columns |= {f'{group}_{name}': scale * column for name, column in own.items()}
     return table(path, columns)
 
 

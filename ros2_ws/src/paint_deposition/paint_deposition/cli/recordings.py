@@ -84,7 +84,8 @@ def _contents(
     from paint_deposition.files.recordings.message_definitions import STATE_TYPE
     from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
-    from paint_deposition.files.tables.readings import holds_readings, is_gauge_file
+    from paint_deposition.files.tables.readings import holds_readings
+    from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)

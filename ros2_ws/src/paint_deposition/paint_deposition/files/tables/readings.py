@@ -1,14 +1,14 @@
 """Tables of gauge readings and of measuring points: their rows, units and numbers."""
 
 from collections.abc import Callable, Collection, Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.tables.gauge_formats import ALIASES, FOLDERS, STATISTIC
+from paint_deposition.files.tables.gauge_formats import ALIASES, STATISTIC
 from paint_deposition.files.tables.headings import (
     UNIT_NAMES,
     Heading,
@@ -37,7 +37,7 @@ from paint_deposition.files.tables.sheets import Sheet, cell_at, is_nothing, is_
 from paint_deposition.files.tables.table import Table
 
 GUESSED = 'no unit is given'
-MOST_REPEATS, MOST_FIGURES = 50, 6
+MOST_FIGURES = 6  # of statistics without labels
 
 
 @dataclass
@@ -75,8 +75,8 @@ class ReadingTable(Table):
         refuse_misleading(table, table.at, layout, table.layers, bare)
         # The cells: one reading in each, its unit in the heading, and n/a for what is none.
         if films and not table.layers:
-            table = table._with_repeats_apart()
-            thick = table.at['thickness']
+            table, thick = table.with_repeats_apart(thick)
+            table.at['thickness'] = thick
         numeric = [k for q in (*AXES, *ON_FACE, *NORMALS, 'sigma') for k in table.at.get(q, [])]
         numeric += thick
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
@@ -94,28 +94,6 @@ class ReadingTable(Table):
         table = table.select(kept)
         table.film_unit_m = table._unit_beside(sheet, header or 0)
         return table
-
-    def _with_repeats_apart(self) -> 'ReadingTable':
-        """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'."""
-        headings, films = [*self.headings], [*self.at['thickness']]
-        width = len(headings)
-        if max(map(len, self.rows), default=0) > width:
-            return self
-        rows = [[*row, *[''] * (width - len(row))] for row in self.rows]
-        for k in self.at['thickness']:
-            cells = [[part.strip() for part in text.split(';')] for text in self.texts(k)]
-            most = max(map(len, cells), default=1)
-            if not 1 < most <= MOST_REPEATS:
-                continue
-            films += range(len(headings), len(headings) + most - 1)
-            headings += [
-                replace(headings[k], text=f'{headings[k].text} ({number})')
-                for number in range(2, most + 1)
-            ]
-            for row, parts in zip(rows, cells, strict=True):
-                row[k] = parts[0]
-                row += [*parts[1:], *[''] * (most - len(parts))]
-        return replace(self, headings=headings, rows=rows, at=self.at | {'thickness': films})
 
     def _mark_failed(self) -> str:
         """Write n/a for the readings that the gauge itself marks as none; how many, in words.
@@ -319,18 +297,20 @@ class ReadingTable(Table):
 
         One of them is the mean of the rest, as exactly as it is written.
         """
-        texts = [text.replace(',', '.') for text in self.of('thickness')]
-        several = len(self.at['thickness']) > 1 or self.has(*AXES) or self.has(*ON_FACE)
-        if several or self.labels or any(map(is_nothing, texts)):
+        films = self.at['thickness']
+        if len(films) > 1 or self.labels or self.has(*AXES) or self.has(*ON_FACE):
             return ''
-        values = np.array([*map(float, texts)])
+        texts = [text.replace(',', '.') for text in self.texts(films[0])]
+        values = self.numbers(films[0], may_be_empty=True)
+        if np.isnan(values).any():
+            return ''
         decimals = [len(text.partition('.')[2]) for text in texts]
         for count in range(min(MOST_FIGURES, len(values) - 3), 0, -1):
             rest, last = values[:-count], values[-count:]
-            least, most, mean = rest.min(), rest.max(), rest.mean()
+            least, most = rest.min(), rest.max()
             figures = np.array([
-                mean, rest.std(), rest.std(ddof=1), np.median(rest), least, most, most - least,
-                rest.sum(), len(rest),
+                rest.mean(), rest.std(), rest.std(ddof=1), np.median(rest), least, most,
+                most - least, rest.sum(), len(rest),
             ])  # fmt: skip
             finest = np.maximum(decimals[-count:], max(decimals[:-count]))
             alike = abs(last[:, None] - figures) <= 0.5 * 10.0 ** -finest[:, None] + 1e-9
@@ -358,14 +338,6 @@ class ReadingTable(Table):
                 f"'{self.headings[beside].text}' beside it: if decimal commas are cut, put "
                 'semicolons between the columns'
             )
-
-
-def is_gauge_file(path: Path) -> bool:
-    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
-    if path.is_dir():
-        names = {file.name for file in path.iterdir()}
-        return any({*files} <= names for files in FOLDERS.values())
-    return path.suffix.lower() in ('.json', '.zip')
 
 
 def holds_readings(path: Path) -> bool:

@@ -82,7 +82,7 @@ def _content(path: Path, refusal: type[PaintError]) -> bytes:
         wanted = _table_in(files, path, refusal)
         return b'\n'.join(read_file(files[name], refusal, MOST_TABLE_MB) for name in wanted)
     content = read_file(path, refusal, MOST_TABLE_MB)
-    if not zipfile.is_zipfile(BytesIO(content)):
+    if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
         return content
     with zipfile.ZipFile(BytesIO(content)) as package:
         names = {Path(name).name: name for name in package.namelist() if name[-1:] != '/'}
@@ -101,6 +101,14 @@ def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> 
     if len(visible) != 1:
         raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
     return visible
+
+
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() in ('.json', '.zip')
 
 
 def text_of(cell: Cell) -> str:
