@@ -77,11 +77,11 @@ FORMATS = (
                 {'nx': 'i', 'ny': 'j', 'nz': 'k'}),
 )  # fmt: skip
 UNIT = r'(?P<unit>mils?|thou|µm|μm|um|microns?|mm)'
-# Lines without headings, as gauges print or send them, dashes where there is no reading: the groups
-# are the headings.
+# Lines without headings, as gauges print or send them, dashes for no reading: the groups are the
+# headings.
 LINES = {
     'PosiTector, serial': re.compile(
-        rf'\x02?\s*(?P<thickness>[\d.,]+(?=.*\s[FN])|-+)\s*{UNIT}?\s*(?P<probe>[FN]\w*)?\s*',
+        rf'\x02?\s*(?P<thickness>[\d.,]+(?=[^\d.,]*\s[FN])|-+)\s*{UNIT}?\s*(?P<probe>[FN]\w*)?\s*',
         re.IGNORECASE,
     ),
     'Fischer, printed': re.compile(
