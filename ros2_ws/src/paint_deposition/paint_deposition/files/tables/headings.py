@@ -141,12 +141,12 @@ def find_table(
         above = [(one, k) for k in range(min(len(one.rows), MOST_LINES_ABOVE))]
         above += [(two, k) for k in range(MOST_LINES_ABOVE_TWO) if (two := _on_two_rows(one, k))]
         ranked = [
-            (known(headings_in(its.rows[k])), not is_comment(its.rows[k]), -place)
-            for place, (its, k) in enumerate(above)
+            (known(headings_in(its.rows[k])), not is_comment(its.rows[k]), its, k)
+            for its, k in above
         ]
-        count, _, place = max(ranked, default=(0, False, 0))
-        if count and _is_split_alike(above[-place][0].rows, above[-place][1]):
-            found.append(above[-place])
+        count, _, best, row = max(ranked, key=lambda rank: rank[:2], default=(0, False, one, 0))
+        if count and _is_split_alike(best.rows, row):
+            found.append((best, row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
         found_in = ' and '.join(one.form for one, _ in found)
         raise refusal(f'{path}: there are tables in {found_in}; name one, sheet:')

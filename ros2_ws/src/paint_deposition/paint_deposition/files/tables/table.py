@@ -176,9 +176,9 @@ class Table:
         headings, rows = [*self.headings], self.rows
         for k in columns:
             texts, heading = self.texts(k), self.headings[k]
-            split = [NUMBER_AND_MORE.fullmatch(text) for text in texts]
-            if not any(split[:MOST_LINES_ABOVE]):
+            if not any(map(NUMBER_AND_MORE.fullmatch, texts[:MOST_LINES_ABOVE])):
                 continue
+            split = [NUMBER_AND_MORE.fullmatch(text) for text in texts]
             units = {
                 unit_of(one[2]) if one else heading.unit
                 for one, text in zip(split, texts, strict=True)
