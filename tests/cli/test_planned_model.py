@@ -11,7 +11,7 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import paint
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.provenance import model_digest, origin, planned_model
+from paint_deposition.files.provenance import model_digest, model_of_plan, origin, planned_model
 from paint_deposition.motion.programmed import PROGRAMMED
 
 PANEL = SAMPLES / 'panel.stl'
@@ -129,7 +129,7 @@ def test_a_module_away_from_its_model_is_warned_of(plan, tmp_path):
     assert '--model' in warning
     # Another model of that name is not taken for it.
     (tmp_path / 'model.yaml').write_text('effects: []\n')
-    assert planned_model(tmp_path / 'passes.mod').file() is None
+    assert model_of_plan(*planned_model(tmp_path / 'passes.mod')) is None
 
 
 def test_the_digest_is_that_of_the_values(model_file, tmp_path):

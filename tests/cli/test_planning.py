@@ -123,7 +123,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     names = {path.name for path in (tmp_path / 'plan').iterdir()}
     assert names == {
         MARKER, 'film.csv', 'film.ply', 'film.png', 'model.yaml', 'passes.csv', 'passes.mod',
-        'passes.yaml', 'plan.json', 'stats.json', 'trajectory',
+        'plan.json', 'stats.json', 'trajectory',
     }  # fmt: skip
     program = read_program(tmp_path / 'plan' / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}

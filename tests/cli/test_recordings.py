@@ -149,7 +149,7 @@ def test_inspect_a_real_program(shared_data):
     assert head.startswith('module grey_t_rob1: 10 moves at 0.1 m/s, tool defaultghtool')
     assert moves[0].split()[:3] == ['14', 'movej', '0.6139']
     assert len(moves) == 10
-    assert note == 'note: line 13: moveabsj skipped: joint angles need the robot'
+    assert note == 'note: line 13: moveabsj skipped: joint angles are no pose'
     assert passed_over.startswith('note: passed over, neither motion nor paint: confl (line 11)')
     content = json.loads(paint('inspect', module, '--json').stdout)
     assert content['moves'][0]['position_m'] == [0.61391, 2.32615, 1.04068]

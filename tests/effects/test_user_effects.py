@@ -16,7 +16,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, TRIAL_RAY, effect_class, load_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.files.model_file import write_model
 from paint_deposition.kernel.laws import Ray, in_precision
 
 SAMPLE = (SAMPLES / 'my_effect.py').read_text()
@@ -143,26 +143,12 @@ def test_an_unknown_id_is_answered_with_the_nearest():
         effect_class('???')
 
 
-def test_a_class_of_a_script_is_kept_as_a_file_beside_the_model(own, tmp_path):
-    """With what it uses of the script, and nothing else that the script does."""
-    path = own(
-        ('class WakeLoss', 'GAIN = 0.7\nFIELDS = list(Ray._fields)\n\n\nclass WakeLoss'),
-        ('return exp', 'return GAIN * exp'),
-    )
-    spec = importlib.util.spec_from_file_location('script', path)
+def test_a_class_of_a_script_has_no_file_that_a_model_could_name(own, tmp_path):
+    spec = importlib.util.spec_from_file_location('script', own())
     script = sys.modules['script'] = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     model = DepositionModel(effects=(script.WakeLoss(loss_per_m_per_s=0.3),))
-    write_model(tmp_path / 'out.yaml', model)
-    (effect,) = read_model(tmp_path / 'out.yaml').effects
-    assert effect.loss_per_m_per_s == 0.3
-    ray = Ray(*map(float, TRIAL_RAY))
-    assert effect.flux_factor(ray, 0.3) == script.WakeLoss.flux_factor(ray, 0.3)
-    assert 'FIELDS' not in (tmp_path / 'wake_loss.py').read_text()
-    script.WakeLoss.__module__ = 'elsewhere'
-    with pytest.raises(
-        ModelError, match="source of effect 'wake_loss' is not known: put WakeLoss in"
-    ):
+    with pytest.raises(ModelError, match="effect 'wake_loss' has no file; put WakeLoss in a file"):
         write_model(tmp_path / 'out.yaml', model)
 
 

@@ -2,7 +2,6 @@
 
 from pathlib import Path
 
-import numpy as np
 import pytest
 import yaml
 
@@ -13,8 +12,6 @@ from paint_deposition.errors import ModelError, RecordingError
 from paint_deposition.files.model_file import read_model, write_model
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import model_digest
-from paint_deposition.files.rapid.program import module_text, program_trajectory, read_program
-from paint_deposition.motion.programmed import GunSwitch, Move
 
 MODEL = two_brushes(effects=(EFFECTS['edge_build'].typical(),))
 HEAD = 'x_m,y_m,z_m,qx,qy,qz,qw'
@@ -86,56 +83,6 @@ def test_a_programmed_table_takes_the_brush_of_each_move(tmp_path: Path):
     assert read_recording(path).triggers == [
         (0, 1.0, 4), (500_000_000, 1.0, 9), (1_000_000_000, 0.0, 9)
     ]  # fmt: skip
-
-
-def moves(*guns: tuple[float, float, int]) -> list[Move]:
-    """Steps of 0.1 m along x, each with its flow (0 is off) and brush."""
-    return [
-        Move(np.array([0.1 * k, 0.0, 0.0]), np.array([0.0, 0.0, 0.0, 1.0]), 0.5, flow > 0,
-             flow=flow or 1.0, brush=brush)
-        for k, (flow, brush) in enumerate(guns)
-    ]  # fmt: skip
-
-
-def test_a_written_program_switches_brushes_and_reads_back(tmp_path: Path):
-    path = tmp_path / 'passes.mod'
-    guns = ((0, 0), (1, 2), (1, 2), (0, 0), (0.8, 3), (0, 0), (1, 2), (0.9, 3))
-    path.write_text(module_text(moves(*guns)))
-    assert path.read_text().count('GOp:=goBrush') == 2
-    on = [(m.flow, m.brush) for m in read_program(path).moves if m.spraying]
-    assert on == [(flow, brush) for flow, brush in guns if flow]
-    # A program without numbers does without the output.
-    assert 'goBrush' not in module_text(moves((0, 0), (1, 0)))
-
-
-def test_set_brush_chooses_the_brush_of_paint_moves(tmp_path: Path):
-    axes = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
-    target = [f'[[{100 * k},0,0],[1,0,0,0],{axes}]' for k in range(6)]
-    path = tmp_path / 'paint.mod'
-    path.write_text(
-        'MODULE Paint\nPROC main()\n'
-        rf"""
-        PaintL {target[0]},v600,z50,tBell;
-        SetBrush 3;
-        PaintL {target[1]},v600,z50,tBell;
-        SetBrush 5\X:=150;
-        PaintL {target[2]},v600,z50,tBell;
-        SetBrush 0;
-        PaintL {target[3]},v600,z50,tBell;
-        SetGO goBrush,7;
-        PaintL {target[4]},v600,z50,tBell;
-        """
-        'ENDPROC\nENDMODULE\n'
-    )
-    program = read_program(path)
-    assert [m.brush for m in program.moves if m.spraying] == [0, 3, 3, 7]
-    assert program.moves[2].switches == (GunSwitch(0.05, True, True, 5),)
-    trajectory = program_trajectory(program)
-    changes = [(round(ns * 0.6e-6), brush) for ns, _, brush in trajectory.triggers]
-    assert changes == [(0, 3), (100, 3), (150, 5), (200, 0), (300, 7)]
-    path.write_text(path.read_text().replace('SetBrush 3', 'SetBrush 2.5'))
-    with pytest.raises(RecordingError, match=r'line 5: setbrush takes the number of a brush, not'):
-        read_program(path)
 
 
 def test_states_recorded_before_they_had_a_brush_are_of_the_only_one(tmp_path: Path):

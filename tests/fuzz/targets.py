@@ -10,7 +10,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-import pyarrow as pa
 import trimesh
 from mcap.writer import CompressionType, Writer
 
@@ -20,7 +19,7 @@ from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBO
 from paint_deposition.api.shown_results import results_scenes
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.atomic import json_text, write_parquet
+from paint_deposition.files.atomic import json_text
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
 from paint_deposition.files.meshes import read_mesh, write_mesh_ply
@@ -224,11 +223,6 @@ def _metadata(path: Path) -> object:
         return planned_model(run), _bag(run)
 
 
-def _parquet(path: Path) -> None:
-    films = {'x_m': [0.1, 0.2], 'y_m': [0.0, 0.0], 'z_m': [0.2, 0.2], 'thickness_um': [24.5, 9.0]}
-    write_parquet(path, pa.table(films | {'point': ['P1', 'P2']}))
-
-
 @cache
 def targets() -> dict[str, Target]:
     """All readers by name."""
@@ -261,7 +255,6 @@ def targets() -> dict[str, Target]:
         ),
         'points': Target('.csv', read_points, [points], cells),
         'poses': Target('.csv', read_recording, [*POSES], cells),
-        'parquet': Target('.parquet', read_readings, [_written(_parquet, 'readings.parquet')]),
         'workbook': Target('.xlsx', read_readings, [book]),
         'worksheet': Target(
             '.xlsx', read_readings, [_member(book, 'sheet1.xml')],

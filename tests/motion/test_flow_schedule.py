@@ -36,15 +36,3 @@ def test_neither_order_nor_forgetting_matters_later(changes, order, forgotten_un
     flow.forget(forgotten_until)
     later = np.arange(forgotten_until, 70)
     assert np.array_equal(flow_at(flow, later), flow_at(expected, later))
-
-
-def test_beginning_again_keeps_what_came_early_for_it():
-    flow = schedule([(1000, 1.0), (2000, 0.0)])
-    flow.add(0, 0.0, another_stream=True)
-    flow.add(50, 1.0, another_stream=True)
-    assert flow_at(flow, [10, 1500, 2500]).tolist() == [0.0, 1.0, 0.0]
-    flow.restart(ended_ns=1500)
-    assert flow_at(flow, [10, 60, 1500]).tolist() == [0.0, 1.0, 1.0]
-    flow.add(10, 0.5, another_stream=True)
-    assert flow.go_on() == [10]
-    assert flow_at(flow, [20, 60]).tolist() == [0.5, 1.0]

@@ -99,15 +99,6 @@ def test_a_gap_gives_nothing_and_is_told():
     assert np.all((stamp < stamps[1]) | (stamp > stamps[2]))
 
 
-@pytest.mark.parametrize('cut_ns', [1, 3_141_592, 9_999_999])
-def test_a_cut_splits_the_time_exactly(cut_ns):
-    positions = np.array([[0, 0, 0], [0.03, 0, 0]])
-    stamp, dwell, *_ = split([0, 10_000_000], positions, np.tile([0, 0, 0, 1.0], (2, 1)), [cut_ns])
-    before = stamp < cut_ns
-    assert dwell[before].sum() == pytest.approx(cut_ns * 1e-9, rel=1e-12)
-    assert dwell[~before].sum() == pytest.approx((10_000_000 - cut_ns) * 1e-9, rel=1e-12)
-
-
 @pytest.mark.parametrize('away_m', [1e3, 1e30, 1e300])
 def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
     positions = np.array([[0, 0, 0], [away_m, 0, 0], [0.001, 0, 0]])

@@ -36,17 +36,6 @@ def sprayed_serpentine():
     return route(SERPENTINE, trigger_stamps_ns=stamps, trigger_flow=on_off)
 
 
-def test_strokes_are_the_straight_legs():
-    path, _ = spray_path(route(SERPENTINE))
-    assert path.stroke.tolist() == sorted(path.stroke.tolist())
-    assert path.stroke[-1] == 4
-    length = [
-        np.sum((path.dwell_s * path.speed_m_per_s)[path.stroke == stroke]) for stroke in range(5)
-    ]
-    # A turn shows after the first centimetres of the new leg.
-    assert length == pytest.approx([1.2, 0.3, 1.2, 0.3, 1.2], abs=0.02)
-
-
 def test_times_to_the_trigger_are_those_of_the_clock():
     path, _ = spray_path(sprayed_serpentine())
     time_s = (path.stamp_ns - scenes.START_NS) * 1e-9

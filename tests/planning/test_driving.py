@@ -212,10 +212,3 @@ def test_the_commands_write_what_the_robot_drives(planned, cell, urdf, tmp_path)
     done = paint('place', *given[:2], '--urdf', urdf, '-o', tmp_path / 'place')
     assert done.returncode == 2
     assert '--part-pose' in done.stderr
-    # A tool path holds the passes: the same film, at its own speed.
-    passes = '--trajectory', tmp_path / 'plan/passes.yaml', '--part-pose', *PART_POSE
-    done = paint('simulate', *part, '--model', model, *passes, '-o', tmp_path / 'film')
-    assert 'no speeds' in done.stderr
-    film = json.loads((tmp_path / 'film/stats.json').read_text())
-    planned_um = json.loads((tmp_path / 'plan/stats.json').read_text())['mean_um']
-    assert film['mean_um'] == pytest.approx(planned_um * 0.2 / 0.3, rel=0.01)

@@ -60,20 +60,6 @@ def test_a_program_without_a_gun_sprays_all_the_way_and_says_so(motion, shared_d
     assert 'joint moves are taken as straight' in trajectory.notes
 
 
-def test_the_gun_is_switched_at_its_distances(motion):
-    trajectory = motion(
-        r'TriggIO on,100\Start\DOp:=doGun,1;TriggIO off,50\DOp:=doGun,0;'
-        f'SetDO doGun,0;MoveJ {target(0)},v500,fine,tool0;'
-        f'TriggL {target(1000)},v500,on\\T2:=off,fine,tool0;'
-        f'MoveL {target(1000, 300)},v500,fine,tool0;'
-    )
-    path, _ = spray_path(trajectory)
-    sprayed_x = path.position_m[path.flow > 0.0, 0]
-    assert path.spraying_time_s == pytest.approx(0.85 / 0.5, abs=1e-8)
-    assert sprayed_x.min() == pytest.approx(0.1, abs=0.008)
-    assert sprayed_x.max() == pytest.approx(0.95, abs=0.008)
-
-
 @pytest.mark.parametrize('sweep_deg', [30.0, 180.0, 300.0])
 def test_circular_moves_are_arcs(motion, sweep_deg):
     middle, end = np.radians([0.4 * sweep_deg, sweep_deg])

@@ -147,7 +147,7 @@ def test_messages_that_nodes_leave_out_are_left_out_counted_and_refused_if_stric
     assert np.array_equal(read.positions_m, written.positions_m[rows])
     assert read.trigger_flow.tolist() == [0.5]
     said = ' '.join(read.warnings)
-    assert "1 poses in frame 'nowhere', of which 'part' is not known: left out" in said
+    assert "1 poses in frame 'nowhere', of which 'part' is not known at their time (" in said
     assert '3 states on /state, the first of them an atomizer state without a stamp' in said
     with pytest.raises(RecordingError, match='leave out --strict'):
         read_recording(path, state_topic='/state', strict=True)

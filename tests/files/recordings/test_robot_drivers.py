@@ -22,7 +22,6 @@ POSITIONS, QUATERNIONS = tip_poses(SWEEP)
 RAIL_M = np.linspace(0.0, 0.6, len(TIMES_S))
 ABB_JOINTS = [f'joint_{k}' for k in range(1, 7)]
 LAG_NS = 12_000_000
-ARRAY = 'geometry_msgs/msg/PoseArray'
 
 
 def abb_urdf(rail: bool) -> str:
@@ -78,7 +77,7 @@ def poses(topic, kind, scale=1.0, frame_id='base_link'):
                 message = make['geometry_msgs/msg/PoseWithCovarianceStamped'](head, covered)
             elif kind == 'PoseArray':
                 other = messages.pose(stamp, -position, quaternion).pose
-                message = make[ARRAY](head, [other, pose])
+                message = make['geometry_msgs/msg/PoseArray'](head, [other, pose])
             elif kind == 'TransformStamped':
                 row = (stamp, frame_id, 'bell', [*position, *quaternion])
                 message = messages.transforms(row).transforms[0]
@@ -105,23 +104,16 @@ def bag(path, *streams):
 
 def egm_log(path):
     """What ``EGMLogger`` writes: ms, mm and degrees; measured, planned and asked for."""
-    groups = {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}
+    quaternion, none = QUATERNIONS[:, [3, 0, 1, 2]], 0.0 * TIMES_S
+    own = {f'POS_RJ{k + 1}': column for k, column in enumerate(np.degrees(SWEEP).T)}
+    own |= {f'POS_EJ{k}': none for k in range(1, 7)}
+    own |= {f'POS_{axis}': 1e3 * POSITIONS[:, k] for k, axis in enumerate('XYZ')}
+    own |= {f'EULER_{axis}': none for axis in 'XYZ'}
+    own |= {f'QUAT_U{k}': quaternion[:, k] for k in range(4)}
+    own |= {f'VEL_{kind}': none for kind in ('RJ1', 'EJ1', 'LX', 'LY', 'LZ', 'AX', 'AY', 'AZ')}
     columns = {'TIMESTAMP': np.round(1e3 * TIMES_S)}
-    quaternion = QUATERNIONS[:, [3, 0, 1, 2]]
-    for group, scale in groups.items():
-        for place in ('POS', 'VEL'):
-            for axis in ('RJ', 'EJ'):
-                own = np.degrees(SWEEP) if (place, axis) == ('POS', 'RJ') else 0.0 * SWEEP
-                columns |= {f'{group}_{place}_{axis}{k + 1}': scale * own[:, k] for k in range(6)}
-            if place == 'VEL':
-                columns |= {
-                    f'{group}_POS_{a}': scale * 1e3 * POSITIONS[:, k] for k, a in enumerate('XYZ')
-                }
-                columns |= {f'{group}_EULER_{a}': 0.0 * TIMES_S for a in 'XYZ'}
-                columns |= {f'{group}_QUAT_U{k}': scale * quaternion[:, k] for k in range(4)}
-                columns |= {
-                    f'{group}_VEL_{kind}{a}': 0.0 * TIMES_S for kind in 'LA' for a in 'XYZ'
-                }
+    for group, scale in {'R_FB': 1.0, 'R_PL': 1.1, 'S_REF': 0.0}.items():
+        columns |= {f'{group}_{name}': scale * column for name, column in own.items()}
     return table(path, columns)
 
 
@@ -149,7 +141,7 @@ BOTH = (EGM, joints('/joint_states', ABB_JOINTS, SWEEP, every=5))
 # What was recorded, the options that read it, and what is said without the last of them.
 DRIVERS = {
     'abb_ros2': ((EGM,), {'urdf': 'arm'}, 'give urdf'),
-    'prefix': ((PREFIXED,), {'urdf': 'arm', 'joint_prefix': 'irb_'}, 'give --joint-prefix irb_'),
+    'prefix': ((PREFIXED,), {'urdf': 'arm', 'joint_prefix': 'irb_'}, 'give --joint-prefix'),
     'degrees': ((DEGREES,), {'urdf': 'arm', 'angle_unit': 'deg'}, 'give --angle-unit deg'),
     'rail': ((EGM, RAIL), {'urdf': 'railed'}, 'give urdf'),
     'rail in mm': ((EGM, RAIL_MM), {'urdf': 'railed', 'pose_unit': 'mm'}, ''),
@@ -234,12 +226,12 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
         poses('/poses', 'PoseArray'), joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
-    found = {source.topic: source for source in summarise(run, 0.25).pose_streams}
+    found = {source.topic: source for source in summarise(run, 0.25)[1]}
     assert {topic: source.unit for topic, source in found.items()} == {
         '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm', '/poses': '',
         '/slow': 'rad', '/twice': 'rad',
     }  # fmt: skip
-    assert not found['/poses'].will_do
+    assert not found['/poses'].quality
     assert '2 poses in a message' in found['/poses'].faults[0]
     assert 'only 5 samples' in found['/slow'].faults[0]
     assert found['/twice'].quality.repeated_samples == 355
@@ -247,7 +239,7 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
     assert found['/odom'].quality.lag_s == pytest.approx(0.012)
     assert (found['/arm_PoseStamped'].frame_id, found['/odom'].frame_id) == ('', 'base_link')
     for source in found.values():
-        if source.will_do:
+        if source.quality:
             words = shlex.split(source.options.replace('ROBOT', str(folder / 'arm.urdf')))
             options = {k[2:].replace('-', '_'): v for k, v in zip(*[iter(words)] * 2, strict=True)}
             ends = read_recording(run, **options).positions_m[[0, -1]]

@@ -454,6 +454,7 @@ def test_cells_that_could_mislead_are_refused(tmp_path, message):
         ('Block;Nr;Messwert\n1;1;20\n1;2;21\n2;1;22\n', {}, "'Nr' counts anew in each Block"),
         ('#,F,N\nGauge,1,2\n', {}, "the thickness .columns: '#', 'F', 'N'"),
         ('point,DFT\n1,20\n2,<5\n', {}, "line 3: DFT is '<5'; expected .*, or n/a where there is"),
+        ('DFT\n20\n21\n22\n23\n24\n<5\n', {}, "line 7: DFT is '<5'; expected .*, or n/a where"),
         ('point;DFT\n1;20\n;21\n2;22\n', {}, 'line 3: the point has no label'),
         ('point,DFT\n1,20\n\npoint,DFT [mil]\n2,1\n', {}, 'lines 1 and 4 are headings of two tab'),
         ('point,DFT\n1,20\npoint,DFT,Units\n2,1,mil\n', {}, 'lines 1 and 3 are headings of two'),

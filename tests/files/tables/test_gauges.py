@@ -78,8 +78,7 @@ CASES: dict[str, tuple] = {
     'PosiTector batch, zip': ('B1.zip', BATCH),
     'PosiTector, serial': ('f.txt', SERIAL),
     'PosiTector, serial with a missing one': (
-        'f.txt', '21.5um NONFE\n---um NONFE\n24.0um NONFE\n19.5um NONFE\n', '21.5 24 19.5',
-        'P1 P3 P4',
+        'f.txt', '21.5um NONFE\n---\n---um NONFE\n19.5um NONFE\n', '21.5 19.5', 'P1 P4',
     ),
     'Fischer, printed': ('f.txt', PRINTED),
     'spots of SSPC-PA 2': ('f.csv', SPOTS, '21 22 21.5 22.5 22.5', 'P1 P1 P1 P2 P2'),

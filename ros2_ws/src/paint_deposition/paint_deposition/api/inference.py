@@ -10,7 +10,7 @@ from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_unnam
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import read_model, read_model_file
-from paint_deposition.files.model_text import needs_file, source_of
+from paint_deposition.files.model_text import require_file
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared
@@ -140,8 +140,8 @@ def diagnose(
         seed: of the starts of the fits and of the simulated deviations.
     """
     own = {effect.id: effect for effect in own_effects}
-    for effect in filter(needs_file, own.values()):
-        source_of(effect)  # refuses what could not be written with the model
+    for effect in own.values():
+        require_file(effect)
     library = dict(EFFECTS) | own
     start, known, doubts = _start(campaign, model, posterior)
     found = diagnosed(campaign, start, library, seed, progress, known)

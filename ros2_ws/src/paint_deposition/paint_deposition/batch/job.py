@@ -109,26 +109,22 @@ class Job:
         return self._once(('model', path), lambda: read_model_file(path, load_unnamed_effect_file))
 
     def _model(self, values: Values) -> DepositionModel:
-        path = self._named('model', values)
-        if path is None:
-            if DRAW in values:
+        path, sample = self._named('model', values), self.file.sample
+        file = ModelFile(DepositionModel()) if path is None else self._model_file(path)
+        model, posterior = file.model, file.posterior
+        if DRAW in values and sample:
+            if path is None:
                 raise BatchError('no model is given, and the parameters of one vary; give model')
-            return varied_model(DepositionModel(), values, self.effects)
-        file = self._model_file(path)
-        model = self._draws(path, file)[values[DRAW]] if DRAW in values else file.model
-        return varied_model(model, values, self.effects)
-
-    def _draws(self, path: Path, file: ModelFile) -> list[DepositionModel]:
-        sample, posterior = self.file.sample, file.posterior
-        assert sample is not None
-        if posterior is None:
-            raise BatchError(
-                f'{path}: has no posterior to draw from; take a model that calibrate, diagnose '
-                'or refit wrote'
+            if posterior is None:
+                raise BatchError(
+                    f'{path}: has no posterior to draw from; take a model that calibrate, '
+                    'diagnose or refit wrote'
+                )
+            drawn = self._once(
+                ('draws', path), lambda: draw_models(model, posterior, sample.count, sample.seed)
             )
-        return self._once(
-            ('draws', path), lambda: draw_models(file.model, posterior, sample.count, sample.seed)
-        )
+            model = drawn[values[DRAW]]
+        return varied_model(model, values, self.effects)
 
     def _inputs(self, values: Values) -> tuple[str, str, str]:
         """Names of the part, the motion and the readings of a case."""

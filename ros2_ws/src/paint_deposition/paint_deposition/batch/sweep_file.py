@@ -1,9 +1,10 @@
 """Sweep files: what is fixed and what varies."""
 
+import sys
 from pathlib import Path
-from typing import Annotated, Any, Literal, TypeVar
+from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BaseModel, Field, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import BatchError
 from paint_deposition.files.motion_source import MotionSource, Number, Text
@@ -13,62 +14,44 @@ from paint_deposition.request import validate
 MOST_CASES = 1_000_000
 LIST_WORDS = 'a list of at least one value, or {first: A, last: B, steps: N}'
 DISTRIBUTION_WORDS = '{normal: [mean, standard deviation]} or {uniform: [lowest, highest]}'
-Model = TypeVar('Model', bound=BaseModel)
 
 
-class Steps(BaseModel, extra='forbid'):
-    """Evenly spaced values, both ends included."""
-
-    first: Number
-    last: Number
-    steps: int = Field(ge=2, le=MOST_CASES)
-
-    def values(self) -> list[float]:
-        """All of them, rounded to 12 digits."""
-        span = self.last - self.first
-        return [float(f'{self.first + span * k / (self.steps - 1):.12g}')
-                for k in range(self.steps)]  # fmt: skip
-
-
-class Distribution(BaseModel, extra='forbid'):
-    """A distribution: normal or uniform."""
-
-    normal: tuple[Number, Number] | None = None
-    uniform: tuple[Number, Number] | None = None
-
-    @model_validator(mode='after')
-    def _is_one_distribution(self) -> 'Distribution':
-        if (self.normal is None) == (self.uniform is None):
-            raise ValueError('give one of normal, uniform')
-        if self.normal and not self.normal[1] > 0.0:
-            raise ValueError('the standard deviation must be above 0')
-        if self.uniform and not self.uniform[1] > self.uniform[0]:
-            raise ValueError('the second number must be the greater')
-        return self
+def is_number(value: Any) -> bool:
+    """Whether a value is a finite number."""
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and abs(value) <= sys.float_info.max
 
 
 def _grid(given: dict[str, Any]) -> dict[str, list[Any]]:
+    """The values of each name: as listed, or evenly spaced, both ends included."""
     values = dict(given)
     for name, listed in given.items():
-        if isinstance(listed, dict):
-            values[name] = _validated(Steps, name, listed, LIST_WORDS).values()
-        elif not isinstance(listed, list) or not listed:
+        if isinstance(listed, dict) and {*listed} == {'first', 'last', 'steps'}:
+            first, last, steps = listed['first'], listed['last'], listed['steps']
+            whole = isinstance(steps, int) and 2 <= steps <= MOST_CASES
+            if whole and all(map(is_number, (first, last))):
+                span, ends = last - first, steps - 1
+                values[name] = [float(f'{first + span * k / ends:.12g}') for k in range(steps)]
+                continue
+        if not isinstance(listed, list) or not listed:
             raise ValueError(f'{name} is {listed!r}; expected {LIST_WORDS}')
     return values
 
 
-def _distributions(given: dict[str, Any]) -> dict[str, Distribution]:
-    return {
-        name: _validated(Distribution, name, values, DISTRIBUTION_WORDS)
-        for name, values in given.items()
-    }
-
-
-def _validated(model: type[Model], name: str, given: Any, expected: str) -> Model:
-    try:
-        return model.model_validate(given)
-    except ValidationError:
-        raise ValueError(f'{name} is {given!r}; expected {expected}') from None
+def _distributions(given: dict[str, Any]) -> dict[str, tuple[str, float, float]]:
+    """Of each name whether it is normal or uniform, and its two numbers."""
+    found = {}
+    for name, said in given.items():
+        ((kind, numbers), *more) = said.items() if isinstance(said, dict) and said else [('', [])]
+        two = isinstance(numbers, list) and len(numbers) == 2 and all(map(is_number, numbers))
+        if more or not two or kind not in ('normal', 'uniform'):
+            raise ValueError(f'{name} is {said!r}; expected {DISTRIBUTION_WORDS}')
+        low, high = map(float, numbers)
+        # A standard deviation is above 0, the greatest above the lowest.
+        if not high > (0.0 if kind == 'normal' else low):
+            raise ValueError(f'{name} is {said!r}; expected {DISTRIBUTION_WORDS}')
+        found[name] = kind, low, high
+    return found
 
 
 class Sample(BaseModel, extra='forbid'):

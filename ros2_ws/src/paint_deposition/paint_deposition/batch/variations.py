@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import BaseModel
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.batch.sweep_file import MOST_CASES, SweepFile
+from paint_deposition.batch.sweep_file import MOST_CASES, SweepFile, is_number
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -95,9 +95,8 @@ def _draws(file: SweepFile) -> list[Values]:
     rng = np.random.default_rng(file.sample.seed)
     columns = {}
     for name, spread in file.sample.vary.items():
-        low, high = spread.normal or spread.uniform
-        draw = rng.normal if spread.normal else rng.uniform
-        columns[name] = draw(low, high, file.sample.count).tolist()
+        kind, low, high = spread
+        columns[name] = getattr(rng, kind)(low, high, file.sample.count).tolist()
     if file.sample.posterior:
         columns[DRAW] = list(range(file.sample.count))
     return [{name: column[k] for name, column in columns.items()}
@@ -124,21 +123,17 @@ def _require_kind(name: str, value: Any) -> None:
     if name in INPUTS:
         holds, expected = isinstance(value, str), 'the name of a file'
     elif name == 'part_pose':
-        holds, expected = all(map(_is_number, many)) and is_pose(many), POSE_FORMAT
+        holds, expected = all(map(is_number, many)) and is_pose(many), POSE_FORMAT
     elif name == 'effects':
         holds = isinstance(value, list) and all(isinstance(one, str) for one in value)
         expected = 'a list of effects of the model, [] for none'
     elif name in (*PASS_KEYS, 'speed_factor', 'flow_factor'):
-        holds = _is_number(value) and value > 0.0
-        expected = f'a number{" above 0" if _is_number(value) else ""}'
+        holds = is_number(value) and value > 0.0
+        expected = f'a number{" above 0" if is_number(value) else ""}'
     else:
-        holds, expected = _is_number(value), 'a number'
+        holds, expected = is_number(value), 'a number'
     if not holds:
         raise BatchError(f'{name} is {value!r}; expected {expected}')
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and np.isfinite(value)
 
 
 def varied_model(

@@ -17,7 +17,8 @@ from paint_deposition.files.atomic import json_text
 from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
-    from paint_deposition.files.recordings.bag_summary import BagSummary, PoseSource
+    from paint_deposition.files.recordings.bag_files import BagTopic
+    from paint_deposition.files.recordings.bag_summary import PoseSource
     from paint_deposition.motion.stream_quality import StreamQuality
 
 MOST_NAMED = 8
@@ -85,8 +86,11 @@ def _contents(
     from paint_deposition.files.motion_source import MotionSource
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
     from paint_deposition.files.recordings.bag_summary import summarise
+    from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+    from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
-    from paint_deposition.files.tables.readings import holds_readings, is_gauge_file
+    from paint_deposition.files.tables.readings import holds_readings
+    from paint_deposition.files.tables.sheets import is_gauge_file
     from paint_deposition.request import validate
 
     source = validate(MotionSource, 'motion', motion, RecordingError)
@@ -108,9 +112,13 @@ def _contents(
     if is_rapid(path):
         program = read_program(path, **of_program)
         return asdict(program), [program_as_text(program)]
-    summary = summarise(path, max_pose_gap_s)
-    streams = [source.to_dict() for source in summary.pose_streams]
-    return asdict(summary) | {'pose_streams': streams}, _bag_lines(summary)
+    topics, sources = summarise(path, max_pose_gap_s)
+    triggers = [t.name for kind in (STATE_TYPE, BOOL_TYPE) for t in topics if t.type == kind]
+    figures = {
+        'path': str(path), 'topics': [asdict(topic) for topic in topics],
+        'pose_streams': [source.to_dict() for source in sources], 'triggers': triggers,
+    }  # fmt: skip
+    return figures, _bag_lines(path, topics, sources, triggers)
 
 
 def _mesh_contents(path: Path) -> Contents:
@@ -120,10 +128,10 @@ def _mesh_contents(path: Path) -> Contents:
     from paint_deposition.files.mesh_bodies import WITH_UNIT, read_bodies
     from paint_deposition.files.meshes import LARGEST_M
 
-    bodies, scale, unit = read_bodies(path), 1.0, ''
+    ((vertices, faces), *_), scale, unit = read_bodies(path), 1.0, ''
     if path.suffix.lower() not in WITH_UNIT:
         unit = 'it has no unit and is taken for metres'
-        largest = float(np.ptp(bodies.vertices, axis=0).max()) if len(bodies.vertices) else 0.0
+        largest = float(np.ptp(vertices, axis=0).max()) if len(vertices) else 0.0
         if largest > LARGEST_M:
             scale, unit = 1e-3, (
                 f'it has no unit and looks like millimetres, else it would be {largest:.4g} m '
@@ -133,11 +141,11 @@ def _mesh_contents(path: Path) -> Contents:
     box, where = _box(surface.vertices_m)
     area_m2 = float(surface.vertex_areas_m2.sum())
     figures = {
-        'triangles': len(bodies.faces), **box, 'area_m2': area_m2, 'mesh_scale': scale,
+        'triangles': len(faces), **box, 'area_m2': area_m2, 'mesh_scale': scale,
         'notes': list(surface.notes),
     }  # fmt: skip
     size = ' x '.join(f'{side:.3f}' for side in np.ptp(surface.vertices_m, axis=0))
-    what = f'{path.name}: a mesh of {len(bodies.faces)} triangles, {size} m, {area_m2:.3g} m2'
+    what = f'{path.name}: a mesh of {len(faces)} triangles, {size} m, {area_m2:.3g} m2'
     return figures, [*filter(None, [what, unit, where]), *surface.notes]
 
 
@@ -208,19 +216,20 @@ def _box(points_m: Any) -> tuple[dict[str, list[float]], str]:
     return {name: corner.tolist() for name, corner in corners.items()}, box_words(points_m)
 
 
-def _bag_lines(summary: BagSummary) -> list[str]:
+def _bag_lines(
+    path: Path, topics: list[BagTopic], sources: list[PoseSource], triggers: list[str]
+) -> list[str]:
     from paint_deposition.files.recordings.message_definitions import TF_TYPES
 
-    width = max((len(topic.name) for topic in summary.topics), default=0)
-    topics = [f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in summary.topics]
-    lines = [summary.path, *topics]
-    for source in summary.pose_streams:
+    width = max((len(topic.name) for topic in topics), default=0)
+    lines = [str(path), *(f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in topics)]
+    for source in sources:
         lines += _source_lines(source)
-    if not summary.pose_streams:
+    if not sources:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
-    if {topic.type for topic in summary.topics} & {*TF_TYPES}:
+    if {topic.type for topic in topics} & {*TF_TYPES}:
         lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
-    return [*lines, f'triggers: {" ".join(summary.triggers) or "none"}']
+    return [*lines, f'triggers: {" ".join(triggers) or "none"}']
 
 
 def _source_lines(source: PoseSource) -> list[str]:

@@ -60,27 +60,28 @@ def model_for(given: Path | None, motion: Path, named: bool = True) -> ChosenMod
 
     ``named`` is as for ``chosen_model``. Warnings go to stderr.
     """
-    from paint_deposition.files.provenance import model_digest, planned_model
+    from paint_deposition.files.provenance import model_digest, model_of_plan, planned_model
 
     planned = planned_model(motion)
     chosen = chosen_model(given, named=named)
     if planned is None:
         return chosen
+    path, digest = planned
     if chosen.file is not None:
         model = chosen.model
         alike = [model, *(model.with_brush(brush.number) for brush in model.brushes)]
-        if planned.digest not in map(model_digest, alike):
-            print_all('note', [f'{motion} was planned with another model ({planned.digest[:12]})'])
+        if digest not in map(model_digest, alike):
+            print_all('note', [f'{motion} was planned with another model ({digest[:12]})'])
         return chosen
-    file = planned.file()
+    file = model_of_plan(path, digest)
     if file is None:
         print_all('warning', [
-            f'{motion} was planned with a model ({planned.digest[:12]}) that is not in '
-            f'{planned.path}; give it with --model, or the film is another one than planned'
+            f'{motion} was planned with a model ({digest[:12]}) that is not in '
+            f'{path}; give it with --model, or the film is another one than planned'
         ])  # fmt: skip
         return chosen
-    words = f'that of the plan, {model_words(planned.path, file)}'
-    return ChosenModel(file, planned.path, words)
+    words = f'that of the plan, {model_words(path, file)}'
+    return ChosenModel(file, path, words)
 
 
 def models_for(

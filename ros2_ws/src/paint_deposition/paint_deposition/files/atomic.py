@@ -112,9 +112,6 @@ def filled(template: Path, **values: Any) -> str:
     return made.render(values)
 
 
-MAGIC = b'PAR1'
-
-
 def require_pyarrow(what: str) -> None:
     """Refuse to begin what needs the library of the extra, where it is not installed."""
     if find_spec('pyarrow') is None:

@@ -72,105 +72,89 @@ class GunMotionFile:
         return path.with_(brush=np.full(len(path), self.brush))
 
 
-@dataclass(frozen=True)
-class LaidCoats:
-    """The coats of an experiment, with their guns in the order of painting."""
+def laid_coats(
+    folder: Path, entry: PaintJob, written: Sequence[Any]
+) -> tuple[Coats, list[GunMotionFile], list[float | None]]:
+    """The coats that an experiment lists, else the one that it is, and their guns in order.
 
-    coats: Coats
-    guns: tuple[GunMotionFile, ...]
-    solids: tuple[float | None, ...]  # (C,) of each coat, where known
+    Then the share of solids in the paint of each coat, None where it is not said.
 
-    @staticmethod
-    def of(folder: Path, entry: PaintJob, written: Sequence[Any]) -> 'LaidCoats':
-        """The coats that an experiment lists, else the one that it is.
+    Raises:
+        ReadingsError: naming the coat or the gun and the key at fault.
+    """
+    coats = [
+        validate(CoatEntry, f'coat {number}', one, ReadingsError)
+        for number, one in enumerate(written, start=1)
+    ]
+    called = [coat.name for coat in coats]
+    if twice := [name for name in called if called.count(name) > 1]:
+        raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
+    guns: list[GunMotionFile] = []
+    names: list[str] = []
+    jobs: Sequence[PaintJob] = coats or [entry]
+    for coat in jobs:
+        given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
+        for number, one in enumerate(given, start=1):
+            gun = validate(_Gun, f'gun {number}', one, ReadingsError)
+            whose = f"coat '{coat.name}'" if coats else 'it'
+            whose = whose if given == [{}] else f'gun {number}'
+            guns.append(_motion(folder, (gun, coat, entry), whose))
+        names += [coat.name] * len(given) * bool(coats)
+    on_wet = {coat.name for coat in coats if coat.wet_on_wet}
+    solids = [entry.solids if coat.solids is None else coat.solids for coat in jobs]
+    return Coats.of_guns(names, len(guns), on_wet), guns, solids
 
-        Raises:
-            ReadingsError: naming the coat or the gun and the key at fault.
-        """
-        coats = [
-            validate(CoatEntry, f'coat {number}', one, ReadingsError)
-            for number, one in enumerate(written, start=1)
-        ]
-        called = [coat.name for coat in coats]
-        if twice := [name for name in called if called.count(name) > 1]:
-            raise ReadingsError(f"two coats are called '{twice[0]}'; rename one, or list guns")
-        guns: list[GunMotionFile] = []
-        names: list[str] = []
-        jobs: Sequence[PaintJob] = coats or [entry]
-        for coat in jobs:
-            given = coat.guns or ([] if coat.trajectory else entry.guns) or [{}]
-            for number, one in enumerate(given, start=1):
-                gun = validate(_Gun, f'gun {number}', one, ReadingsError)
-                whose = f"coat '{coat.name}'" if coats else 'it'
-                whose = whose if given == [{}] else f'gun {number}'
-                guns.append(_motion(folder, (gun, coat, entry), whose))
-            names += [coat.name] * len(given) * bool(coats)
-        on_wet = {coat.name for coat in coats if coat.wet_on_wet}
-        solids = tuple(entry.solids if coat.solids is None else coat.solids for coat in jobs)
-        return LaidCoats(Coats.of_guns(names, len(guns), on_wet), tuple(guns), solids)
 
-    def painted(self, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
-        """The path of the guns that laid a layer, and the wet films that it is the sum of."""
-        films = self.coats.films_of(layer)
-        chosen = sorted({k for _, rows in films for k in range(len(paths))[rows]})
-        ends = np.cumsum([0, *(len(paths[k]) for k in chosen)]).tolist()
-        start = {k: ends[place] for place, k in enumerate(chosen)}
-        stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
-        steps = tuple(
-            (sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films
+def laid_path(coats: Coats, layer: str, paths: Sequence[SprayPath]) -> tuple[SprayPath, WetFilms]:
+    """The path of the guns that laid a layer, and the wet films that it is the sum of.
+
+    ``paths`` are those of all guns in the order of painting.
+    """
+    films = coats.films_of(layer)
+    chosen = sorted({k for _, rows in films for k in range(len(paths))[rows]})
+    ends = np.cumsum([0, *(len(paths[k]) for k in chosen)]).tolist()
+    start = {k: ends[place] for place, k in enumerate(chosen)}
+    stop = {k: ends[place + 1] for place, k in enumerate(chosen)}
+    steps = tuple((sign, slice(start[rows.start], stop[rows.stop - 1])) for sign, rows in films)
+    return SprayPath.of_guns([paths[k] for k in chosen]), steps
+
+
+def solids_of(layer: str, coats: Coats, solids: Sequence[float | None]) -> float:
+    """The share of solids in the paint of a layer, whose coats have these where they are known.
+
+    Raises:
+        ReadingsError: the solids of the coats are not known or differ.
+    """
+    its = layer.split('+') if layer != TOTAL else coats.names
+    shares = {solids[coats.names.index(coat)] for coat in its}
+    share = shares.pop()
+    if share is None or shares:
+        of = 'the paint' if coats.names == ('',) else f"layer '{layer}'"
+        what = 'differ' if shares else 'are not said'
+        raise ReadingsError(
+            f'the readings are wet, and the solids of {of} {what}; give each coat its solids, '
+            '0.45 say, and name the one that was read in the column layer'
         )
-        return SprayPath.of_guns([paths[k] for k in chosen]), steps
-
-    def dry(self, readings: Readings, layer: str, wet: bool, under_um: float) -> Readings:
-        """Readings of a layer as its dry film alone.
-
-        Args:
-            wet: whether they were taken wet. Where all are teeth of a comb, the film is as likely
-                anywhere between the tooth that is read and the next.
-            under_um: film that was there before the first coat, part of all total readings [um].
-
-        Raises:
-            ReadingsError: taken wet, of coats whose solids are not known or differ.
-        """
-        film_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
-        if wet:
-            share = self._solids(layer)
-            if (step_um := _comb_step_um(film_um)) and np.isnan(sigma_um).all():
-                film_um, sigma_um = (
-                    film_um + 0.5 * step_um,
-                    np.full(len(film_um), step_um / 12**0.5),
-                )
-                words += f'; a comb in steps of {step_um:g} µm, half of which is added'
-            film_um, sigma_um = share * film_um, share * sigma_um
-            words += f'; wet film, times {share:g} solids'
-        if under_um and layer == TOTAL:
-            film_um, words = film_um - under_um, f'{words}; less {under_um:g} µm below'
-        return replace(
-            readings, thickness_um=film_um, sigma_um=sigma_um,
-            understood=f'{readings.understood}{words}',
-            layer=readings.layer if self.coats.names == ('',) else np.array(layer),
-        )  # fmt: skip
-
-    def _solids(self, layer: str) -> float:
-        coats = layer.split('+') if layer != TOTAL else self.coats.names
-        known = {self.solids[self.coats.names.index(coat)] for coat in coats}
-        share = known.pop()
-        if share is None or known:
-            of = 'the paint' if self.coats.names == ('',) else f"layer '{layer}'"
-            what = f'of {of} differ' if known else f'of {of} are not said'
-            raise ReadingsError(
-                f'the readings are wet, and the solids {what}; give each coat its solids, 0.45 '
-                'say, and name the one that was read in the column layer'
-            )
-        return share
+    return share
 
 
-def _comb_step_um(thickness_um: np.ndarray) -> float:
-    """The least step between the teeth of a comb [um], 0 where the readings are no teeth."""
-    teeth = np.unique(thickness_um)
-    if len(teeth) < FEWEST_TEETH or np.any(teeth % TOOTH_UM):
-        return 0.0
-    return float(np.diff(teeth).min())
+def dried(readings: Readings, share: float) -> Readings:
+    """Readings of a wet film as the dry film that a share of solids leaves.
+
+    Where all are teeth of a comb, the film is as likely anywhere between the tooth that is read
+    and the next.
+    """
+    wet_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
+    teeth = np.unique(wet_um)
+    is_comb = len(teeth) >= FEWEST_TEETH and not np.any(teeth % TOOTH_UM)
+    if is_comb and np.isnan(sigma_um).all():
+        step_um = float(np.diff(teeth).min())
+        wet_um, sigma_um = wet_um + 0.5 * step_um, np.full(len(wet_um), step_um / 12**0.5)
+        words = f'; a comb in steps of {step_um:g} µm, half of which is added'
+    return replace(
+        readings, thickness_um=share * wet_um, sigma_um=share * sigma_um,
+        understood=f'{readings.understood}{words}; wet film, times {share:g} solids',
+    )  # fmt: skip
 
 
 def _motion(folder: Path, levels: Sequence[_Gun], whose: str) -> GunMotionFile:

@@ -9,7 +9,14 @@ import numpy as np
 from pydantic import AfterValidator, BaseModel, Field, model_validator
 
 from paint_deposition.errors import PaintError, ReadingsError
-from paint_deposition.files.campaign_coats import LaidCoats, Name, PaintJob
+from paint_deposition.files.campaign_coats import (
+    Name,
+    PaintJob,
+    dried,
+    laid_coats,
+    laid_path,
+    solids_of,
+)
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
@@ -167,15 +174,15 @@ def _read_experiments(
 ) -> list[Experiment]:
     """One for each layer that was measured; ``zones`` is the file of theirs."""
     files = {kind: str(folder / getattr(entry, kind)) for kind in ('mesh', 'measurements')}
-    laid = LaidCoats.of(folder, entry, entry.coats)
-    for number, file in enumerate(dict.fromkeys(gun.file for gun in laid.guns), start=1):
+    coats, guns, solids = laid_coats(folder, entry, entry.coats)
+    for number, file in enumerate(dict.fromkeys(gun.file for gun in guns), start=1):
         files['trajectory' if number == 1 else f'trajectory {number}'] = file
     down = None if entry.down is None else np.array(entry.down)
     # Readings are matched to the surface: a finer mesh only helps where that is strongly curved.
     surface = read_mesh(files['mesh'], entry.mesh_scale, 0.02, down, entry.body)
-    trajectories = [read_motion(gun.file, gun.source) for gun in laid.guns]
+    trajectories = [read_motion(gun.file, gun.source) for gun in guns]
     paths = []
-    for trajectory, gun in zip(trajectories, laid.guns, strict=True):
+    for trajectory, gun in zip(trajectories, guns, strict=True):
         path, counts, odd = checked_path(trajectory, entry.max_pose_gap_s)
         paths.append(gun.with_brush(path))
         for warning in odd:
@@ -198,26 +205,26 @@ def _read_experiments(
     for trajectory in reversed(trajectories):
         settings |= trajectory.settings
     made = []
-    for layer, rows in laid.coats.by_layer(readings.layer).items():
-        path, films = laid.painted(layer, paths)
-        of_layer = laid.dry(readings.select(rows), layer, entry.wet, entry.under_um)
+    for layer, rows in coats.by_layer(readings.layer).items():
+        path, films = laid_path(coats, layer, paths)
+        of_layer = readings.select(rows)
+        if entry.wet:
+            of_layer = dried(of_layer, solids_of(layer, coats, solids))
+        if entry.under_um and layer == TOTAL:
+            film_um = of_layer.thickness_um - entry.under_um
+            understood = f'{of_layer.understood}; less {entry.under_um:g} µm below'
+            of_layer = replace(of_layer, thickness_um=film_um, understood=understood)
+        if coats.names != ('',):
+            of_layer = replace(of_layer, layer=np.array(layer))
         experiment = Experiment.of(
             f'{name}: {layer}' if entry.coats and (layer != TOTAL or not rows.all()) else name,
             surface, path, of_layer, files, settings, off, trajectories[0].frame_id, films,
         )  # fmt: skip
         band = (entry.target_um or 0.0, entry.tolerance_um or 0.0)
         experiment = replace(experiment, layer=layer, target=band if band[0] else None)
-        # What is wanted is the whole film.
-        made.append(_with_zones(experiment, entry, zones) if layer == TOTAL else experiment)
+        if zones and layer == TOTAL:  # what is wanted is the whole film
+            of_part = read_zones(zones, files['mesh'], entry.mesh_scale, entry.body)
+            its_files = experiment.files | {'zones': str(zones)}
+            experiment = replace(experiment, zones=of_part.on(surface), files=its_files)
+        made.append(experiment)
     return made
-
-
-def _with_zones(experiment: Experiment, part: OnePart, file: str | Path | None) -> Experiment:
-    if not file:
-        return experiment
-    zones = read_zones(file, experiment.files['mesh'], part.mesh_scale, part.body)
-    return replace(
-        experiment,
-        zones=zones.on(experiment.surface),
-        files=experiment.files | {'zones': str(file)},
-    )

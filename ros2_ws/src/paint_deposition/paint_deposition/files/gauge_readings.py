@@ -39,11 +39,11 @@ def read_readings(
     """Read gauge readings.
 
     Args:
-        path: CSV, TSV, TXT, JSON, Parquet, a workbook, or a folder or zip. The project's own
-            columns are ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``,
-            ``group``, ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings,
-            and the layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one
-            place are repeats.
+        path: CSV, TSV, TXT, JSON, a workbook, or a folder or zip. The project's own columns are
+            ``x_m,y_m,z_m,thickness_um`` and optionally ``point``, ``sigma_um``, ``group``,
+            ``session``, ``layer`` and ``nx,ny,nz``; others are known by usual headings, and the
+            layouts of gauges by ``gauge_formats``. Without labels, readings at exactly one place
+            are repeats.
         points: file of the measuring points (label, x, y, z) that readings name.
         layout: what the file does not say itself.
         surface: the part, for points that are given on its face.
@@ -54,14 +54,13 @@ def read_readings(
     path, layout = Path(path), layout or Layout()
     listed = None if points is None else MeasuringPoints.read(Path(points), layout, surface)
     read = ReadingTable.read(path, True, layout, listed.labels if listed else ())
-    table = read.table
     thickness, row, layers, film_words = read.films_um()
     for k in np.flatnonzero((thickness < THINNEST_UM) | (thickness > THICKEST_UM)):
         found = f'{read.heading("thickness")} is {thickness[k]:g}'
         span = f'{THINNEST_UM:g} to {THICKEST_UM:g} micrometres'
         unit = ': it may be in another unit than is said' if thickness[k] > THICKEST_UM else ''
-        table.complain(row[k], f'{found}; expected {span}{unit}')
-    doubts = read.doubts
+        read.add_error(row[k], f'{found}; expected {span}{unit}')
+    doubts = tuple(read.doubts())
     if listed is not None:
         positions, normals, labels, place_words = listed.joined_to(read)
         measured, count = len({*labels.tolist()}), len(listed.labels)
@@ -75,12 +74,12 @@ def read_readings(
         labels = _labels(read, positions)
     sigma_um = np.full(len(read), np.nan)
     if read.has('sigma'):
-        sigma_um = read.numbers('sigma', may_be_empty=True)
+        sigma_um = read.numbers(read.at['sigma'][0], may_be_empty=True)
         for k in np.flatnonzero(sigma_um <= 0.0):
-            table.complain(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
-    table.refuse_errors()
-    notes = [f'{len(row)} readings, {table.form}', f'{place_words}, {film_words}', read.left_out]
-    groups, sessions = (np.array(c)[row] for c in (read.groups, read.texts('session')))
+            read.add_error(k, f'{read.heading("sigma")} is {sigma_um[k]:g}; expected above 0')
+    read.refuse_errors()
+    notes = [f'{len(row)} readings, {read.form}', f'{place_words}, {film_words}', read.left_out]
+    groups, sessions = (np.array(c)[row] for c in (read.groups, read.of('session')))
     readings = Readings(
         positions[row], thickness, labels[row], groups, sigma_um[row],
         None if normals is None else normals[row], str(path), sessions,
@@ -118,19 +117,19 @@ class MeasuringPoints:
         positions, normals, place_words = _places(read, surface)
         labels = read.labels
         if labels is None:
-            raise read.table.error(
+            raise read.error(
                 'the points have no labels; give a column point, with the labels of the readings'
             )
         first: dict[str, int] = {}
         for row, label in enumerate(labels):
             other = first.setdefault(label, row)
             if not label:
-                read.table.complain(row, NO_LABEL)
+                read.add_error(row, NO_LABEL)
             elif not np.array_equal(positions[row], positions[other]):
-                same = f"point '{label}' is elsewhere in line {read.table.lines[other]}"
-                read.table.complain(row, f'{same}; keep one')
-        read.table.refuse_errors()
-        words = f'{place_words} of {len(labels)} points in {path.name} ({read.table.form})'
+                same = f"point '{label}' is elsewhere in line {read.lines[other]}"
+                read.add_error(row, f'{same}; keep one')
+        read.refuse_errors()
+        words = f'{place_words} of {len(labels)} points in {path.name} ({read.form})'
         return MeasuringPoints(path, labels, positions, normals, words)
 
     def joined_to(
@@ -138,13 +137,13 @@ class MeasuringPoints:
     ) -> tuple[np.ndarray, np.ndarray | None, np.ndarray, str]:
         """Positions (N, 3) [m], normals, labels (N,) of the rows of readings, and what was done.
 
-        Rows that name no listed point are complained of in the table of readings.
+        Rows that name no listed point are errors of the table of readings.
         """
         wanted, by = self._wanted_by(readings)
         places = {label: row for row, label in enumerate(self.labels)}
         known = f"its points are called '{self.labels[0]}' to '{self.labels[-1]}'"
         if any(wanted) and places.keys().isdisjoint(wanted):
-            raise readings.table.error(
+            raise readings.error(
                 f"the readings are called '{wanted[0]}' to '{wanted[-1]}', and there is no such "
                 f'point in {self.path.name} ({known}); name them alike, or leave the labels of '
                 'the readings out where they are in the order of the points'
@@ -152,7 +151,7 @@ class MeasuringPoints:
         for row, label in enumerate(wanted):
             if label not in places:
                 missing = f"no point '{label}' in {self.path.name} ({known})"
-                readings.table.complain(row, missing if label else NO_LABEL)
+                readings.add_error(row, missing if label else NO_LABEL)
         rows = [places.get(label, 0) for label in wanted]
         words = f'{self.words}, joined {by}'
         if unmeasured := [label for label in self.labels if label not in set(wanted)]:
@@ -167,49 +166,48 @@ class MeasuringPoints:
         A gauge's own count of its readings is their order: it knows nothing of a point left out.
         """
         labels, by = readings.labels, readings.named_by
-        orders = [([str(k) for k in order], count) for order, count in readings.orders]
+        orders = [([*map(str, order)], count) for order, count in readings.orders]
         if labels and {*labels}.isdisjoint(self.labels) and len({*labels}) == 1:
             # The name of the part, or none.
-            labels = labels if labels[0] and not format_of(readings.table.headings) else None
+            labels = labels if labels[0] and not format_of(readings.headings) else None
         again = ''
-        if labels is not None and by[-1] == 'number' and {*labels}.isdisjoint(self.labels):
-            labels, by = readings.texts('number'), ('number',)
-        if labels is not None and by == ('number',):
-            again = _counts_anew(readings, labels)
-            if again and not {*self.labels} <= {*labels}:
-                labels = None
-        if labels is not None and (by != ('number',) or labels != orders[0][0]):
+        if labels is not None and by[-1] == 'number':
+            if {*labels}.isdisjoint(self.labels):
+                labels, by = readings.of('number'), ('number',)
+            if by == ('number',):
+                again = _counts_anew(readings)
+                in_order = labels == orders[0][0] or (again and {*self.labels} - {*labels})
+                labels = None if in_order else labels
+        if labels is not None:
             return labels, f"by '{' '.join(map(readings.heading, by))}'"
-        for wanted, count in orders:
+        for order, count in orders:
             if count == len(self.labels):
-                if not {*wanted} <= {*self.labels}:
-                    wanted = [self.labels[int(number) - 1] for number in wanted]
-                return wanted, 'by the order of the readings'
+                if not {*order} <= {*self.labels}:
+                    order = [self.labels[int(number) - 1] for number in order]
+                return order, 'by the order of the readings'
         if again:
-            raise readings.table.error(
-                f"{again}; give a column 'point' with the labels of the points"
-            )
+            raise readings.error(f"{again}; give a column 'point' with the labels of the points")
         figures = readings.figures_at_end
-        what = f'{figures}; delete it if so' if figures else (
-            'which is missing is not known; write n/a in its place'
-        )  # fmt: skip
-        raise readings.table.error(
+        unknown = 'which is missing is not known; write n/a in its place'
+        raise readings.error(
             f'{orders[0][1]} readings in order for the {len(self.labels)} points in '
-            f"{self.path.name}: {what}, or give a column 'point' with the labels of the points"
+            f'{self.path.name}: {f"{figures}; delete it if so" if figures else unknown}, or give '
+            "a column 'point' with the labels of the points"
         )
 
 
-def _counts_anew(readings: ReadingTable, numbers: list[str]) -> str:
+def _counts_anew(readings: ReadingTable) -> str:
     """In words that a count of readings begins anew and names no points, '' where it does not.
 
     It does so where another column changes, or from the same number each time.
     """
+    numbers = readings.of('number')
     if not all(map(str.isdigit, numbers)) or len({*numbers}) == len(numbers):
         return ''
-    table, counted = readings.table, [int(text) for text in numbers]
+    counted = [*map(int, numbers)]
     falls = [row for row, (a, b) in enumerate(pairwise(counted), start=1) if b <= a]
-    for column, heading in enumerate(table.headings):
-        texts = table.texts(column)
+    for column, heading in enumerate(readings.headings):
+        texts = readings.texts(column)
         changes = [row for row, (a, b) in enumerate(pairwise(texts), start=1) if a != b]
         if changes == falls and column not in readings.at['thickness']:
             return f"'{readings.heading('number')}' counts anew in each {heading.text}"
@@ -226,9 +224,9 @@ def write_predictions(path: str | Path, readings: Readings, predicted_um: np.nda
     read = ReadingTable.read(Path(readings.source), True, Layout(), readings.point)
     _, row, _, _ = read.films_um()
     rows, first = np.unique(row, return_index=True)
-    names = [heading.text for heading in read.table.headings]
+    names = [heading.text for heading in read.headings]
     kept = [k for k, name in enumerate(names) if name != 'predicted_um']
-    columns = [read.table.texts(k) for k in kept]
+    columns = [read.texts(k) for k in kept]
     lines = [[column[r] for column in columns] for r in rows]
     for line, k in zip(lines, first, strict=True):
         line.append(f'{predicted_um[k]:.4f}')
@@ -250,7 +248,7 @@ def table_text(lines: Iterable[Sequence[object]]) -> str:
 
 def _labels(read: ReadingTable, positions_m: np.ndarray) -> np.ndarray:
     """What the file calls the points, else the line of the first reading at each place."""
-    names = [f'line {line}' for line in read.table.lines]
+    names = [f'line {line}' for line in read.lines]
     _, first, place = np.unique(positions_m, axis=0, return_index=True, return_inverse=True)
     given = read.labels
     if given is not None and read.named_by[-1] == 'number':
@@ -266,13 +264,12 @@ def _places(
     read: ReadingTable, surface: Surface | None
 ) -> tuple[np.ndarray, np.ndarray | None, str]:
     """Positions (N, 3) of the rows in the mesh frame [m], normals, and their unit in words."""
-    table = read.table
     if read.has(*AXES):
         positions, words = read.lengths_m(AXES)
         return positions, _normals(read), words
     if read.has(*ON_FACE):
         if surface is None:
-            raise table.error(
+            raise read.error(
                 f"'{read.heading('from_left')}' and '{read.heading('height')}' are places on a "
                 'face; give x, y, z, or name the file in a campaign, which knows the part'
             )
@@ -280,7 +277,7 @@ def _places(
         positions, hit = on_face_m(surface, on_face)
         for row in np.flatnonzero(~hit & np.isfinite(on_face).all(axis=1)):
             left, height = on_face[row]
-            table.complain(
+            read.add_error(
                 row,
                 f'{left:.3f} m from the left and {height:.3f} m from the lower edge there is no '
                 'surface, as the gun sees the part',
@@ -288,12 +285,12 @@ def _places(
         return positions, None, words
     missing = [axis for axis in AXES if not read.has(axis)]
     if len(missing) < len(AXES):
-        raise table.error(
-            f'no column is known as {" or ".join(missing)} {shown(table.headings)}; '
+        raise read.error(
+            f'no column is known as {" or ".join(missing)} {shown(read.headings)}; '
             f'give it with columns: {{{missing[0]}: ...}} in the campaign'
         )
-    raise table.error(
-        f'the readings have no coordinates {shown(table.headings)}; give x, y, z, or a list of '
+    raise read.error(
+        f'the readings have no coordinates {shown(read.headings)}; give x, y, z, or a list of '
         'measuring points (points: in a campaign, else --points)'
     )
 
@@ -303,9 +300,9 @@ def _normals(read: ReadingTable) -> np.ndarray | None:
     if not names:
         return None
     if len(names) < len(NORMALS):
-        raise read.table.error(f'has {", ".join(names)} only; give all of nx,ny,nz or none')
-    normals = np.column_stack([read.numbers(name) for name in names])
+        raise read.error(f'has {", ".join(names)} only; give all of nx,ny,nz or none')
+    normals = np.column_stack([read.numbers(read.at[name][0]) for name in names])
     lengths = np.linalg.norm(normals, axis=1)
     for row in np.flatnonzero(lengths < 1e-6):
-        read.table.complain(row, 'the normal nx,ny,nz has length zero')
+        read.add_error(row, 'the normal nx,ny,nz has length zero')
     return normals / np.where(lengths < 1e-6, 1.0, lengths)[:, np.newaxis]

@@ -5,7 +5,6 @@ from __future__ import annotations
 import importlib.util
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -29,42 +28,27 @@ STL_HEAD = 84
 STL_TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('colour', '<u2')])
 
 
-@dataclass(frozen=True)
-class Bodies:
-    """Vertices (V, 3) in the file's own unit and precision, faces (F, 3), metres to the unit, and
-    notes.
-
-    ``unit_m`` is 1 where the file has no unit; the notes say what was understood, for the user.
-    ``colours`` (F, 3, 3) uint8 are those of the corners of the faces, where they were asked for.
-    """
-
-    vertices: np.ndarray
-    faces: np.ndarray
-    unit_m: float
-    notes: tuple[str, ...]
-    colours: np.ndarray | None = None
+# Vertices (V, 3) in the file's own unit and precision, and faces (F, 3).
+Body = tuple[np.ndarray, np.ndarray]
 
 
-def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> Bodies:
-    """Read all bodies of a file as one mesh, or the one of a name (object, solid, node or part).
+def read_bodies(path: Path, body: str | None = None) -> tuple[Body, float, list[str]]:
+    """All bodies of a file as one mesh, or the one of a name (object, solid, node or part).
 
-    Raises MeshError, saying what to do, for what is no mesh, has no such body, or no colours
-    although it should be ``coloured``.
+    With the metres of its unit, 1 where the file has none, and what was understood, for the user.
+    Raises MeshError, saying what to do, for what is no mesh or has no such body.
     """
     require_file(path, MeshError)
     kind = path.suffix.lower()
     if kind == '.stl' and (triangles := _binary_stl(path)):
-        if coloured:
-            raise _no_colours(path)
         if body not in (None, path.stem):
             raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
-        return Bodies(*triangles, 1.0, ())
+        return triangles, 1.0, []
     scene = _scene(path, kind)
-    found = _by_name(path, scene, coloured)
+    found = _by_name(path, scene)
     if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
         found = {path.stem: next(iter(found.values()))}
-    notes = []
-    unit_m = 1.0
+    notes, unit_m = [], 1.0
     if kind in WITH_UNIT:
         unit_m, unit_words = _unit(path, kind, scene)
         notes.append(f'{path.name}: {unit_words}')
@@ -80,12 +64,10 @@ def read_bodies(path: Path, body: str | None = None, coloured: bool = False) -> 
             f'{path.name}: its {len(found)} bodies were taken as one part: {names}; --body NAME '
             'takes one of them'
         )
-    vertices, faces = _joined([(vertices, faces) for vertices, faces, _ in found.values()])
-    colours = np.concatenate([c for *_, c in found.values()]) if coloured else None
-    return Bodies(vertices, faces, unit_m, tuple(notes), colours)
+    return _joined([*found.values()]), unit_m, notes
 
 
-def _binary_stl(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
+def _binary_stl(path: Path) -> Body | None:
     """Vertices, as in the file, and faces of a complete binary STL.
 
     trimesh takes five times the memory of the file.
@@ -136,11 +118,9 @@ def _scene(path: Path, kind: str) -> Scene:
         raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
 
 
-def _by_name(
-    path: Path, scene: Scene, coloured: bool
-) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray | None]]:
-    """Vertices (V, 3), faces (F, 3) and colours of each body with triangles, placed as there."""
-    found: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray | None]] = {}
+def _by_name(path: Path, scene: Scene) -> dict[str, Body]:
+    """Each body with triangles, placed as in the file."""
+    found: dict[str, Body] = {}
     for node in scene.graph.nodes_geometry:
         pose, name = scene.graph[node]
         faces = getattr(scene.geometry[name], 'faces', None)
@@ -150,32 +130,15 @@ def _by_name(
         if vertices.shape[1:] != (3,):
             raise MeshError(f'{path}: the vertices of {name!r} have no x, y, z; export it again')
         faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
-        colours = _colours(path, scene.geometry[name].visual, faces) if coloured else None
         if np.linalg.det(pose[:3, :3]) < 0.0:
             faces = faces[:, ::-1]
         if not np.array_equal(pose, np.eye(4)):
             vertices = vertices @ pose[:3, :3].T + pose[:3, 3]
-        found[str(node)] = vertices, faces, colours
+        found[str(node)] = vertices, faces
     return dict(sorted(found.items()))  # the library gives them in any order
 
 
-def _colours(path: Path, visual: Any, faces: np.ndarray) -> np.ndarray:
-    """(F, 3, 3) uint8 of the corners of the faces."""
-    if visual.kind == 'vertex':
-        return visual.vertex_colors[faces, :3]
-    if visual.kind == 'face':
-        return np.repeat(visual.face_colors[:, np.newaxis, :3], 3, axis=1)
-    raise _no_colours(path)
-
-
-def _no_colours(path: Path) -> MeshError:
-    return MeshError(
-        f'{path}: neither its vertices nor its faces have colours; export it with them, as PLY '
-        'for instance'
-    )
-
-
-def _joined(bodies: Sequence[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+def _joined(bodies: Sequence[Body]) -> Body:
     if not bodies:
         return np.empty((0, 3)), np.empty((0, 3), dtype=np.int64)
     if len(bodies) == 1:

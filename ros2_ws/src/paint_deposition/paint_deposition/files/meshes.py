@@ -8,7 +8,7 @@ import numpy as np
 
 from paint_deposition.errors import MeshError
 from paint_deposition.files.atomic import replacing
-from paint_deposition.files.mesh_bodies import SUFFIXES, Bodies, read_bodies
+from paint_deposition.files.mesh_bodies import SUFFIXES, read_bodies
 from paint_deposition.part.edges import Edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
@@ -61,32 +61,29 @@ class Triangles:
     faces: np.ndarray  # (F, 3) wound alike
     rows: np.ndarray  # (F,) number of each in the file, or in the body taken of it, from 0
     notes: list[str]  # what was put right, for the user
-    colours: np.ndarray | None  # (F, 3, 3) uint8 of their corners, where they were asked for
 
 
-def read_triangles(
-    path: str | Path, scale: float = 1.0, body: str | None = None, coloured: bool = False
-) -> Triangles:
-    """Read the triangles of a part, all of one winding where they join; see ``read_mesh``.
-
-    Raises:
-        MeshError: as ``read_mesh``, or without colours although it should be ``coloured``.
-    """
+def read_triangles(path: str | Path, scale: float = 1.0, body: str | None = None) -> Triangles:
+    """Read the triangles of a part, all of one winding where they join; see ``read_mesh``."""
     path = Path(path)
     meaning = 'metres per unit of the file, 0.001 for millimetres'
     _require_above_zero('mesh_scale', scale, meaning)
-    read = _load(path, body, coloured)
-    notes, unit_m, colours = [*read.notes], read.unit_m, read.colours
-    vertices, faces = read.vertices, read.faces
-    del read
+    if path.suffix.lower() not in SUFFIXES:
+        raise MeshError(
+            f'{path}: a mesh of type "{path.suffix}" cannot be read; '
+            f'export it as one of {", ".join(SUFFIXES)}'
+        )
+    if not path.exists() or path.is_dir():
+        raise MeshError(f'{path}: no such mesh file; check the path')
+    (vertices, faces), unit_m, notes = read_bodies(path, body)
+    _require_whole(path, vertices, faces)
     if unit_m * scale != 1.0:
         vertices = vertices.astype(np.float64) * (unit_m * scale)
     _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
     rows = np.flatnonzero(_with_area(path, vertices, faces, notes))
-    if len(rows) < len(faces):
-        faces, colours = faces[rows], None if colours is None else colours[rows]
-    return Triangles(vertices, _oriented(vertices, faces, notes), rows, notes, colours)
+    faces = faces[rows] if len(rows) < len(faces) else faces
+    return Triangles(vertices, _oriented(vertices, faces, notes), rows, notes)
 
 
 def _require_above_zero(name: str, value: float, meaning: str) -> None:
@@ -123,16 +120,7 @@ def write_mesh_ply(
         faces.tofile(file)
 
 
-def _load(path: Path, body: str | None, coloured: bool) -> Bodies:
-    if path.suffix.lower() not in SUFFIXES:
-        raise MeshError(
-            f'{path}: a mesh of type "{path.suffix}" cannot be read; '
-            f'export it as one of {", ".join(SUFFIXES)}'
-        )
-    if not path.exists() or path.is_dir():
-        raise MeshError(f'{path}: no such mesh file; check the path')
-    bodies = read_bodies(path, body, coloured)
-    vertices, faces = bodies.vertices, bodies.faces
+def _require_whole(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
     if not len(faces):
         raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
     if faces.min() < 0 or faces.max() >= len(vertices):
@@ -145,7 +133,6 @@ def _load(path: Path, body: str | None, coloured: bool) -> Bodies:
         raise MeshError(
             f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
         )
-    return bodies
 
 
 def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:

@@ -17,13 +17,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
 from paint_deposition.files.atomic import write_text
-from paint_deposition.files.model_text import (
-    LEARNED_ID,
-    file_name,
-    model_text,
-    needs_file,
-    source_of,
-)
+from paint_deposition.files.model_text import LEARNED_ID, model_text
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
@@ -113,7 +107,7 @@ def write_model(
     """Write a model with what each number means; an older file is replaced at once.
 
     Reading the file gives exactly this model. Files of users' own effects are named relative to
-    it; classes without a file get one beside it. ``header_comment`` stands at the top, the rest is
+    it; ModelError names a class that has none. ``header_comment`` stands at the top, the rest is
     as in ``ModelFile``.
     """
     path = Path(path)
@@ -122,8 +116,6 @@ def write_model(
         'posterior': posterior.model_dump(exclude_defaults=True) if posterior else {},
         'history': list(history or ()),
     }
-    for own in filter(needs_file, map(type, model.effects)):
-        write_text(path.with_name(file_name(own)), source_of(own))
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
 
 

@@ -1,7 +1,5 @@
-"""The text of a model file, with a comment on every number, and of effects kept beside it."""
+"""The text of a model file, with a comment on every number."""
 
-import ast
-import inspect
 import os
 from collections.abc import Mapping
 from contextlib import suppress
@@ -14,7 +12,7 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 
 from paint_deposition.effects.base import Effect
-from paint_deposition.effects.catalogue import EFFECTS, effect_of
+from paint_deposition.effects.catalogue import EFFECTS
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.errors import ModelError
@@ -95,13 +93,12 @@ def _effect(effect: Effect, folder: Path) -> CommentedMap:
         about = f'{effect.over} [{effect.unit}]'
         text.yaml_add_eol_comment(about, 'covariate', COMMENT_COLUMN)
         return text
+    require_file(type(effect))
     source, name = 'id', effect.id
     if effect.file:
         source, name = 'file', effect.file.as_posix()
         with suppress(ValueError):  # on another drive
             name = Path(os.path.relpath(effect.file, folder.resolve())).as_posix()
-    elif needs_file(type(effect)):
-        source, name = 'file', file_name(type(effect))
     text = _fields(effect, **{source: name})
     text.yaml_add_eol_comment(effect.family, source, COMMENT_COLUMN)
     return text
@@ -115,48 +112,11 @@ def _fields(values: BaseModel, **before: str) -> CommentedMap:
     return text
 
 
-def needs_file(effect: type[Effect]) -> bool:
-    """Whether it is a user's own class, from a script or a notebook."""
-    known = issubclass(effect, LearnedLaw) or effect.file is not None
-    return not known and effect.id not in EFFECTS
-
-
-def file_name(effect: type[Effect]) -> str:
-    """What its file beside a model is called."""
-    return f'{effect.id}.py'
-
-
-def source_of(effect: type[Effect]) -> str:
-    """The class with the imports, functions and constants that it uses, as a file of its own.
-
-    Raises:
-        ModelError: its source is not known, or is no effect by itself.
-    """
-    remedy = f'put {effect.__name__} in a file of its own and load that with load_effect_file'
-    try:
-        text = _source(effect)
-        effect_of(Path(file_name(effect)), text.encode())
-    except (OSError, TypeError, SyntaxError):
-        raise ModelError(f'the source of effect {effect.id!r} is not known: {remedy}') from None
-    except ModelError as error:
-        raise ModelError(f'{error}; {remedy}') from None
-    return text
-
-
-def _source(cls: type[Effect]) -> str:
-    own = inspect.getsource(cls)
-    text = inspect.getsource(inspect.getmodule(cls) or cls)
-    wanted, kept = _names(ast.parse(own)), [own]
-    # A function may use constants that stand above it.
-    for node in reversed(ast.parse(text).body):
-        made = {node.name} if isinstance(node, ast.FunctionDef) else set[str]()
-        if isinstance(node, ast.Assign):
-            made = made.union(*map(_names, node.targets))
-        if isinstance(node, ast.Import | ast.ImportFrom) or wanted & made:
-            kept.append(ast.get_source_segment(text, node) or '')
-            wanted |= _names(node)
-    return '\n\n'.join(reversed(kept))
-
-
-def _names(tree: ast.AST) -> set[str]:
-    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+def require_file(effect: type[Effect]) -> None:
+    """Refuse a user's own class of a script or a notebook: a model names the file of it."""
+    known = issubclass(effect, LearnedLaw) or effect.file is not None or effect.id in EFFECTS
+    if not known:
+        raise ModelError(
+            f'effect {effect.id!r} has no file; put {effect.__name__} in a file of its own and '
+            'load that with load_effect_file'
+        )

@@ -16,8 +16,7 @@ from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_dat
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
-from paint_deposition.files.tool_path import is_tool_path, read_tool_path
-from paint_deposition.motion.part_frame import Rigid, at_part, is_frame, moved
+from paint_deposition.motion.part_frame import Rigid, is_frame, moved
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.request import validate
 
@@ -52,7 +51,7 @@ def read_recording(
     """Read the poses and the trigger of a motion file, and transform them into the part's frame.
 
     Args:
-        path: a bag, a RAPID module, a tool path of noether or a table of poses.
+        path: a bag, a RAPID module or a table of poses.
         pose_topic, state_topic: of a bag.
         gun_signal: digital output that opens the gun; for RAPID modules only.
         more: the other fields of ``MotionSource``, such as ``part_pose``.
@@ -72,12 +71,7 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
     path = Path(path)
     if is_rapid(path):
         source.require_kind(path, 'a RAPID module')
-        robot = _robot(path, source)
-        program = read_program(path, source.gun_signal, source.procedure, robot)
-        recorded = program_trajectory(program)
-    elif is_tool_path(path):
-        source.require_kind(path, 'a tool path')
-        recorded = read_tool_path(path)
+        recorded = program_trajectory(read_program(path, source.gun_signal, source.procedure))
     elif is_pose_table(path):
         recorded = read_table(path, source)
     elif maker := OTHER_PROGRAMS.get(path.suffix.lower()):
@@ -90,9 +84,6 @@ def read_motion(path: str | Path, source: MotionSource, gun: str = '') -> Trajec
         source.require_kind(path, 'a bag')
         with open_bag(path) as bag:
             recorded = replace(_read_bag(bag, source, gun), source=str(path))
-            if recorded.frames:
-                recorded = _in_one_frame(recorded, source, bag)
-                source = source.model_copy(update={'part_pose': None})
             brought = _in_part_frame(recorded, source, bag)
             skipped = tuple(f'{path}: {n} {what}: left out' for what, n in bag.skipped.items())
             if skipped and source.strict:
@@ -109,16 +100,14 @@ def _turned(recorded: Trajectory, source: MotionSource) -> Trajectory:
     sign, axis = (-1.0 if source.tool_axis[0] == '-' else 1.0), 'xyz'.index(source.tool_axis[-1])
     turn, _ = Rotation.align_vectors([sign * np.eye(3)[axis]], [[0.0, 0.0, 1.0]])
     turned = (Rotation.from_quat(recorded.quaternions_xyzw) * turn).as_quat()
-    note = f'its tool sprays along {source.tool_axis}'
-    return _with_note(replace(recorded, quaternions_xyzw=turned), note)
+    notes = (*recorded.notes, f'its tool sprays along {source.tool_axis}')
+    return replace(recorded, quaternions_xyzw=turned, notes=notes)
 
 
 def holds_joints(path: Path) -> bool:
     """Whether the motion in a file may be that of joints, for which the robot has to be known."""
-    if is_tool_path(path) or is_pose_table(path):
+    if is_pose_table(path) or is_rapid(path):
         return False
-    if is_rapid(path):
-        return True
     with open_bag(path) as bag:
         return bool(bag.topics_of(JOINT_TYPE))
 
@@ -176,7 +165,8 @@ def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
     planned = None if source.state_topic else custom_data(bag.path).get(TRIGGER)
     trigger = source.state_topic or planned
     recorded = trajectory_of(bag, source.pose_topic, trigger, *how)
-    return _with_note(recorded, f'a plan: its trigger {planned} is used') if planned else recorded
+    notes = (f'a plan: its trigger {planned} is used',) if planned else ()
+    return replace(recorded, notes=(*recorded.notes, *notes))
 
 
 def _robot(path: Path, source: MotionSource) -> 'Robot | None':
@@ -187,17 +177,19 @@ def _robot(path: Path, source: MotionSource) -> 'Robot | None':
                 f'{path}: tip_link, base_link and joint_prefix go with a URDF; give --urdf'
             )
         return None
-    from paint_deposition.files.recordings.joint_states import JointNotation, Robot
+    from paint_deposition.files.recordings.joint_states import Robot
 
     robot = Robot.read(Path(source.urdf), source.tip_link, source.base_link)
-    notation = JointNotation(source.joint_prefix, source.angle_unit, source.pose_unit)
-    return replace(robot, recorded_as=notation)
+    return replace(
+        robot, joint_prefix=source.joint_prefix or '', angle_unit=source.angle_unit,
+        length_unit=source.pose_unit,
+    )  # fmt: skip
 
 
 def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) -> Trajectory:
     """Transform by the given pose of the part, else by the transforms of the recording."""
     named, part = recorded.frame_id, source.frame_id or PART
-    if source.part_pose is not None:
+    if source.part_pose is not None and not recorded.frames:
         if source.frame_id and named and is_frame(named, part):
             raise RecordingError(
                 f"{recorded.source}: its poses are in '{named}', which is said to be the part's "
@@ -206,23 +198,18 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         of = f"'{named}'" if named else 'their own frame'
         note = f'part_pose: poses brought from {of} to the part, which stands at '
         note += words(Rigid.of(source.part_pose))
-        return _with_note(at_part(recorded, source.part_pose, part), note)
-    if is_frame(named, part):
-        return recorded
+        brought = moved(recorded, Rigid.of(source.part_pose).inverse(), part)
+        return replace(brought, notes=(*brought.notes, note))
     known = ''
-    if bag is not None:
+    if bag is not None and (recorded.frames or not is_frame(named, part)):
         from paint_deposition.files.recordings.pose_topics import read_frames
 
         tree = read_frames(bag)
-        if tree.moving_between(named, part):
-            return _in_moving_part_frame(recorded, part, tree)
-        if tree.moving_between(named, part) is not None:
-            place = words(tree.lookup(part, named))
-            note = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
-            brought = moved(recorded, tree.lookup(named, part), part)
-            return _with_note(brought, note + place)
-        if fixed := tree.connected(named):
-            known = f' (static transforms connect it to {", ".join(fixed)})'
+        recorded = _by_transforms(recorded, part, tree, bag, source.part_pose)
+        fixed = tree.connected(named)
+        known = f' (static transforms connect it to {", ".join(fixed)})' if fixed else ''
+    if is_frame(recorded.frame_id, part):
+        return recorded
     if source.frame_id:
         raise RecordingError(
             f"{recorded.source}: its poses are in frame '{named}', the mesh in '{part}', and no "
@@ -236,70 +223,60 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
     return replace(recorded, warnings=(*recorded.warnings, warning))
 
 
-def _in_one_frame(recorded: Trajectory, source: MotionSource, bag: Bag) -> Trajectory:
-    """Bring poses of several frames into one, as the nodes do: a pose without a frame is the
-    part's, and one for which no transform is known is left out.
+def _by_transforms(
+    recorded: Trajectory, part: str, tree: 'FrameTree', bag: Bag,
+    part_pose: Sequence[float] | None,
+) -> Trajectory:  # fmt: skip
+    """Each pose in the frame of the part by where that is at its time, as the nodes do it.
+
+    A pose without a frame is the part's. If nothing places the part, it is the most frequent
+    frame of the poses; poses for which no transform is known are left out.
     """
-    from paint_deposition.files.recordings.pose_topics import lookups, read_frames
-
-    tree, part, frames = read_frames(bag), source.frame_id or PART, np.array(recorded.frames)
-    others = Counter(frame for frame in recorded.frames if not is_frame(frame, part))
-    if source.part_pose is not None and others:
-        tree.place(part, others.most_common(1)[0][0], source.part_pose)
-    own = [frame for frame in {*recorded.frames} if is_frame(frame, part)]
-    known = own or tree.moving_between(recorded.frame_id, part) is not None
-    target = part if known else recorded.frame_id
-    taken = np.isin(frames, [*own, target])
-    positions, quaternions = recorded.positions_m.copy(), recorded.quaternions_xyzw.copy()
-    for frame in sorted({*recorded.frames} - {*own, target}):
-        (rows,) = np.nonzero(frames == frame)
-        found, transforms = lookups(tree, frame, target, recorded.stamps_ns[rows])
-        for row, transform in zip(rows[found], transforms, strict=True):
-            pose = transform.applied(positions[row], quaternions[row])
-            positions[row], quaternions[row] = pose
-        taken[rows[found]] = True
-        if lost := len(rows) - len(transforms):
-            bag.skipped[f"poses in frame '{frame}', of which '{target}' is not known"] += lost
-    return replace(
-        recorded, stamps_ns=recorded.stamps_ns[taken], positions_m=positions[taken],
-        quaternions_xyzw=quaternions[taken], frame_id=target, frames=(),
-        trigger_rows=np.searchsorted(np.flatnonzero(taken), recorded.trigger_rows),
-    )  # fmt: skip
-
-
-def _in_moving_part_frame(recorded: Trajectory, part: str, tree: 'FrameTree') -> Trajectory:
-    """Transform by where the part is at each time at which it is known."""
     from paint_deposition.files.recordings.pose_topics import lookups
 
-    frames = f"'{part}' in '{recorded.frame_id}'"
-    known, transforms = lookups(tree, recorded.frame_id, part, recorded.stamps_ns)
-    if not transforms:
+    named = recorded.frame_id
+    frames = np.array(recorded.frames or [named] * len(recorded))
+    own = [frame for frame in {*frames.tolist()} if is_frame(frame, part)]
+    others = Counter(frame for frame in frames.tolist() if frame not in own)
+    if part_pose is not None and others:
+        tree.place(part, others.most_common(1)[0][0], part_pose)
+    between = tree.moving_between(named, part)
+    target = part if own or between is not None else named
+    taken = np.isin(frames, [*own, target])
+    positions, quaternions = recorded.positions_m.copy(), recorded.quaternions_xyzw.copy()
+    for frame in sorted(others.keys() - {target}):
+        (rows,) = np.nonzero(frames == frame)
+        if tree.moving_between(frame, target) == set():
+            transforms = [tree.lookup(frame, target)] * len(rows)
+        else:
+            found, transforms = lookups(tree, frame, target, recorded.stamps_ns[rows])
+            if lost := np.count_nonzero(~found):
+                what = f"poses in frame '{frame}', of which '{target}' is not known at their time"
+                bag.skipped[f'{what} (record /tf from before the first pose on)'] += int(lost)
+            rows = rows[found]
+        for row, transform in zip(rows, transforms, strict=True):
+            positions[row], quaternions[row] = transform.applied(positions[row], quaternions[row])
+        taken[rows] = True
+    if not taken.any():
         raise RecordingError(
-            f'{recorded.source}: the transforms of {frames} cover none of its poses; their clock '
-            'is another, give --part-pose'
+            f"{recorded.source}: the transforms of '{target}' in '{named}' cover none of its "
+            'poses; their clock is another, give --part-pose'
         )
-    poses = zip(recorded.positions_m[known], recorded.quaternions_xyzw[known], strict=True)
-    each = [transform.applied(*pose) for transform, pose in zip(transforms, poses, strict=True)]
-    positions, quaternions = map(np.array, zip(*each, strict=True))
-    brought = replace(
-        recorded, stamps_ns=recorded.stamps_ns[known], positions_m=positions,
-        quaternions_xyzw=quaternions, frame_id=part,
-        trigger_rows=np.searchsorted(np.flatnonzero(known), recorded.trigger_rows),
+    notes = recorded.notes
+    if between == set() and not recorded.frames:
+        place = words(tree.lookup(part, named))
+        note = f"static transforms: poses brought from '{named}' to '{part}', which stands at "
+        notes = (*notes, note + place)
+    elif between and not recorded.frames:
+        frames_of = f"'{part}' in '{named}'"
+        notes = (*notes, f'/tf: {taken.sum()} poses brought to the moving part, {frames_of}')
+    return replace(
+        recorded, stamps_ns=recorded.stamps_ns[taken], positions_m=positions[taken],
+        quaternions_xyzw=quaternions[taken], frame_id=target, frames=(), notes=notes,
+        trigger_rows=np.searchsorted(np.flatnonzero(taken), recorded.trigger_rows),
     )  # fmt: skip
-    if left_out := len(recorded) - len(brought):
-        warning = (
-            f'{recorded.source}: {left_out} of {len(recorded)} poses are left out, since the '
-            f'transforms of {frames} do not cover their time; record /tf from before the first'
-            ' pose on'
-        )
-        brought = replace(brought, warnings=(*brought.warnings, warning))
-    return _with_note(brought, f'/tf: {len(brought)} poses brought to the moving part, {frames}')
 
 
 def words(place: Rigid) -> str:
     """A pose in the format of the options."""
     return ' '.join(f'{value + 0.0:.6g}' for value in place.values)
-
-
-def _with_note(trajectory: Trajectory, note: str) -> Trajectory:
-    return replace(trajectory, notes=(*trajectory.notes, note))

@@ -38,14 +38,13 @@ class MotionSource(MotionOptions):
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
-PLURAL = {
-    'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules',
-    'a tool path': 'tool paths',
-}  # fmt: skip
+PLURAL = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
 # The fields that only some kinds of files have.
 MOTION_KINDS = {
     'pose_topic': 'bags', 'tf': 'bags', 'state_topic': 'bags and tables', 'rotation': 'tables',
     **dict.fromkeys(('gun_signal', 'procedure'), 'RAPID modules'),
-    **dict.fromkeys(('urdf', 'tip_link', 'base_link'), 'bags, tables and RAPID modules'),
-    **dict.fromkeys(('joint_prefix', 'pose_unit', 'angle_unit'), 'bags and tables'),
+    **dict.fromkeys(
+        ('urdf', 'tip_link', 'base_link', 'joint_prefix', 'pose_unit', 'angle_unit'),
+        'bags and tables',
+    ),
 }  # fmt: skip

@@ -8,7 +8,6 @@ import hashlib
 import math
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -110,37 +109,26 @@ IN_JSON = re.compile(rf'"{DIGEST}":\s*"([0-9a-f]{{64}})"')
 IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 
 
-@dataclass(frozen=True)
-class PlannedModel:
-    """What a motion says of its plan's model: where that should lie, and its digest."""
+def planned_model(motion: Path) -> tuple[Path, str] | None:
+    """Where the model of a plan's bag, module or table should lie, and its digest.
 
-    path: Path
-    digest: str
-
-    def file(self) -> ModelFile | None:
-        """The model, if it is still that of the plan."""
-        if not self.path.is_file():
-            return None
-        file = read_model_file(self.path, load_unnamed_effect_file)
-        return file if model_digest(file.model) == self.digest else None
-
-
-def planned_model(motion: Path) -> PlannedModel | None:
-    """The model of a plan's bag, module or table, None for a motion that was not planned."""
+    None for a motion that was not planned.
+    """
     folder = motion if motion.is_dir() else motion.parent
-    digest = _digest(motion, folder)
-    return PlannedModel(folder / MODEL_FILE, digest) if digest else None
-
-
-def _digest(motion: Path, folder: Path) -> str:
-    """Digest of the model that a motion was planned with, '' for none."""
     if not is_rapid(motion) and motion.suffix != '.csv':
-        return custom_data(folder).get(DIGEST, '')
+        digest = custom_data(folder).get(DIGEST, '')
+        return (folder / MODEL_FILE, digest) if digest else None
     files, pattern = [motion], IN_RAPID
     if not is_rapid(motion):
         plans = (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ()
         files, pattern = [folder / name for name in plans], IN_JSON
     for file in filter(Path.is_file, files):
         found = pattern.search(read_file(file, ModelError).decode('utf-8', errors='replace'))
-        return found[1] if found else ''
-    return ''
+        return (folder / MODEL_FILE, found[1]) if found else None
+    return None
+
+
+def model_of_plan(path: Path, digest: str) -> ModelFile | None:
+    """The model in a file, if it is still that of the plan."""
+    file = read_model_file(path, load_unnamed_effect_file) if path.is_file() else None
+    return file if file and model_digest(file.model) == digest else None

@@ -6,8 +6,8 @@ from typing import Annotated, Any
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from paint_deposition.errors import PaintError, quoted, some
-from paint_deposition.files.meshes import Triangles, read_triangles
+from paint_deposition.errors import PaintError, quoted
+from paint_deposition.files.meshes import read_triangles
 from paint_deposition.files.motion_source import Number, Text
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
@@ -46,9 +46,6 @@ class ZoneEntry(BaseModel, extra='forbid'):
     faces: list[Annotated[tuple[int, int], BeforeValidator(_number_range)]] | None = Field(
         None, min_length=1, description=FACES
     )
-    colour: Annotated[str, Field(pattern='^#[0-9a-fA-F]{6}$')] | None = Field(
-        None, description="red, green and blue in hexadecimal digits, as '#ff0000' in quotes"
-    )
 
     @model_validator(mode='after')
     def _complete(self) -> 'ZoneEntry':
@@ -59,7 +56,7 @@ class ZoneEntry(BaseModel, extra='forbid'):
         if self.mesh_scale and not self.mesh:
             raise ValueError('mesh_scale has no mesh; give both, or --mesh-scale for the part')
         if not (self.box or self.has_triangles):
-            raise ValueError('it has no place; give box, body, faces, mesh or colour')
+            raise ValueError('it has no place; give box, body, faces or mesh')
         if self.box and not all(low < high for low, high in zip(*self.box, strict=True)):
             raise ValueError(f'box is {self.box}; give its lowest corner first, then its highest')
         return self
@@ -67,7 +64,7 @@ class ZoneEntry(BaseModel, extra='forbid'):
     @property
     def has_triangles(self) -> bool:
         """Whether the place is told by triangles of a mesh."""
-        return bool(self.mesh or self.body or self.faces or self.colour)
+        return bool(self.mesh or self.body or self.faces)
 
 
 def read_zones(
@@ -108,33 +105,13 @@ def _regions(
     if entry.has_triangles:
         mesh = folder / entry.mesh if entry.mesh else part
         of_mesh = entry.body or (None if entry.mesh else body)
-        found = read_triangles(mesh, entry.mesh_scale or scale, of_mesh, bool(entry.colour))
+        found = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
         chosen = np.ones(len(found.rows), dtype=bool)
         if entry.faces:
-            chosen &= _numbered(mesh, entry.faces, found)
-        if entry.colour:
-            chosen &= _coloured(mesh, entry.colour, found)
+            highest, most = int(found.rows[-1]), max(last for _, last in entry.faces)
+            if most > highest:
+                raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
+            within = [(found.rows >= a) & (found.rows <= b) for a, b in entry.faces]
+            chosen = np.logical_or.reduce(within)
         regions.append(Patch(found.vertices_m[found.faces[chosen]]))
     return tuple(regions)
-
-
-def _numbered(mesh: Path, ranges: list[tuple[int, int]], found: Triangles) -> np.ndarray:
-    highest = int(found.rows[-1])
-    most = max(last for _, last in ranges)
-    if most > highest:
-        raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
-    return np.logical_or.reduce([(found.rows >= a) & (found.rows <= b) for a, b in ranges])
-
-
-def _coloured(mesh: Path, colour: str, found: Triangles) -> np.ndarray:
-    assert found.colours is not None
-    wanted = np.array([int(colour[k : k + 2], 16) for k in (1, 3, 5)])
-    # Of each of red, green and blue: brushes mix the colours along their edge.
-    alike = np.abs(found.colours.astype(int) - wanted).max(axis=2) <= 40
-    # A triangle has a colour if that many of its corners have it.
-    chosen = alike.sum(axis=1) >= 2
-    if not chosen.any():
-        there, count = np.unique(found.colours.reshape(-1, 3), axis=0, return_counts=True)
-        names = ['#{:02x}{:02x}{:02x}'.format(*one) for one in there[np.argsort(-count)]]
-        raise PaintError(f'{mesh} has no {colour}; its colours are {some(names, 5)}')
-    return chosen

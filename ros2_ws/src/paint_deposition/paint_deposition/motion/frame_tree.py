@@ -1,10 +1,10 @@
 """Where frames are in one another over time, by the rules of tf2: live and from a recording."""
 
-from bisect import bisect_left
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from functools import reduce
 from itertools import pairwise
-from operator import matmul
+from operator import itemgetter, matmul
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from paint_deposition.motion.part_frame import Rigid
 LONGEST_GAP_NS = 2_000_000_000
 # Frames and poses of a frame that are remembered, more than any cell has.
 MOST_FRAMES, MOST_POSES = 1000, 100_000
+STAMP = itemgetter(0)
 
 
 class NoTransform(Exception):
@@ -23,50 +24,6 @@ class NoTransform(Exception):
     def __init__(self, reason: str, may_come: bool = False) -> None:
         super().__init__(reason)
         self.may_come = may_come
-
-
-class _Motion:
-    """The poses of a frame over time, each in the parent that it had then."""
-
-    def __init__(self) -> None:
-        self.stamps_ns: list[int] = []
-        self.poses: list[tuple[str, np.ndarray]] = []
-
-    def add(self, stamp_ns: int, parent: str, pose: np.ndarray) -> None:
-        row = bisect_left(self.stamps_ns, stamp_ns)
-        is_known = row < len(self.stamps_ns) and self.stamps_ns[row] == stamp_ns
-        self.stamps_ns[row : row + is_known] = [stamp_ns]
-        self.poses[row : row + is_known] = [(parent, pose)]
-
-    def forget(self, before_ns: int) -> None:
-        row = bisect_left(self.stamps_ns, before_ns)
-        row = max(row, len(self.stamps_ns) - MOST_POSES)
-        del self.stamps_ns[:row], self.poses[:row]
-
-    def parent(self, stamp_ns: int) -> str:
-        row = bisect_left(self.stamps_ns, stamp_ns)
-        if row == len(self.stamps_ns) or self.stamps_ns[row] > stamp_ns:
-            row = max(row - 1, 0)
-        return self.poses[row][0]
-
-    def pose(self, frame: str, stamp_ns: int) -> Rigid:
-        """In its parent, interpolated between the transforms before and after."""
-        stamps, row = self.stamps_ns, bisect_left(self.stamps_ns, stamp_ns)
-        if row < len(stamps) and stamps[row] == stamp_ns:
-            return Rigid.of(self.poses[row][1])
-        of = f"the pose of '{frame}' at {1e-9 * stamp_ns:.3f} s is not known"
-        if row == len(stamps):
-            raise NoTransform(f'{of}: the newest of tf is of {1e-9 * stamps[-1]:.3f} s', True)
-        if row == 0:
-            raise NoTransform(f'{of}: the first of tf is of {1e-9 * stamps[0]:.3f} s')
-        gap_ns, (parent, before), (next_parent, after) = (
-            stamps[row] - stamps[row - 1], *self.poses[row - 1 : row + 1]
-        )  # fmt: skip
-        if gap_ns > LONGEST_GAP_NS:
-            raise NoTransform(f'{of}: tf has none for {1e-9 * gap_ns:.2f} s')
-        if parent != next_parent:
-            return Rigid.of(before)
-        return _between(before, after, (stamp_ns - stamps[row - 1]) / gap_ns)
 
 
 def _between(before: np.ndarray, after: np.ndarray, share: float) -> Rigid:
@@ -91,7 +48,8 @@ class FrameTree:
         # Parent and pose of a frame that does not move; of these, where the user says that it is.
         self._fixed: dict[str, tuple[str, Rigid]] = {}
         self._placed: dict[str, tuple[str, Rigid]] = {}
-        self._moving: dict[str, _Motion] = {}
+        # Stamp, parent and pose of each frame over time, in order.
+        self._moving: dict[str, list[tuple[int, str, np.ndarray]]] = {}
         # Transforms that hold at any time.
         self._lasting: dict[tuple[str, str], Rigid] = {}
 
@@ -99,7 +57,7 @@ class FrameTree:
     def names(self) -> list[str]:
         """All frames, by name."""
         parents = {parent for parent, _ in self._still.values()}
-        parents |= {parent for motion in self._moving.values() for parent, _ in motion.poses}
+        parents |= {parent for motion in self._moving.values() for _, parent, _ in motion}
         return sorted(parents | self._still.keys() | self._moving.keys())
 
     def fix(self, child: str, parent: str, pose: Sequence[float]) -> None:
@@ -134,11 +92,14 @@ class FrameTree:
             self._moving.clear()
         if _name(child) not in self._moving:
             self._lasting.clear()
-        motion = self._moving.setdefault(_name(child), _Motion())
-        motion.add(stamp_ns, _name(parent), np.array(pose, dtype=float))
+        motion = self._moving.setdefault(_name(child), [])
+        row = bisect_left(motion, stamp_ns, key=STAMP)
+        is_known = row < len(motion) and motion[row][0] == stamp_ns
+        motion[row : row + is_known] = [(stamp_ns, _name(parent), np.array(pose, dtype=float))]
         if self._live:
             # As in tf2 [ns].
-            motion.forget(motion.stamps_ns[-1] - 10_000_000_000)
+            old = bisect_left(motion, motion[-1][0] - 10_000_000_000, key=STAMP)
+            del motion[: max(old, len(motion) - MOST_POSES)]
         return restarted
 
     def _has_room(self, child: str) -> bool:
@@ -156,11 +117,11 @@ class FrameTree:
     def newest_ns(self, child: str) -> int:
         """Stamp of the newest pose of a frame over time, 0 without any."""
         motion = self._moving.get(_name(child))
-        return motion.stamps_ns[-1] if motion else 0
+        return motion[-1][0] if motion else 0
 
     def stamps_ns(self, child: str) -> list[int]:
         """The stamps of the poses of a frame over time."""
-        return self._moving[_name(child)].stamps_ns
+        return [stamp for stamp, *_ in self._moving[_name(child)]]
 
     def _ancestors(self, frame: str, stamp_ns: int) -> list[str]:
         """A frame, its parent at that time and so on up to the root."""
@@ -169,7 +130,9 @@ class FrameTree:
             if chain[-1] in still:
                 chain.append(still[chain[-1]][0])
             elif chain[-1] in self._moving:
-                chain.append(self._moving[chain[-1]].parent(stamp_ns))
+                motion = self._moving[chain[-1]]
+                at_or_before = bisect_right(motion, stamp_ns, key=STAMP) - 1
+                chain.append(motion[max(at_or_before, 0)][1])
             else:
                 break
         return chain
@@ -221,10 +184,28 @@ class FrameTree:
         still = self._still
         steps = [
             still[frame][1] if frame in still
-            else self._moving[frame].pose(frame, stamp_ns)
+            else self._pose_at(frame, stamp_ns)
             for frame in chain
         ]  # fmt: skip
         return reduce(matmul, reversed(steps)) if steps else None
+
+    def _pose_at(self, frame: str, stamp_ns: int) -> Rigid:
+        """In its parent, interpolated between the transforms before and after."""
+        motion = self._moving[frame]
+        row = bisect_left(motion, stamp_ns, key=STAMP)
+        if row < len(motion) and motion[row][0] == stamp_ns:
+            return Rigid.of(motion[row][2])
+        of = f"the pose of '{frame}' at {1e-9 * stamp_ns:.3f} s is not known"
+        if row == len(motion):
+            raise NoTransform(f'{of}: the newest of tf is of {1e-9 * motion[-1][0]:.3f} s', True)
+        if row == 0:
+            raise NoTransform(f'{of}: the first of tf is of {1e-9 * motion[0][0]:.3f} s')
+        (begin_ns, parent, before), (end_ns, next_parent, after) = motion[row - 1 : row + 1]
+        if end_ns - begin_ns > LONGEST_GAP_NS:
+            raise NoTransform(f'{of}: tf has none for {1e-9 * (end_ns - begin_ns):.2f} s')
+        if parent != next_parent:
+            return Rigid.of(before)
+        return _between(before, after, (stamp_ns - begin_ns) / (end_ns - begin_ns))
 
     def longest_gap_s(self, child: str) -> float:
         """Between two poses of a frame over time."""

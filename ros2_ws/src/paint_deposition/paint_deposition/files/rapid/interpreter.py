@@ -2,14 +2,15 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import replace
 from itertools import count
 from typing import Any
 
 from lark import Token
 
 from paint_deposition.errors import did_you_mean
-from paint_deposition.files.rapid.parser import Declared, Instruction, Node, Routine, line_of
-from paint_deposition.files.rapid.values import Datum, Unknown, Values
+from paint_deposition.files.rapid.parser import Datum, Instruction, Node, Routine, line_of
+from paint_deposition.files.rapid.values import Unknown, Values
 
 MOST_TURNS, MOST_STATEMENTS = 10_000, 100_000
 CHANGING = {'incr': 1.0, 'decr': -1.0, 'add': None, 'clear': 0.0}
@@ -67,7 +68,7 @@ class Interpreter(Values):
         self.only_options(routine.name, options, optional)
         given = dict(zip(needed, values, strict=True)) | options
         own = {
-            one.name: Datum(one.type, self.value(given[one.name]))
+            one.name: Datum(one.name, one.type, self.value(given[one.name]))
             for one in routine.parameters if one.name in given
         }  # fmt: skip
         caller, result = (self._local, self.source, self.line, self._running), None
@@ -121,8 +122,7 @@ class Interpreter(Values):
 
     def _instruction(self, i: Instruction) -> None:
         self.line = i.line
-        options = {name: self._option(node) for name, node in i.options.items()}
-        i = i._replace(options={name: at for name, at in options.items() if at is not None})
+        i = i._replace(options=dict(self._given(i.options)))
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
         elif i.name == 'return':
@@ -137,12 +137,13 @@ class Interpreter(Values):
         elif not self.act(i):
             self._pass_over(i)
 
-    def _option(self, node: Any) -> Any:
-        """An option; None for a conditional one, V?v, of a parameter that is not given."""
-        if isinstance(node, Node) and node.rule == 'conditional':
-            (name,) = node.children
-            return Node('reference', [name]) if name in self._local else None
-        return node
+    def _given(self, options: dict[str, Any]) -> Iterator[tuple[str, Any]]:
+        """The options without those handed on, V?v, of a parameter that is not given."""
+        for name, node in options.items():
+            if not (isinstance(node, Node) and node.rule == 'conditional'):
+                yield name, node
+            elif (parameter := node.children[0]) in self._local:
+                yield name, Node('reference', [parameter])
 
     def _pass_over(self, i: Instruction) -> None:
         if i.name not in PASSED_OVER:
@@ -163,8 +164,8 @@ class Interpreter(Values):
         self.line = reference.children[0].line
         self.assign(reference, self.value(node))
 
-    def _declaration(self, *data: Declared) -> None:
-        self._local |= {datum.name: Datum.of(datum) for datum in data}
+    def _declaration(self, *data: Datum) -> None:
+        self._local |= {datum.name: replace(datum) for datum in data}
 
     def _label(self, name: Token) -> None:
         """Only GOTO needs it, which is refused."""
@@ -218,7 +219,7 @@ class Interpreter(Values):
         outer = self._local
         for turn in range(int(turns + 1e-9) + 1 if turns >= 0.0 else 0):
             self._step()
-            self._local = outer | {name: Datum('num', first + turn * step)}
+            self._local = outer | {name: Datum(name, 'num', first + turn * step)}
             self._execute(body)
         self._local = outer
         return None

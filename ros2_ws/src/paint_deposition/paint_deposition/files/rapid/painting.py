@@ -1,54 +1,37 @@
 """What a RAPID program does to the robot and the gun: its moves of the TCP."""
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
 from paint_deposition.files.rapid.gun import (
     Gun,
     RapidMove,
-    RapidProgram,
-    Spray,
-    gun_signal,
     name_of,
 )
-from paint_deposition.files.rapid.interpreter import PASSED_OVER, Interpreter
+from paint_deposition.files.rapid.interpreter import PASSED_OVER
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
-
-if TYPE_CHECKING:
-    from paint_deposition.files.recordings.joint_states import Robot
 
 # Instruction -> number of its targets; the last is where it ends.
 MOVES = {
     'movel': 1, 'movej': 1, 'movec': 2, 'paintl': 1, 'paintc': 2, 'triggl': 1, 'triggj': 1,
     'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
 }  # fmt: skip
-TRIGGERS = tuple(f't{number}' for number in range(2, 9))
+TRIGGER_OPTIONS = tuple(f't{number}' for number in range(2, 9))
 # Of the options of moves what the film sees, and what it does not; a path that a sensor corrects
 # (`\Corr`) is not known.
-MOVE_OPTIONS = ('v', 't', 'wobj', *TRIGGERS, 'conc', 'id', 'z', 'inpos', 'tload')
-MOST_JOINTS = 6
+MOVE_OPTIONS = ('v', 't', 'wobj', *TRIGGER_OPTIONS, 'conc', 'id', 'z', 'inpos', 'tload')
 HOME = frame(NOWHERE)
 
 
-class Painting(Interpreter):
+class Painting(Gun):
     """Collects the moves of a `RapidProgram` while it runs."""
 
-    def __init__(
-        self, modules: list[Module], start: Routine, signal: str | None, robot: 'Robot | None'
-    ) -> None:
-        super().__init__(modules)
-        signal = gun_signal(list(self.reached(start.body)), signal, start.source)
-        name = next(module.name for module in modules if module.source == start.source)
-        self.program = RapidProgram(name, signal)
-        self.tools: dict[str, Frame | None] = {}  # frame of each tool on the flange [mm], if known
-        self._gun = Gun(self, self.program)
-        self._robot = robot
+    def __init__(self, modules: list[Module], start: Routine, signal: str | None) -> None:
+        super().__init__(modules, start, signal)
         # Name of the frame and pose of the TCP in it [mm], None where it is not known.
         self._at: tuple[str, Frame] | None = None
         self._displacement = HOME
@@ -57,8 +40,8 @@ class Painting(Interpreter):
 
     def run(self, start: Routine) -> str:
         passed_over = super().run(start)
-        if self._gun.planes:
-            self.line = self._gun.planes[0].line
+        if self.planes:
+            *_, self.line = self.planes[0]
             self.fail('the TCP never passes this plane while it paints; check its value')
         if self._external_line and any(not move.frame for move in self.program.moves):
             self.line = self._external_line
@@ -72,17 +55,17 @@ class Painting(Interpreter):
 
     def acts(self, i: Instruction) -> bool:
         if i.name.startswith('wait'):
-            return self._gun.is_open
-        return i.name not in PASSED_OVER or bool(self._gun.commanded(i))
+            return self.is_open
+        return i.name not in PASSED_OVER or bool(self.commanded(i))
 
     def act(self, i: Instruction) -> bool:
         if i.name in MOVES:
             self._move(i)
-        elif do := getattr(self, f'do_{i.name}', getattr(self._gun, f'do_{i.name}', None)):
+        elif do := getattr(self, f'do_{i.name}', None):
             do(i)
-        elif what := self._gun.commanded(i):
-            self._gun.command(i, what)
-        elif i.name.startswith('wait') and self._gun.is_open:
+        elif what := self.commanded(i):
+            self.command(i, what)
+        elif i.name.startswith('wait') and self.is_open:
             self.fail(f'{i.name} waits with the gun open, how long only the robot knows')
         else:
             return False
@@ -91,8 +74,8 @@ class Painting(Interpreter):
     # --- instructions
 
     def do_velset(self, i: Instruction) -> None:
-        self._speed_share = self._gun.number(i, 0) / 100.0
-        self._fastest_mm_per_s = self._gun.number(i, 1)
+        self._speed_share = self.argument(i, 0) / 100.0
+        self._fastest_mm_per_s = self.argument(i, 1)
 
     def do_pdispset(self, i: Instruction) -> None:
         self._displacement = self._frame(i.values[0] if i.values else None)
@@ -102,11 +85,11 @@ class Painting(Interpreter):
 
     def do_waittime(self, i: Instruction) -> None:
         """Stand still, with the gun as it is."""
-        wait_s = self._gun.number(i, 0)
+        wait_s = self.argument(i, 0)
         if self.program.moves and wait_s > 0.0:
             still = replace(
                 self.program.moves[-1], instruction=i.name, line=i.line, via_m=None,
-                wait_s=wait_s, **self._gun.now._asdict(),
+                wait_s=wait_s, switches=(), **self.spray,
             )  # fmt: skip
             self.program.moves.append(still)
 
@@ -115,76 +98,52 @@ class Painting(Interpreter):
         self.program.note(f'line {i.line}: moveextj moves an external axis, not the TCP')
 
     def do_moveabsj(self, i: Instruction) -> None:
-        if self._robot is None:
-            if self._gun.is_open:
-                self.fail('moveabsj sprays, and joint angles need the robot; give its --urdf')
-            self.program.note(f'line {i.line}: moveabsj skipped: joint angles need the robot')
-            self._at = None
-            return
-        (target, *how), _ = self._arguments(i, 1)
-        joints = len(self._robot.moving_joints)
-        if joints > MOST_JOINTS:
-            self.fail(f'{self._robot.path} has {joints} joints to its tip, robax {MOST_JOINTS}')
-        robax, _ = self._record(self.known(target), 'jointtarget')
-        angles = [self.number(one, 'a joint') for one in self._record(robax, 'robjoint')[:joints]]
-        (position_m,), (quaternion,) = self._robot.poses(np.radians([angles]))
-        self.program.note('joint angles give the tip of the URDF, in the frame of its base')
-        pose = position_m * 1e3, Rotation.from_quat(quaternion)
-        self._append(i, ('', pose), None, how, self._gun.in_move([]))
+        if self.is_open:
+            self.fail('moveabsj sprays, and its joint angles are no pose; write it as MoveJ')
+        self.program.note(f'line {i.line}: moveabsj skipped: joint angles are no pose')
+        self._at = None
 
     # --- moves
 
-    def _arguments(self, i: Instruction, targets: int) -> tuple[list, list]:
-        """Targets, speed, zone and tool; and what stands between speed and zone."""
+    def _move(self, i: Instruction) -> None:
+        count = MOVES[i.name]
+        self.only_options(i.name, i.options, MOVE_OPTIONS)
         values = i.values[:-2] if i.name.endswith('do') else i.values
-        if len(values) < targets + 3:
+        if len(values) < count + 3:
             self.fail(f'{i.name} needs a target, a speed, a zone and a tool')
-        between = values[targets + 1 : -2]
+        *targets, speed = values[: count + 1]
+        *between, zone, tool = values[count + 1 :]
         if between and not i.name.startswith('trigg'):
             self.fail(
                 f'{i.name} takes {name_of(between[0]) or "a value"} beside target, speed, zone '
                 'and tool; brush and event data of a paint move are not followed: give the brush '
                 'a number, in SetBrush and in the brushes of the model'
             )
-        return [*values[: targets + 1], *values[-2:]], between
-
-    def _move(self, i: Instruction) -> None:
-        targets = MOVES[i.name]
-        self.only_options(i.name, i.options, MOVE_OPTIONS)
-        parts, between = self._arguments(i, targets)
         name, base = self._work_object(i)
         displaced = product(base, self._displacement)
-        poses = [product(displaced, self._frame(part)) for part in parts[:targets]]
+        poses = [product(displaced, self._frame(target)) for target in targets]
         if i.name.startswith('paint'):
             track = None
-            if targets == 1 and self._at and self._at[0] == name:
-                track = np.array([
-                    product(inverse(base), end)[0] for end in (self._at[1], poses[-1])
-                ])  # fmt: skip
-            spray = self._gun.in_paint_move(track)
+            if count == 1 and self._at and self._at[0] == name:
+                places = (product(inverse(base), end)[0] for end in (self._at[1], poses[-1]))
+                track = np.array([*places])
+            spray = self.spray_in_paint_move(track)
         else:
-            named = [*between, *(at for name, at in i.options.items() if name in TRIGGERS)]
-            spray = self._gun.in_move([self.known(node) for node in named])
-        via_m = poses[0][0] * 1e-3 if targets == 2 else None
-        self._append(i, (name, poses[-1]), via_m, parts[targets:], spray)
-        if i.name.endswith('do') and self._gun.commanded(i) == 'gun':
-            self._gun.is_open = self._gun.level(i)
-
-    def _append(
-        self, i: Instruction, at: tuple[str, Frame], via_m: np.ndarray | None, how: list,
-        spray: Spray,
-    ) -> None:  # fmt: skip
-        speed, zone, tool = how
-        name, (position, rotation) = at
+            named = [*between, *(at for name, at in i.options.items() if name in TRIGGER_OPTIONS)]
+            spray = self.spray_in_move([self.known(node) for node in named])
+        at = name, poses[-1]
+        position, rotation = at[1]
         stop, radius_mm, *_ = self._record(self.known(zone), 'zonedata')
         zone_m = 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
-        move = RapidMove(
-            position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at), via_m=via_m,
-            line=i.line, instruction=i.name, zone_m=zone_m, tool=self._tool(tool),
-            work_object=name_of(i.options.get('wobj')) or 'wobj0', frame=name, **spray._asdict(),
-        )  # fmt: skip
-        self.program.moves.append(move)
+        self.program.moves.append(RapidMove(
+            position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at),
+            via_m=poses[0][0] * 1e-3 if count == 2 else None, line=i.line, instruction=i.name,
+            zone_m=zone_m, tool=self._tool(tool), frame=name,
+            work_object=name_of(i.options.get('wobj')) or 'wobj0', **spray,
+        ))  # fmt: skip
         self._at = at
+        if i.name.endswith('do') and self.commanded(i) == 'gun':
+            self.is_open = self.level(i)
 
     def _frame(self, node: object) -> Frame:
         try:
@@ -215,12 +174,9 @@ class Painting(Interpreter):
     def _tool(self, node: object) -> str:
         value, name = self.value(node), name_of(node)
         if isinstance(value, Unknown):
-            self.tools[value.name] = None
             return value.name
-        held, tool_frame, _ = self._record(value, 'tooldata')
-        if held is False:
+        if self._record(value, 'tooldata')[0] is False:
             self.fail(f'tool {name} stands still; only tools the robot holds are read')
-        self.tools[name] = self._frame(tool_frame)
         return name
 
     def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:

@@ -4,6 +4,7 @@ RAPID ignores case: all is converted to lower case.
 """
 
 import json
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple, cast
@@ -29,13 +30,18 @@ class Instruction(NamedTuple):
     options: dict[str, Any]
 
 
-class Declared(NamedTuple):
-    """A declared datum: type, sizes of an array and value, None without."""
+@dataclass
+class Datum:
+    """A datum: its type, the sizes of an array, and its value, None without.
+
+    Until it is first needed (``is_declared``) the value is the expression that it begins with.
+    """
 
     name: str
     type: str
-    sizes: list | None
-    value: Any
+    value: Any = None
+    sizes: list | None = None
+    is_declared: bool = False
 
 
 class Parameter(NamedTuple):
@@ -61,8 +67,8 @@ class Module(NamedTuple):
 
     name: str
     source: str
-    shared: list[Declared | Routine]
-    local: list[Declared | Routine]
+    shared: list[Datum | Routine]
+    local: list[Datum | Routine]
 
 
 @v_args(inline=True)
@@ -111,11 +117,11 @@ class _Builder(Transformer):
     def instruction(self, name: Token, arguments: tuple[list, dict]) -> Instruction:
         return Instruction(str(name), line_of(name), *arguments)
 
-    def datum(self, name: str, sizes: list | None, value: Any) -> Declared:
-        return Declared(str(name), '', sizes, value)
+    def datum(self, name: str, sizes: list | None, value: Any) -> Datum:
+        return Datum(str(name), '', value, sizes, is_declared=True)
 
-    def declaration(self, kind: str, *data: Declared) -> Node:
-        return Node('declaration', [datum._replace(type=str(kind)) for datum in data])
+    def declaration(self, kind: str, *data: Datum) -> Node:
+        return Node('declaration', [replace(datum, type=str(kind)) for datum in data])
 
     def parameter(self, optional: str | None, mode: str | None, kind: str, name: str) -> Parameter:
         return Parameter(str(name), str(kind), optional is not None, mode is not None)

@@ -1,27 +1,19 @@
 """ABB RAPID programs: read as moves of the TCP, as a trajectory, as text, and written."""
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-import numpy as np
-from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
 from paint_deposition.files.atomic import MOST_TEXT_MB, filled, read_file
-from paint_deposition.files.rapid.functions import Frame, inverse, product
-from paint_deposition.files.rapid.gun import RapidMove, RapidProgram
+from paint_deposition.files.rapid.gun import RapidProgram
 from paint_deposition.files.rapid.painting import Painting
 from paint_deposition.files.rapid.parser import Module, Routine, parse_modules
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.programmed import PROGRAMMED, Move, timed
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory
-
-if TYPE_CHECKING:
-    from paint_deposition.files.recordings.joint_states import Robot
 
 MODULES = ('.mod', '.prg', '.sys')
 LIST_OF_MODULES = '.pgf'
@@ -31,7 +23,6 @@ def read_program(
     path: Path | str,
     gun_signal: str | None = None,
     procedure: str | None = None,
-    robot: 'Robot | None' = None,
 ) -> RapidProgram:
     """Run a RAPID program, and read its moves.
 
@@ -41,8 +32,6 @@ def read_program(
         gun_signal: the digital output that opens the gun; None: the only one set, or SetBrush
             where there are paint moves.
         procedure: where it starts; None: `main`, or the only procedure.
-        robot: gives the TCP for joint angles; without it such moves are left out, and refused
-            with the gun open.
 
     Raises:
         RecordingError: what is no RAPID, what depends on values that only the robot knows, and
@@ -52,16 +41,14 @@ def read_program(
     try:
         modules = [m for file in _files(path) for m in parse_modules(_text(file), str(file))]
         start = _start(modules, procedure, path)
-        painting = Painting(modules, start, gun_signal, robot)
+        painting = Painting(modules, start, gun_signal)
         painting.run(start)
-        program = painting.program
-        if not program.moves:
+        if not painting.program.moves:
             raise RecordingError(f'{path} has no moves of the TCP; nothing to read')
-        _with_one_frame(program, str(path))
-        _with_one_tool(program, painting.tools, str(path))
+        _keep_moves_of_the_paint(painting.program, str(path))
     except RecursionError:
         raise RecordingError(f'{path}: its values are nested too deeply to be RAPID') from None
-    return program
+    return painting.program
 
 
 def is_rapid(path: Path | str) -> bool:
@@ -105,12 +92,14 @@ def _start(modules: list[Module], procedure: str | None, path: Path) -> Routine:
     return routines[start]
 
 
-def _with_one_frame(program: RapidProgram, source: str) -> None:
-    """Leave out moves with the gun closed in another frame than that of the paint.
+def _keep_moves_of_the_paint(program: RapidProgram, source: str) -> None:
+    """Leave out moves with the gun closed in another frame, or with another tool, than the paint.
 
-    Raises RecordingError if the gun sprays in two frames whose relation is not known.
+    Raises RecordingError if the gun sprays in two frames, or with two tools: what one is in the
+    other is not known, or only one of them can be the bell.
     """
-    painted = _painting_moves(program)
+    spraying = [m for m in program.moves if m.spraying or any(s.on for s in m.switches)]
+    painted = spraying or program.moves  # all, where nothing switches the gun
     names = {move.frame: move.line for move in reversed(painted)}
     if len(names) > 1:
         lines = ' and '.join(
@@ -120,51 +109,19 @@ def _with_one_frame(program: RapidProgram, source: str) -> None:
             f'{source}: it sprays in frames whose relation is not known: {lines}; declare the '
             'work objects, or give the programs of the parts one by one'
         )
-    kept = [move for move in program.moves if move.frame in names]
-    if left_out := [str(m.line) for m in program.moves if m.frame not in names]:
+    bell = painted[0].tool
+    if other := next((move for move in painted if move.tool != bell), None):
+        raise RecordingError(
+            f'{source} line {other.line}: it sprays with {other.tool} and with {bell}; only one '
+            'of them can be the bell, give a program for each'
+        )
+    kept = [move for move in program.moves if move.frame in names and move.tool == bell]
+    if left_out := [str(m.line) for m in program.moves if m.frame not in names or m.tool != bell]:
         program.note(
-            f'moves of lines {", ".join(left_out)} are left out: their frame is another than that '
-            'of the paint, and the gun is closed'
+            f'moves of lines {", ".join(left_out)} are left out: their frame or tool is another '
+            'than that of the paint, and the gun is closed'
         )
     program.moves[:] = kept
-
-
-def _with_one_tool(program: RapidProgram, tools: Mapping[str, Frame | None], source: str) -> None:
-    """Bring all moves to the tool of the paint, by the frames of the ``tools`` [mm].
-
-    Raises RecordingError if the gun sprays with two tools that differ.
-    """
-    painted = _painting_moves(program)
-    bell = painted[0].tool
-    for number, move in enumerate(program.moves):
-        if move.tool == bell:
-            continue
-        own, wanted = tools[move.tool], tools[bell]
-        step = product(inverse(own), wanted) if own and wanted else None
-        if step and np.allclose(step[0], 0.0, atol=1e-3) and step[1].magnitude() < 1e-5:
-            continue
-        if any(move is one for one in painted):
-            raise RecordingError(
-                f'{source} line {move.line}: it sprays with {move.tool} and with {bell}; only one '
-                'of them can be the bell, give a program for each'
-            )
-        if step is None:
-            program.note(
-                f'the frame of tool {bell} or {move.tool} is not in the modules: the moves of '
-                f'{move.tool}, with the gun closed, are taken as those of {bell}'
-            )
-            continue
-        at = (move.position_m * 1e3, Rotation.from_quat(move.quaternion_xyzw))
-        position, rotation = product(at, step)
-        program.moves[number] = replace(
-            move, position_m=position * 1e-3, quaternion_xyzw=rotation.as_quat()
-        )
-
-
-def _painting_moves(program: RapidProgram) -> list[RapidMove]:
-    """The moves that spray; all, where nothing switches the gun."""
-    spraying = [m for m in program.moves if m.spraying or any(s.on for s in m.switches)]
-    return spraying or program.moves
 
 
 def program_trajectory(program: RapidProgram) -> Trajectory:

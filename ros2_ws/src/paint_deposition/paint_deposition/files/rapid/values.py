@@ -3,12 +3,11 @@
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import Any, NamedTuple, NoReturn
 
 from paint_deposition.errors import RecordingError, quoted
 from paint_deposition.files.rapid.functions import FUNCTIONS, OPERATORS, is_number
-from paint_deposition.files.rapid.parser import Declared, Module, Node, Routine
+from paint_deposition.files.rapid.parser import Datum, Module, Node, Routine
 
 # Of one array, and of all lists that are made or copied while a program runs.
 MOST_ELEMENTS, MOST_COPIED = 1_000_000, 10_000_000
@@ -54,19 +53,6 @@ class Unknown(NamedTuple):
     reason: str
 
 
-@dataclass
-class Datum:
-    """A datum of a type; ``declared`` until it is first needed."""
-
-    type: str
-    value: Any = None
-    declared: Declared | None = None
-
-    @staticmethod
-    def of(declared: Declared) -> 'Datum':
-        return Datum(declared.type, declared=declared)
-
-
 class Values:
     """The data of modules, and of the routine that runs."""
 
@@ -74,7 +60,7 @@ class Values:
         self.source, self.line = modules[0].source, 0
         self._local: dict[str, Datum] = {}
         self._elements = 0
-        self._global: dict[str, Any] = {f'reg{k}': Datum('num', 0.0) for k in range(1, 6)}
+        self._global: dict[str, Any] = {f'reg{k}': Datum('', 'num', 0.0) for k in range(1, 6)}
         self._of_module: dict[str, dict[str, Any]] = {}
         for module in modules:
             own = self._of_module.setdefault(module.source, {})
@@ -86,7 +72,7 @@ class Values:
                             f'procedure {item.name} is in {known.source} and in {item.source}; '
                             'give the modules of one program'
                         )
-                    place[item.name] = item if isinstance(item, Routine) else Datum.of(item)
+                    place[item.name] = item
 
     def fail(self, reason: str) -> NoReturn:
         """Refuse the program with the line that runs."""
@@ -128,9 +114,9 @@ class Values:
         if not isinstance(datum, Datum):
             if parts:
                 self.fail(f'{name} has no such part to assign to')
-            datum = self._global[name] = Datum('')
+            datum = self._global[name] = Datum(name, '')
         if not parts:
-            datum.value, datum.declared = value, None
+            datum.value, datum.is_declared = value, False
             return
         *keys, last = self._keys(datum.type, parts)
         place = self._part(self._settled(datum), keys, name)
@@ -196,12 +182,13 @@ class Values:
 
     def _settled(self, datum: Datum) -> Any:
         """The value of a datum; from its declaration, if it is needed for the first time."""
-        if declared := datum.declared:
-            datum.declared, datum.value = None, Unknown(declared.name, 'a value of its own value')
+        if datum.is_declared:
+            first, datum.is_declared = datum.value, False
+            datum.value = Unknown(datum.name, 'a value of its own value')
             datum.value = (
-                self._initial(declared.type, declared.sizes or [])
-                if declared.value is None
-                else self._copied(self.value(declared.value))
+                self._initial(datum.type, datum.sizes or [])
+                if first is None
+                else self._copied(self.value(first))
             )
         return datum.value
 

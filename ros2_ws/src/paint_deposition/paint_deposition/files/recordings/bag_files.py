@@ -269,64 +269,53 @@ def mcap_files(path: Path) -> list[Path]:
     """The MCAP files of a run in order, or the single file; several runs are refused."""
     if path.is_file():
         return [path]
-    files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=_number)
-    runs = {re.sub(r'_\d+$', '', file.stem) for file in files}
-    if len(runs) > 1:
+
+    def place(file: Path) -> tuple[int, str]:
+        number = re.search(r'_(\d+)$', file.stem)
+        return (int(number[1]) if number else 0, file.name)
+
+    files = sorted((file for file in path.glob('*.mcap') if file.is_file()), key=place)
+    if len({re.sub(r'_\d+$', '', file.stem) for file in files}) > 1:
         names = ' '.join(file.name for file in files)
         raise RecordingError(f'{path} holds several recordings; name one of them: {names}')
     return files
 
 
-def _number(file: Path) -> tuple[int, str]:
-    number = re.search(r'_(\d+)$', file.stem)
-    return (int(number[1]) if number else 0, file.name)
-
-
-def _is_unfinished(path: Path) -> bool:
-    """Whether a file begins as MCAP and does not end as MCAP."""
-    length = len(MCAP0_MAGIC)
-    with path.open('rb') as stream:
-        if stream.read(length) != MCAP0_MAGIC:
-            return False
-        stream.seek(max(stream.seek(0, 2) - length, length))
-        return stream.read() != MCAP0_MAGIC
-
-
 def _require_bag(path: Path) -> None:
+    """Refuse what is no bag, and one that its recorder has not finished."""
     if not path.exists():
         raise RecordingError(f'no bag at {path}')
     for file in path.iterdir() if path.is_dir() else [path]:
         require_file(file, RecordingError, math.inf)
-    if path.is_dir():
-        names = [file.name.removesuffix('.zstd') for file in path.iterdir()]
-        if not any(name.endswith(ROS2_SUFFIXES) for name in names):
-            raise RecordingError(f'{path} is not a rosbag2 folder: it holds no .mcap or .db3 file')
-    elif path.suffix not in ('.bag', *ROS2_SUFFIXES):
+    names = [file.name.removesuffix('.zstd') for file in path.iterdir()] if path.is_dir() else []
+    stored = {name for name in names if name.endswith(ROS2_SUFFIXES)}
+    if path.is_dir() and not stored:
+        raise RecordingError(f'{path} is not a rosbag2 folder: it holds no .mcap or .db3 file')
+    if path.is_file() and path.suffix not in ('.bag', *ROS2_SUFFIXES):
         raise RecordingError(
             f'{path} is not a bag; give a ROS 1 .bag, a rosbag2 folder, or an .mcap file'
         )
-    elif path.stat().st_size == 0:
+    if path.is_file() and path.stat().st_size == 0:
         raise RecordingError(f'{path} is empty')
+    unfinished = ''
     for file in mcap_files(path):
-        if _is_unfinished(file):
-            raise RecordingError(_unfinished(path, f'{file.name} has no end'))
+        with file.open('rb') as stream:
+            begins = stream.read(len(MCAP0_MAGIC)) == MCAP0_MAGIC
+            stream.seek(max(stream.seek(0, 2) - len(MCAP0_MAGIC), len(MCAP0_MAGIC)))
+            if begins and stream.read() != MCAP0_MAGIC:
+                unfinished = unfinished or f'{file.name} has no end'
     if path.is_dir() and not (path / 'metadata.yaml').is_file():
-        raise RecordingError(_unfinished(path, 'it has no metadata.yaml'))
-    if path.is_dir():
-        # A recorder that splits its bag and is killed has not named the last file yet.
-        listed = _information(path).get('relative_file_paths')
-        named = {
-            Path(str(name)).name.removesuffix('.zstd')
-            for name in (listed if isinstance(listed, list) else names)
-        }
-        there = {name for name in names if name.endswith(ROS2_SUFFIXES)}
-        if others := ', '.join(sorted(there - named)):
-            raise RecordingError(_unfinished(path, f'its metadata.yaml does not name {others}'))
-
-
-def _unfinished(path: Path, reason: str) -> str:
-    remedy = _remedy(path) or f'; run: ros2 bag reindex {path}'
-    return f'{path} is an unfinished recording ({reason}){remedy}'
+        unfinished = unfinished or 'it has no metadata.yaml'
+    # A recorder that splits its bag and is killed has not named the last file yet.
+    listed = _information(path).get('relative_file_paths')
+    listed = listed if isinstance(listed, list) else [*stored]
+    others = stored - {Path(str(name)).name.removesuffix('.zstd') for name in listed}
+    if path.is_dir() and others:
+        named = ', '.join(sorted(others))
+        unfinished = unfinished or f'its metadata.yaml does not name {named}'
+    if unfinished:
+        remedy = _remedy(path) or f'; run: ros2 bag reindex {path}'
+        raise RecordingError(f'{path} is an unfinished recording ({unfinished}){remedy}')
 
 
 @contextmanager

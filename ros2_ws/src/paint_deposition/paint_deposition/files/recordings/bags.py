@@ -16,7 +16,7 @@ from paint_deposition.files.recordings.bag_files import Bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, read_trigger, unused_triggers
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, unused_triggers, with_trigger
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
@@ -30,9 +30,6 @@ POSE_TOPIC = '/atomizer/pose'
 STATE_TOPIC = '/atomizer/state'
 JOINT_TRAJECTORY_TYPE = 'trajectory_msgs/msg/JointTrajectory'
 JOINT_TOPIC = '/joint_trajectory'
-# For a trigger without stamps the log times are used, if those of the poses show that recorder and
-# robot have the same clock.
-MAX_CLOCK_OFFSET_S = 1.0
 
 
 def trajectory_of(
@@ -48,7 +45,7 @@ def trajectory_of(
     Args:
         pose_topic: of poses, or the robot's joint states, several with blanks between them; None:
             the only one, or the joint states that have the robot's joints.
-        state_topic: see ``read_trigger``; None: the gun always sprays, and a note lists the
+        state_topic: see ``with_trigger``; None: the gun always sprays, and a note lists the
             topics that could be its trigger.
         tf: [target, source] frames of the transforms to read instead of poses; source is the TCP.
         robot: the robot whose joint states to read instead of poses.
@@ -60,26 +57,7 @@ def trajectory_of(
     trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot, pose_unit)
     if not state_topic:
         return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
-    gun = read_trigger(bag, state_topic)
-    offset_s = float(np.median(log_times_ns - trajectory.stamps_ns)) * 1e-9
-    if gun.by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
-        raise RecordingError(
-            f'{state_topic} in {bag.path} has no stamps, and the stream of poses was logged '
-            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
-        )
-    order: np.ndarray = np.argsort(gun.stamps_ns, kind='stable')
-    rows: np.ndarray = np.empty(0, np.int64)
-    if np.any(np.diff(trajectory.stamps_ns) < 0):
-        # Where the clock was set back, the order in which they came says of which stream they are.
-        order = np.arange(len(order))
-        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), gun.log_times_ns)
-    columns = gun.stamps_ns, gun.flow, gun.brush
-    stamps, flow, brush = (its[order] if len(its) else its for its in columns)
-    return replace(
-        trajectory, trigger_stamps_ns=stamps, trigger_flow=flow, trigger_brush=brush,
-        trigger_rows=rows, settings=gun.settings,
-        notes=(*trajectory.notes, *gun.notes),
-    )  # fmt: skip
+    return with_trigger(bag, state_topic, trajectory, log_times_ns)
 
 
 def motion_of(
@@ -137,52 +115,51 @@ def write_pose_bag(
     types = definitions.own_types()
     levels = set(trajectory.trigger_flow.tolist()) - {0.0, 1.0}
     state_type = STATE_TYPE if levels or trajectory.trigger_brush.any() else BOOL_TYPE
+    frame_id, poses = trajectory.frame_id, poses.tolist()
     # (time, rank at equal times, content): the trigger before the pose.
     entries: list[tuple[int, int, Any]] = [
         (time_ns, 0, gun) for time_ns, *gun in trajectory.triggers
     ]
     entries += [(time_ns, 1, row) for row, time_ns in enumerate(trajectory.stamps_ns.tolist())]
     with RunWriter(folder, custom_data, ros_distro='kilted') as run:
+
+        def write(topic: str, time_ns: int, message: Any) -> None:
+            cdr = types.serialize_cdr(message, message.__msgtype__)
+            run.write(topic, bytes(cdr), time_ns, time_ns)
+
         _add_topic(run, POSE_TOPIC, POSE_TYPE)
         if len(trajectory.trigger_stamps_ns):
             _add_topic(run, STATE_TOPIC, state_type)
         if part:
             _add_topic(run, '/tf_static', TF_TYPES[0], latched=True)
             begin_ns, (child, place) = min(time_ns for time_ns, *_ in entries), part
-            header = _header(types, begin_ns, trajectory.frame_id)
             transform = _pose_message(types, 'Transform', 'Vector3', place.values)
-            stamped = types.types['geometry_msgs/msg/TransformStamped'](header, child, transform)
-            cdr = types.serialize_cdr(types.types[TF_TYPES[0]]([stamped]), TF_TYPES[0])
-            run.write('/tf_static', bytes(cdr), begin_ns, begin_ns)
+            stamped = types.types['geometry_msgs/msg/TransformStamped']
+            placed = stamped(_header(types, begin_ns, frame_id), child, transform)
+            write('/tf_static', begin_ns, types.types[TF_TYPES[0]]([placed]))
         if drive:
             begin_ns = int(trajectory.stamps_ns[0])
             _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
-            message = _joint_trajectory(types, _header(types, begin_ns, ''), drive)
-            cdr = types.serialize_cdr(message, JOINT_TRAJECTORY_TYPE)
-            run.write(JOINT_TOPIC, bytes(cdr), begin_ns, begin_ns)
+            write(JOINT_TOPIC, begin_ns, _joint_trajectory(types, begin_ns, drive))
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
-            header = _header(types, time_ns, trajectory.frame_id)
+            header = _header(types, time_ns, frame_id)
             if is_pose:
-                pose = _pose_message(types, 'Pose', 'Point', poses[content].tolist())
-                cdr = types.serialize_cdr(types.types[POSE_TYPE](header, pose), POSE_TYPE)
+                pose = _pose_message(types, 'Pose', 'Point', poses[content])
+                write(POSE_TOPIC, time_ns, types.types[POSE_TYPE](header, pose))
             else:
-                cdr = types.serialize_cdr(_state(types, state_type, header, *content), state_type)
-            run.write(POSE_TOPIC if is_pose else STATE_TOPIC, bytes(cdr), time_ns, time_ns)
+                write(STATE_TOPIC, time_ns, _state(types, state_type, header, *content))
     return run.folder
 
 
-def _joint_trajectory(types: Typestore, header: Any, drive: Drive) -> Any:
-    point, duration = (
-        types.types[name]
-        for name in ('trajectory_msgs/msg/JointTrajectoryPoint', 'builtin_interfaces/msg/Duration')
-    )
-    none = np.empty(0)
+def _joint_trajectory(types: Typestore, begin_ns: int, drive: Drive) -> Any:
+    point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
+    duration = types.types['builtin_interfaces/msg/Duration']
+    none, rows = np.empty(0), zip(drive.seconds.tolist(), drive.joints, drive.speeds, strict=True)
     points = [
         point(position, speed, none, none, duration(int(time_s), round(time_s % 1.0 * 1e9)))
-        for time_s, position, speed in zip(
-            drive.seconds.tolist(), drive.joints, drive.speeds, strict=True
-        )
+        for time_s, position, speed in rows
     ]
+    header = _header(types, begin_ns, '')
     return types.types[JOINT_TRAJECTORY_TYPE](header, list(drive.arm.joints), points)
 
 
@@ -204,10 +181,9 @@ def _state(types: Typestore, kind: str, header: Any, flow: float, brush: int) ->
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:
     """A Pose with a Point, or a Transform with a Vector3, from x y z qx qy qz qw."""
-    make = types.types
-    turn = make['geometry_msgs/msg/Quaternion'](*values[3:])
-    at = make[f'geometry_msgs/msg/{place}'](*values[:3])
-    return make[f'geometry_msgs/msg/{kind}'](at, turn)
+    turn = types.types['geometry_msgs/msg/Quaternion'](*values[3:])
+    at = types.types[f'geometry_msgs/msg/{place}'](*values[:3])
+    return types.types[f'geometry_msgs/msg/{kind}'](at, turn)
 
 
 def _header(types: Typestore, time_ns: int, frame_id: str) -> Any:

@@ -1,8 +1,8 @@
 """Forward kinematics of recorded joint states, by the URDF of the robot."""
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -29,23 +29,20 @@ T = TypeVar('T')
 
 
 @dataclass(frozen=True)
-class JointNotation:
-    """How a recording writes joints: what precedes the URDF's names, and units; None is usual."""
-
-    prefix: str | None = None
-    angle_unit: str | None = None
-    length_unit: str | None = None
-
-
-@dataclass(frozen=True)
 class Robot:
-    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d."""
+    """The kinematic chain from a robot's base link to its tip link, joints of pytransform3d.
+
+    A recording may have ``joint_prefix`` before the names of the joints, or lack it, and have
+    angles and lengths in other units than rad and m, where it does not say them itself.
+    """
 
     path: Path
     base: str
     tip: str
     chain: list[Any]
-    recorded_as: JointNotation = JointNotation()
+    joint_prefix: str = ''
+    angle_unit: str | None = None
+    length_unit: str | None = None
 
     @staticmethod
     def read(path: Path, tip: str | None = None, base: str | None = None) -> 'Robot':
@@ -119,7 +116,7 @@ class Robot:
         Case and marks do not count, as in joint1 for joint_1; with ``numbered``, J1 is the first
         joint that moves, if no name is known. Raises RecordingError that names the joints.
         """
-        prefix = _plain(self.recorded_as.prefix or '')
+        prefix = _plain(self.joint_prefix)
         plain = {_plain(name): value for name, value in names.items()}
         found: dict[str, T] = {}
         for joint in self.moving_joints:
@@ -138,23 +135,10 @@ class Robot:
         if missing or not found:
             raise RecordingError(
                 f'{where} has nothing of {" ".join(missing) or "any joint"} of {self.path.name}; '
-                f'its joints: {" ".join(sorted(names)) or "none"}{self._prefix_hint(names)}'
+                f'its joints: {" ".join(sorted(names)) or "none"}; where they have a prefix, give '
+                '--joint-prefix'
             )
         return found
-
-    def _prefix_hint(self, names: Iterable[str]) -> str:
-        """The prefix that would do, for a message."""
-        joints = self.moving_joints
-        pairs = [(name, joint) for name in names for joint in joints]
-        pairs += [(joint, name) for name, joint in pairs]
-        for long, short in pairs:
-            prefix = long.removesuffix(short)
-            if prefix != long and (
-                {prefix + joint for joint in joints} <= {*names}
-                or {prefix + name for name in names} >= {*joints}
-            ):
-                return f'; give --joint-prefix {prefix}'
-        return ''
 
     def in_si(self, values: np.ndarray, where: str, units: Sequence[str] = ()) -> np.ndarray:
         """Recorded values (N, J) of the moving joints in rad and m; '' is a unit that is not said.
@@ -165,7 +149,7 @@ class Robot:
         scales = []
         for joint, column, its in zip(moving, values.T, units or [''] * len(moving), strict=True):
             slides = joint.joint_type == 'prismatic'
-            said = self.recorded_as.length_unit if slides else self.recorded_as.angle_unit
+            said = self.length_unit if slides else self.angle_unit
             known, unit = LENGTHS if slides else ANGLES, its or said
             if unit and unit not in known:
                 wanted = 'm or mm' if slides else 'deg or rad'
@@ -206,26 +190,6 @@ class Robot:
         return positions, Rotation.from_matrix(axes).as_quat()
 
 
-@dataclass
-class _Columns:
-    """What the messages of one topic with the same joints hold of a robot's: a row a message."""
-
-    topic: str
-    names: list[str]
-    stamps_ns: list[int] = field(default_factory=list)
-    log_times_ns: list[int] = field(default_factory=list)
-    values: list[list[float]] = field(default_factory=list)
-
-    def without_repeats(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
-        """Stamps (N,), log times (N,) and values (N, K), and what is wrong with them."""
-        stamps, logged = np.array(self.stamps_ns, np.int64), np.array(self.log_times_ns, np.int64)
-        values = np.array(self.values, dtype=float)
-        faults = list(StreamQuality.of(stamps, values).repeats(self.topic))
-        new = RepeatedSamples().are_new(stamps, values)
-        new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
-        return stamps[new], logged[new], values[new], faults
-
-
 def read_joint_poses(
     bag: Bag, robot: Robot, topic_names: str | None
 ) -> tuple[Trajectory, np.ndarray, str]:
@@ -241,63 +205,67 @@ def read_joint_poses(
     if not topics:
         listed = listed_topics([], 'JointState')
         raise RecordingError(f'{bag.path}: name a topic of joint states; {listed}')
-    streams: dict[tuple[str, tuple[str, ...]], _Columns] = {}
+    # Of each topic and set of joints: stamps, log times and values.
+    streams: dict[tuple[str, tuple[str, ...]], list[tuple[int, int, list[float]]]] = {}
     for topic, log_time_ns, message in bag.decoded(topics):
-        key = topic, tuple(message.name)
-        if key not in streams:
-            streams[key] = _Columns(topic, list(message.name))
-        stream = streams[key]
+        rows = streams.setdefault((topic, tuple(message.name)), [])
         if len(message.position) == len(message.name):
-            stream.stamps_ns.append(stamp_ns(message.header))
-            stream.log_times_ns.append(log_time_ns)
-            stream.values.append(list(message.position))
-    its = {name: name for stream in streams.values() for name in stream.names}
-    recorded = robot.recorded_joints(its, f'{" and ".join(topics)} in {bag.path}')
-    wanted = dict.fromkeys(recorded.values())
-    used = [stream for stream in streams.values() if wanted.keys() & {*stream.names}]
-    _require_one_topic(bag, used, recorded)
+            rows.append((stamp_ns(message.header), log_time_ns, list(message.position)))
+    on_all, all_joints = ' and '.join(topics), {n: n for _, names in streams for n in names}
+    recorded = robot.recorded_joints(all_joints, f'{on_all} in {bag.path}')
+    for joint, name in recorded.items():
+        on = list(dict.fromkeys(topic for topic, names in streams if name in names))
+        if len(on) > 1:
+            raise RecordingError(
+                f'{bag.path}: {joint} is on {" and ".join(on)}; name the topics to take, with '
+                f'blanks between several, as --pose-topic {on[0]}'
+            )
     columns: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     warnings: list[str] = []
-    for stream in used:
-        stamps, logged, values, faults = stream.without_repeats()
-        finite = np.isfinite(values[:, [name in wanted for name in stream.names]]).all(axis=1)
+    used: list[str] = []
+    for (topic, names), rows in streams.items():
+        wanted = [column for column, name in enumerate(names) if name in recorded.values()]
+        if not (wanted and rows):
+            continue
+        used.append(topic)
+        stamps, logged, values, faults = _without_repeats(rows, topic)
+        finite = np.isfinite(values[:, wanted]).all(axis=1)
         if not finite.all():
-            what = f'joint states on {stream.topic} with joints that are not finite'
+            what = f'joint states on {topic} with joints that are not finite'
             bag.skipped[what] += int(np.count_nonzero(~finite))
-            stamps, logged, values = stamps[finite], logged[finite], values[finite]
         warnings += faults
-        for column, name in enumerate(stream.names):
-            if name in wanted and len(stamps) > len(columns.get(name, ([],))[0]):
-                columns[name] = stamps, logged, values[:, column]
+        for column in wanted:
+            if np.count_nonzero(finite) > len(columns.get(names[column], ([],))[0]):
+                columns[names[column]] = stamps[finite], logged[finite], values[finite, column]
     short = [joint for joint, name in recorded.items() if len(columns.get(name, ([],))[0]) < 2]
     if short:
         raise RecordingError(
-            f'{" and ".join(topics)} in {bag.path} has fewer than two positions of '
+            f'{on_all} in {bag.path} has fewer than two positions of '
             f'{" ".join(short)} of {robot.path.name}; record them again'
         )
-    clock = max(columns.values(), key=lambda column: len(column[0]))
-    stamps = clock[0]
+    clock, logged, _ = max(columns.values(), key=lambda column: len(column[0]))
     begin = max(at[0] for at, _, _ in columns.values())
-    end = min(at[-1] for at, _, _ in columns.values())
-    known = (stamps >= begin) & (stamps <= end)
-    stamps = stamps[known]
+    known = (clock >= begin) & (clock <= min(at[-1] for at, _, _ in columns.values()))
     each = [columns[recorded[joint]] for joint in robot.moving_joints]
-    values = np.stack([np.interp(stamps - begin, at - begin, v) for at, _, v in each], axis=1)
-    name = ' and '.join(dict.fromkeys(stream.topic for stream in used))
-    si = robot.in_si(values, f'{name} in {bag.path}')
-    trajectory = robot.trajectory(stamps, si, recorded, name)
-    trajectory = replace(trajectory, warnings=tuple(warnings))
-    return trajectory, clock[1][known], name
+    values = np.stack(
+        [np.interp(clock[known] - begin, at - begin, v) for at, _, v in each], axis=1
+    )
+    on_used = ' and '.join(dict.fromkeys(used))
+    si = robot.in_si(values, f'{on_used} in {bag.path}')
+    trajectory = robot.trajectory(clock[known], si, recorded, on_used)
+    return replace(trajectory, warnings=tuple(warnings)), logged[known], on_used
 
 
-def _require_one_topic(bag: Bag, used: list[_Columns], recorded: dict[str, str]) -> None:
-    for joint, name in recorded.items():
-        topics = dict.fromkeys(stream.topic for stream in used if name in stream.names)
-        if len(topics) > 1:
-            raise RecordingError(
-                f'{bag.path}: {joint} is on {" and ".join(topics)}; name the topics to take, with '
-                f'blanks between several, as --pose-topic {next(iter(topics))}'
-            )
+def _without_repeats(
+    rows: Sequence[tuple[int, int, list[float]]], topic: str
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Stamps (N,) that increase, log times (N,) and values (N, K), and what is wrong with them."""
+    stamps, logged = np.array([row[:2] for row in rows], np.int64).reshape(-1, 2).T
+    values = np.array([row[2] for row in rows], dtype=float)
+    faults = list(StreamQuality.of(stamps, values).repeats(topic))
+    new = RepeatedSamples().are_new(stamps, values)
+    new[new] = np.diff(np.maximum.accumulate(stamps[new]), prepend=-1) > 0
+    return stamps[new], logged[new], values[new], faults
 
 
 def _plain(name: str) -> str:

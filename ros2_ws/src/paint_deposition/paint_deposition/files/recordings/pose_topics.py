@@ -135,7 +135,7 @@ def read_tf_poses(bag: Bag, target: str, source: str) -> tuple[Trajectory, np.nd
 
 POSE_TYPE = 'geometry_msgs/msg/PoseStamped'
 ARRAY_TYPE = 'geometry_msgs/msg/PoseArray'
-# The pose in a message of each type.
+# The pose, or the poses of an array, in a message of each type.
 POSES: dict[str, Callable[[Any], Any]] = {
     POSE_TYPE: lambda message: message.pose,
     'geometry_msgs/msg/PoseWithCovarianceStamped': lambda message: message.pose.pose,
@@ -171,8 +171,19 @@ def choose_pose_topic(bag: Bag, name: str | None) -> BagTopic:
 
 def _element(name: str) -> tuple[str, int | None]:
     """The topic and the number of '/poses[2]'."""
-    element = re.fullmatch(r'(?P<topic>.*)\[(?P<number>\d+)\]', name)
-    return (element['topic'], int(element['number'])) if element else (name, None)
+    element = re.fullmatch(r'(.*)\[(\d+)\]', name)
+    return (element[1], int(element[2])) if element else (name, None)
+
+
+def _one_of(poses: Sequence[Any], number: int | None, topic: str) -> Any:
+    """The pose of this number in an array, or its only one."""
+    if number is None and len(poses) != 1:
+        raise RecordingError(
+            f'{topic} has {len(poses)} poses in a message; name the one of the gun, as {topic}[0]'
+        )
+    if (number or 0) >= len(poses):
+        raise RecordingError(f'{topic} has {len(poses)} poses in a message, and none [{number}]')
+    return poses[number or 0]
 
 
 def _other_motion(bag: Bag) -> str:
@@ -226,14 +237,3 @@ def read_poses(bag: Bag, name: str | None) -> tuple[Trajectory, np.ndarray, str]
         frames=tuple(frames) if most < len(frames) else (),
     )  # fmt: skip
     return trajectory, np.array(log_times, np.int64), topic.name
-
-
-def _one_of(poses: Sequence[Any], number: int | None, topic: str) -> Any:
-    """The pose of this number in an array, or its only one."""
-    if number is None and len(poses) != 1:
-        raise RecordingError(
-            f'{topic} has {len(poses)} poses in a message; name the one of the gun, as {topic}[0]'
-        )
-    if (number or 0) >= len(poses):
-        raise RecordingError(f'{topic} has {len(poses)} poses in a message, and none [{number}]')
-    return poses[number or 0]

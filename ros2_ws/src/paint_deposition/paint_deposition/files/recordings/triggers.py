@@ -3,7 +3,7 @@
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,13 @@ from paint_deposition.files.recordings.bag_files import Bag, BagTopic
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.motion.pose_stream import TriggerChange
-from paint_deposition.motion.trajectory import SPRAYS_NOTHING, numbered, relative_flow
+from paint_deposition.motion.trajectory import (
+    ONLY_BRUSH,
+    SPRAYS_NOTHING,
+    Trajectory,
+    numbered,
+    relative_flow,
+)
 
 BOOL_TYPE = 'std_msgs/msg/Bool'
 # Fields of AtomizerState that are summarised while the gun sprays.
@@ -69,18 +75,11 @@ class Signal:
         return values < self.level if self.below else values > self.level
 
 
-@dataclass(frozen=True)
-class RecordedTrigger:
-    """The trigger changes of a recording."""
-
-    stamps_ns: np.ndarray  # (M,) int64 times of the changes; log times if ``by_log_time``
-    flow: np.ndarray  # (M,) relative flow from then on
-    brush: np.ndarray  # (M,) int64 brush from then on; empty if it is not recorded
-    log_times_ns: np.ndarray  # (M,) int64 when they came, in this order
-    # Median of each setting while the gun sprays.
-    settings: dict[str, float] = field(default_factory=dict)
-    by_log_time: bool = False
-    notes: tuple[str, ...] = ()  # how the trigger was interpreted, one line each
+# A change of the trigger: its time, flow and brush from then on, and when it was logged [ns].
+Change = tuple[int, float, int, int]
+# For a trigger without stamps the log times are used, if those of the poses show that recorder and
+# robot have the same clock.
+MAX_CLOCK_OFFSET_S = 1.0
 
 
 def choose_state_topic(bag: Bag, name: str) -> BagTopic:
@@ -102,37 +101,67 @@ def unused_triggers(bag: Bag) -> tuple[str, ...]:
     )
 
 
-def read_trigger(bag: Bag, name: str) -> RecordedTrigger:
-    """Read the trigger from a topic of AtomizerState (header stamps) or Bool (log times).
+def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarray) -> Trajectory:
+    """The motion, logged at (N,) int64, with the trigger of a topic.
 
-    Or from a field of other messages, with the level beyond which the gun is on unless it is 0:
-    ``/io.states[3]``, ``/io.level > 12``, ``/io.closed < 1``. Raises RecordingError if there is no
-    such topic or field, or if it is no number.
+    That is AtomizerState (header stamps) or Bool (log times), or a field of other messages, with
+    the level beyond which the gun is on unless it is 0: ``/io.states[3]``, ``/io.level > 12``,
+    ``/io.closed < 1``. Raises RecordingError if there is no such topic or field, if it is no
+    number, or if it has no stamps and the clock of the robot is another than the recorder's.
     """
-    signal = Signal.parse(name)
+    signal, settings = Signal.parse(name), dict[str, float]()
     topic = bag.find(signal.topic) if signal else None
     if signal is None or topic is None or topic.type in (STATE_TYPE, BOOL_TYPE):
-        return _states(bag, choose_state_topic(bag, name))
+        topic = choose_state_topic(bag, name)
+        by_log_time = topic.type == BOOL_TYPE
+        changes, settings, notes = _changes_of_states(bag, topic)
+    else:
+        changes, by_log_time, notes = _changes_of_signal(bag, topic, signal)
+    offset_s = float(np.median(log_times_ns - motion.stamps_ns)) * 1e-9
+    if by_log_time and abs(offset_s) > MAX_CLOCK_OFFSET_S:
+        raise RecordingError(
+            f'{name} in {bag.path} has no stamps, and the stream of poses was logged '
+            f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
+        )
+    rows: np.ndarray = np.empty(0, np.int64)
+    if np.any(np.diff(motion.stamps_ns) < 0):
+        # Where the clock was set back, the order in which they came says of which stream they are.
+        logged = np.array([change[3] for change in changes], np.int64)
+        rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
+    else:
+        changes.sort(key=lambda change: change[0])
+    return replace(
+        motion, trigger_stamps_ns=np.array([change[0] for change in changes], np.int64),
+        trigger_flow=np.array([change[1] for change in changes], float),
+        trigger_brush=numbered([change[2] for change in changes]), trigger_rows=rows,
+        settings=settings, notes=(*motion.notes, *notes),
+    )  # fmt: skip
+
+
+def _changes_of_signal(
+    bag: Bag, topic: BagTopic, signal: Signal
+) -> tuple[list[Change], bool, list[str]]:
+    """The changes of a signal, whether they are by log time, and how it was interpreted."""
     rows = list(_signal_values(bag, topic, signal))
     known = [row for row in rows if math.isfinite(row[1])]
     if not known:
         raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
-    stamps, values, logged, _ = map(np.array, zip(*known, strict=True))
+    values = [value for _, value, *_ in known]
     note = (
-        f'trigger {topic.name}{signal.path} is {values.min():.4g} to {values.max():.4g}: the gun '
+        f'trigger {topic.name}{signal.path} is {min(values):.4g} to {max(values):.4g}: the gun '
         f'is on where it is {"below" if signal.below else "above"} {signal.level:g}'
     )
     if left_out := len(rows) - len(known):
         note += f'; {left_out} values that are no number are left out'
-    on, by_log = signal.is_on(values), not all(stamped for *_, stamped in rows)
-    flow = on.astype(float)
-    return RecordedTrigger(stamps, flow, numbered([]), logged, by_log_time=by_log, notes=(note,))
+    changes = [(at, float(signal.is_on(v)), ONLY_BRUSH, logged) for at, v, logged, _ in known]
+    return changes, not all(stamped for *_, stamped in rows), [note]
 
 
-def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
-    """The changes on a topic of AtomizerState or Bool; without a brush, the only one."""
-    changes: list[TriggerChange] = []
-    logged: list[int] = []
+def _changes_of_states(
+    bag: Bag, topic: BagTopic
+) -> tuple[list[Change], dict[str, float], list[str]]:
+    """The changes on a topic of AtomizerState or Bool, the median of each setting, and notes."""
+    changes: list[Change] = []
     settings: dict[str, list[float]] = {}
     without_flow, refused = 0, []
     for _, log_time_ns, message in bag.decoded([topic.name]):
@@ -145,24 +174,15 @@ def _states(bag: Bag, topic: BagTopic) -> RecordedTrigger:
                 refused.append(str(error))
                 continue
             without_flow += bool(message.spraying) and change.flow == 0.0
-        changes.append(change)
-        logged.append(log_time_ns)
+        changes.append((change.stamp_ns, change.flow, change.brush, log_time_ns))
         for name in SETTINGS if change.flow > 0.0 else ():
             value = getattr(message, name, np.nan)
             if np.isfinite(value):
                 settings.setdefault(name, []).append(value)
     if refused:
         bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
-    notes = (f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)',)
-    return RecordedTrigger(
-        np.array([change.stamp_ns for change in changes], dtype=np.int64),
-        np.array([change.flow for change in changes], dtype=float),
-        numbered([change.brush for change in changes]),
-        np.array(logged, dtype=np.int64),
-        {name: float(np.median(values)) for name, values in settings.items()},
-        topic.type == BOOL_TYPE,
-        notes if without_flow else (),
-    )
+    notes = [f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)'] * bool(without_flow)
+    return changes, {name: float(np.median(values)) for name, values in settings.items()}, notes
 
 
 def _signal_values(

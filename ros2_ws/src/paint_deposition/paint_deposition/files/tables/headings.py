@@ -19,6 +19,7 @@ from paint_deposition.files.tables.sheets import (
 
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
+MOST_LINES_ABOVE_TWO = 40  # of headings on two rows
 
 # The ways to write a unit, by its metres, seconds, radians, or metres a second.
 WAYS_TO_WRITE: dict[str, dict[float, str]] = {
@@ -137,18 +138,13 @@ def find_table(
         sheets = named
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
-        above = one.rows[:MOST_LINES_ABOVE]
+        above = [(one, k) for k in range(min(len(one.rows), MOST_LINES_ABOVE))]
+        above += [(two, k) for k in range(MOST_LINES_ABOVE_TWO) if (two := _on_two_rows(one, k))]
         ranked = [
-            (known(headings_in(row)), not is_comment(row), one, k) for k, row in enumerate(above)
+            (known(headings_in(its.rows[k])), not is_comment(its.rows[k]), its, k)
+            for its, k in above
         ]
-        ranked += [
-            (known(headings_in(two.rows[k])), True, two, k)
-            for k in range(min(len(above) - 1, 40))
-            if (two := _on_two_rows(one, k))
-        ]
-        if not ranked:
-            continue
-        count, _, best, row = max(ranked, key=lambda rank: rank[:2])
+        count, _, best, row = max(ranked, key=lambda rank: rank[:2], default=(0, False, one, 0))
         if count and _is_split_alike(best.rows, row):
             found.append((best, row))
     if len(found) > 1 and found[0][0].form.startswith('sheet'):
@@ -161,9 +157,7 @@ def find_table(
     wide_enough = [s for s in sheets if sum(len(r) >= columns for r in s.rows) > len(s.rows) / 2]
     if columns and wide_enough:
         return wide_enough[0], None
-    apart = [s for s in sheets if 2 * sum(len(row) > 1 for row in s.rows) > len(s.rows)]
-    by_marks = [s for s in apart if not s.form.startswith('blanks')]
-    return max(by_marks or sheets, key=lambda s: len(widest(s))), None
+    return max(sheets, key=lambda s: len(widest(s))), None
 
 
 def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
@@ -172,8 +166,8 @@ def _on_two_rows(sheet: Sheet, first: int) -> Sheet | None:
     A blank cell belongs to the cell left of it, over which the upper heading is merged, or to the
     one above it.
     """
-    upper, lower = sheet.rows[first], sheet.rows[first + 1]
-    if any(map(is_value, [*upper, *lower])) or len(lower) < 2:
+    upper, lower = [*sheet.rows[first : first + 2], [], []][:2]
+    if len(lower) < 2 or any(map(is_value, [*upper, *lower])):
         return None
     texts, last = list[Cell](), ''
     for k in range(max(len(upper), len(lower))):

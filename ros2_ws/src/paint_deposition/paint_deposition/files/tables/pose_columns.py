@@ -2,7 +2,7 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
 from functools import partial
 from pathlib import Path
@@ -12,7 +12,6 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.tables import pose_columns
 from paint_deposition.files.tables.headings import (
     ANGLES,
     BESIDE,
@@ -39,23 +38,21 @@ ROTATED = {
     **dict.fromkeys(('rot', 'rotation', 'rotvec', 'rv', 'r'), 'r'),
     **dict.fromkeys(('euler', 'angle', 'e'), 'e'),
 }
+# The columns of the log of abb_libegm that hold what the robot measured, as usual headings.
 EGM_LOG = {
     'TIMESTAMP': 'time [ms]',
     **{f'R_FB_POS_{axis}': f'{axis} [mm]' for axis in 'XYZ'},
     **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
     **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
 }
+MEASURED_BY_EGM = {'R_FB_POS_X', 'R_FB_POS_RJ1'}  # by which the log is known
 
 
 @dataclass
 class PoseTable(Table):
-    """A table whose columns are found by their names, see ``column_name``.
-
-    ``log`` says whose log it is, '' for a table with usual headings.
-    """
+    """A table whose columns are found by their names, see ``column_name``."""
 
     names: list[str] = field(default_factory=list)
-    log: str = ''
 
     @staticmethod
     def read(path: Path, robot: 'Robot | None' = None) -> 'PoseTable':
@@ -72,18 +69,17 @@ class PoseTable(Table):
                 f'{path}: no columns x, y, z; name them x_m, y_m, z_m (its first row: {first}); '
                 'joints are read with --urdf'
             )
-        headings, log = translated(headings_in(sheet.rows[header]))
+        headings = translated(headings_in(sheet.rows[header]))
         names = [column_name(heading) for heading in headings]
         headings, below = rows_below(sheet, headings, header + 1)
         table = PoseTable(
-            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names,
-            log=log,
-        ).select(below)  # fmt: skip
+            path, sheet.form, headings, sheet.rows, sheet.lines, RecordingError, names=names
+        ).select(below)
         if not len(table):
             raise table.error('no poses below the row of headings')
         for k, row in enumerate(table.rows):
             if any(cell != '' for cell in row[len(headings) :]):
-                table.complain_of_width(k)
+                table.add_width_error(k)
         table.refuse_errors()
         table = table.without_units_in_cells(range(len(headings)))
         if not sheet.form.startswith('commas'):
@@ -108,9 +104,8 @@ class PoseTable(Table):
     def joints(self, robot: 'Robot') -> tuple[np.ndarray, dict[str, str]]:
         """The values (N, J) of a robot's moving joints [rad or m], and their headings."""
         columns = robot.recorded_joints(_by_text(self.headings), str(self.path), numbered=True)
-        of_each = [columns[joint] for joint in robot.moving_joints]
-        units = [self.headings[column].unit for column in of_each]
-        values = robot.in_si(self.values(of_each), str(self.path), units)
+        units = [self.headings[column].unit for column in columns.values()]
+        values = robot.in_si(self.values([*columns.values()]), str(self.path), units)
         return values, {joint: self.headings[column].text for joint, column in columns.items()}
 
     def units(self, columns: Sequence[int]) -> set[str]:
@@ -164,13 +159,24 @@ def column_name(heading: Heading) -> str:
     return kept[-1] if kept[-1] in known else ''.join(kept)
 
 
+def translated(headings: list[Heading]) -> list[Heading]:
+    """The headings of a log of abb_libegm with the usual words and units, others as they are.
+
+    What it planned (R_PL) and was asked for (S_REF) has no words.
+    """
+    if MEASURED_BY_EGM.isdisjoint(heading.text for heading in headings):
+        return headings
+    usual = [Heading.of(EGM_LOG.get(heading.text, '')) for heading in headings]
+    return [replace(its, text=heading.text) for its, heading in zip(usual, headings, strict=True)]
+
+
 def _by_text(headings: Sequence[Heading]) -> dict[str, int]:
     """The column of each heading, by its words."""
     return {''.join(heading.words): k for k, heading in enumerate(headings) if heading.words}
 
 
 def _known(headings: list[Heading], robot: 'Robot | None') -> int:
-    headings, _ = translated(headings)
+    headings = translated(headings)
     names = {column_name(heading) for heading in headings}
     if robot is None:
         return len(names - {''}) if {*POSITION} <= names else 0
@@ -180,30 +186,15 @@ def _known(headings: list[Heading], robot: 'Robot | None') -> int:
         return 0
 
 
-def translated(headings: Sequence[Heading]) -> tuple[list[Heading], str]:
-    """The headings with the usual words and units for a log that is known, and a note; else ''.
-
-    What else such a log holds of the motion has no words left.
-    """
-    if not {'R_FB_POS_X', 'R_FB_POS_RJ1'} & {heading.text for heading in headings}:
-        return list(headings), ''
-    usual = []
-    for heading in headings:
-        if meaning := EGM_LOG.get(heading.text):
-            words = Heading.of(meaning)
-            heading = Heading(heading.text, words.words, words.unit)
-        elif heading.text.startswith(('R_FB_', 'R_PL_', 'S_REF_')):
-            heading = Heading(heading.text, ())
-        usual.append(heading)
-    return usual, 'a log of abb_libegm: what the robot measured (R_FB)'
-
-
-EULER = ('ex', 'ey', 'ez')
-# Angles in the order in which a convention takes them, and the maker who calls them so.
-IN_ORDER = {
-    ('a', 'b', 'c'): 'kuka', ('w', 'p', 'r'): 'fanuc', ('alpha', 'beta', 'gamma'): '',
-    ('phi', 'theta', 'psi'): '', ('e1', 'e2', 'e3'): '', ('o', 'a', 't'): '', EULER: '',
-}  # fmt: skip
+# Columns of angles, what they are unless the user says it ('' for not known), and whether each is
+# that of an axis, else they are in the order in which a convention takes them.
+ANGLE_COLUMNS = (
+    (ROTATION_VECTOR, 'rotvec', True), (ROLL_PITCH_YAW, 'rpy', True),
+    (('ex', 'ey', 'ez'), '', True), (('a', 'b', 'c'), 'kuka', False),
+    (('w', 'p', 'r'), 'fanuc', False), (('alpha', 'beta', 'gamma'), '', False),
+    (('phi', 'theta', 'psi'), '', False), (('e1', 'e2', 'e3'), '', False),
+    (('o', 'a', 't'), '', False),
+)  # fmt: skip
 # Makers' conventions in the letters of scipy: capital letters turn about the axes of the tool as
 # it goes, small ones about those of the world.
 CONVENTIONS = {
@@ -239,8 +230,12 @@ def read_rotations(
                 note = f'quaternion {table.written(columns)} ({order})'
                 return table.values(columns), note
     columns, by_axis, convention = _angle_columns(table, rotation)
-    written = table.written(columns)
-    unit = _unit(table, columns, convention, angle_unit)
+    written, units = table.written(columns), table.units(columns)
+    if units not in ({'deg'}, {'rad'}, {''}):
+        found = ', '.join(sorted(units))
+        raise RecordingError(f'{written} in {found}; give all in deg or in rad')
+    of_maker = 'deg' if convention in {*CONVENTIONS} - {'rpy'} else 'rad'
+    unit = units.pop() or angle_unit or of_maker
     angles = table.values(columns) * ANGLES[unit]
     largest = np.nanmax(np.abs(angles), initial=0.0)
     if unit == 'rad' and largest > 2.0 * np.pi + 1e-6:
@@ -260,38 +255,17 @@ def read_rotations(
 
 def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], bool, str]:
     """The three columns, whether each is that of an axis, x y z, and what they are."""
-    if columns := table.find_all(pose_columns.ROTATION_VECTOR):
-        if rotation is None and 'deg' in table.units(columns):
-            raise RecordingError(
-                f'{table.written(columns)} in degrees may be Euler angles or a rotation vector; '
-                f'give --rotation: {ROTATION_WORDS}'
-            )
-        return columns, True, rotation or ROTVEC
-    if columns := table.find_all(pose_columns.ROLL_PITCH_YAW):
-        return columns, True, rotation or 'rpy'
-    for names, usual in IN_ORDER.items():
+    for names, usual, by_axis in ANGLE_COLUMNS:
         if columns := table.find_all(names):
-            if not (rotation or usual):
+            doubt = '' if usual else 'are Euler angles of an unknown convention'
+            if usual == ROTVEC and 'deg' in table.units(columns):
+                doubt = 'in degrees may be Euler angles or a rotation vector'
+            if doubt and not rotation:
                 raise RecordingError(
-                    f'{table.written(columns)} are Euler angles of an unknown convention; give '
-                    f'--rotation: {ROTATION_WORDS}'
+                    f'{table.written(columns)} {doubt}; give --rotation: {ROTATION_WORDS}'
                 )
-            return columns, names == EULER, rotation or usual
+            return columns, by_axis, rotation or usual
     raise RecordingError(
         f'no orientation among the columns {table.written(())}; give qx qy qz qw, rx ry rz '
         '(rotation vector) or roll pitch yaw'
     )
-
-
-def _unit(
-    table: PoseTable, columns: Sequence[int], convention: str, angle_unit: str | None
-) -> str:
-    """The unit of the angles: their headings', else the one given, else their maker's."""
-    units = table.units(columns)
-    if units in ({'deg'}, {'rad'}):
-        return units.pop()
-    if units != {''}:
-        found = ', '.join(sorted(units))
-        raise RecordingError(f'{table.written(columns)} in {found}; give all in deg or in rad')
-    of_maker = 'deg' if convention in ('kuka', 'abb', 'fanuc', 'staubli', 'kawasaki') else 'rad'
-    return angle_unit or of_maker

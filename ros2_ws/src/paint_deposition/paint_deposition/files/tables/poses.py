@@ -46,7 +46,7 @@ def may_hold_poses(path: Path) -> bool:
     names = {*TIME, *SPEED, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW}
 
     def known(headings: list[Heading]) -> int:
-        return sum(column_name(heading) in names for heading in translated(headings)[0])
+        return sum(column_name(heading) in names for heading in translated(headings))
 
     return find_table(path, RecordingError, known)[1] is not None
 
@@ -74,93 +74,80 @@ def read_pose_table(
     """
     table = PoseTable.read(path, robot)
     try:
-        gun = _flows(table, trigger)
-        if robot is not None:
-            return _joint_motion(table, gun, robot)
-        positions, unit = _positions_m(table, pose_unit)
-        quaternions, how = read_rotations(table, rotation, angle_unit)
-        poses = Trajectory(np.zeros(len(table), np.int64), positions, quaternions)
-        found = _trajectory(table, poses, gun, f'x y z in {unit}; {how}')
-        # The frame that a column names.
-        column = table.find('frame', 'frameid')
-        names = set() if column is None else {*table.texts(column)}
-        if len(names) > 1:
-            raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
-        return replace(found, frame_id=''.join(names).lstrip('/'))
+        return _motion(table, robot, trigger, pose_unit, (rotation, angle_unit))
     except RecordingError as error:
         reason = str(error).removeprefix(f'{path}: ')
         raise RecordingError(f'{path}: {reason}') from None
 
 
-def _joint_motion(
-    table: PoseTable, gun: tuple[np.ndarray | None, str], robot: 'Robot'
-) -> Trajectory:
-    """The motion of a robot's tip from the columns of its joints."""
-    values, recorded = table.joints(robot)
-    time = table.find(*TIME)
-    if time is None:
-        raise RecordingError(
-            f'no time among the columns {table.written(())}; give a column time_s'
-        )
-    stamps, unit = table.stamps_ns(time)
-    flows, trigger = gun
-    tip = robot.trajectory(stamps, values, recorded, table.path.name)
-    notes = (*tip.notes, f'{trigger}; {table.written([time])} in {unit}', table.log)
-    return _timed(
-        replace(tip, notes=tuple(filter(None, notes))), table, flows,
-        np.full(len(table), ONLY_BRUSH, np.int64),
-    )  # fmt: skip
-
-
-def _timed(
-    poses: Trajectory, table: PoseTable, flows: np.ndarray | None, brushes: np.ndarray
-) -> Trajectory:
-    """Poses with the trigger of their table, and what is wrong with them as a stream."""
-    on = slice(0, 0) if flows is None else slice(None)
-    levels = np.zeros(len(poses)) if flows is None else flows
-    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
-    faults = StreamQuality.of(poses.stamps_ns, values).faults(table.path.name)
-    warnings = () if flows is not None else _could_be_trigger(table)
-    return replace(
-        poses, trigger_stamps_ns=poses.stamps_ns[on], trigger_flow=levels[on],
-        trigger_brush=numbered(brushes[on]), warnings=(*warnings, *faults),
-    )  # fmt: skip
-
-
-def _trajectory(
-    table: PoseTable, poses: Trajectory, gun: tuple[np.ndarray | None, str], how: str
-) -> Trajectory:
+def _motion(
+    table: PoseTable, robot: 'Robot | None', trigger: str | None, pose_unit: str | None,
+    angles: tuple[str | None, str | None],
+) -> Trajectory:  # fmt: skip
     """The poses with their times or speeds, and with what switches the gun."""
-    flows, trigger = gun
+    flows, by_trigger = _flows(table, trigger)
     brushes, by_brush = _brushes(table)
     if flows is None and brushes.any():
         flows = np.ones(len(brushes))
-    note = f'{len(table)} poses: {how}; {trigger}{by_brush}'
-    time, speed = table.find(*TIME), table.find(*SPEED)
-    if time is not None:
-        stamps, time_unit = table.stamps_ns(time)
-        notes = filter(None, (f'{note}; {table.written([time])} in {time_unit}', table.log))
-        poses = replace(poses, stamps_ns=stamps, notes=tuple(notes))
-        return _timed(poses, table, flows, brushes)
-    if speed is None:
+    time, speed = table.find(*TIME), None if robot else table.find(*SPEED)
+    if time is None and speed is None:
+        or_speed = '' if robot else ', or speed_m_per_s for programmed passes'
         raise RecordingError(
-            f'no time among the columns {table.written(())}; give a column time_s, or '
-            'speed_m_per_s for programmed passes'
+            f'no time among the columns {table.written(())}; give a column time_s{or_speed}'
         )
+    stamps, unit = (np.zeros(len(table), np.int64), '') if time is None else table.stamps_ns(time)
+    if robot is not None:
+        joints, recorded = table.joints(robot)
+        poses = robot.trajectory(stamps, joints, recorded, table.path.name)
+        (how,) = poses.notes
+    else:
+        positions, its_unit = _positions_m(table, pose_unit)
+        quaternions, its_rotation = read_rotations(table, *angles)
+        poses = Trajectory(stamps, positions, quaternions, _frame(table))
+        how = f'{len(table)} poses: x y z in {its_unit}; {its_rotation}'
+    note = f'{how}; {by_trigger}{by_brush}'
+    warnings = () if flows is not None else _could_be_trigger(table)
+    if time is None and speed is not None:
+        programmed = timed(_moves(table, poses, speed, flows, brushes), flows is not None)
+        return replace(
+            programmed, frame_id=poses.frame_id, notes=(PROGRAMMED, note), warnings=warnings
+        )
+    notes = (f'{note}; {table.written([time or 0])} in {unit}',)
+    values = np.hstack([poses.positions_m, poses.quaternions_xyzw])
+    faults = StreamQuality.of(stamps, values).faults(table.path.name)
+    poses = replace(poses, notes=notes, warnings=(*warnings, *faults))
+    if flows is None:
+        return poses
+    return replace(
+        poses, trigger_stamps_ns=stamps, trigger_flow=flows, trigger_brush=numbered(brushes)
+    )
+
+
+def _frame(table: PoseTable) -> str:
+    """The frame that a column names, '' for none."""
+    column = table.find('frame', 'frameid')
+    names = set() if column is None else {*table.texts(column)}
+    if len(names) > 1:
+        raise RecordingError(f'poses in frames {", ".join(sorted(names))}; give one frame')
+    return ''.join(names).lstrip('/')
+
+
+def _moves(
+    table: PoseTable, poses: Trajectory, speed: int, flows: np.ndarray | None, brushes: np.ndarray
+) -> list[Move]:
+    """Each row as the move to its pose at its speed."""
     (unit,) = table.units([speed])
     if (unit or 'm/s') not in SPEEDS:
         raise RecordingError(f"{table.written([speed])}: '{unit}' is no unit of speed")
     speeds = table.values([speed])[:, 0] * SPEEDS[unit or 'm/s']
     spraying = np.ones(len(speeds)) if flows is None else flows
     columns = (speeds.tolist(), spraying.tolist(), table.lines, brushes.tolist())
-    moves = [
-        Move(position, quaternion, speed, bool(flow), line=line, flow=flow or 1.0, brush=brush)
-        for position, quaternion, speed, flow, line, brush in zip(
+    return [
+        Move(position, quaternion, one, bool(flow), line=line, flow=flow or 1.0, brush=brush)
+        for position, quaternion, one, flow, line, brush in zip(
             poses.positions_m, poses.quaternions_xyzw, *columns, strict=True
         )
     ]
-    warnings = () if flows is not None else _could_be_trigger(table)
-    return replace(timed(moves, flows is not None), notes=(PROGRAMMED, note), warnings=warnings)
 
 
 def _positions_m(table: PoseTable, given: str | None) -> tuple[np.ndarray, str]:

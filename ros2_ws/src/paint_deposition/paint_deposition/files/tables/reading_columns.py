@@ -60,29 +60,14 @@ class Layout:
 
 
 def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
-    """The columns of each quantity under these headings; the user's, else those that are known."""
+    """The columns of each quantity under these headings; the user's, else those that are known.
+
+    Empty where there is no column that the user names.
+    """
     texts = [heading.text for heading in headings]
     own = {q: [k for k, t in enumerate(texts) if t == n] for q, n in OWN.items() if n in texts}
-    at: dict[str, list[int]] = {}
-    if not {*AXES, 'thickness'} <= {*own}:
-        for quantities, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
-            found = [_quantity(heading, beside) for heading in headings]
-            for quantity in (q for q in quantities if q in found and q not in at):
-                at[quantity] = [k for k, one in enumerate(found) if one == quantity]
-        if {*AXES} <= {*at}:
-            at = {q: columns for q, columns in at.items() if q not in ON_FACE}
-        if gauge := format_of(headings):
-            words = [plain(heading) for heading in headings]
-            _assign(at, '', [k for k, word in enumerate(words) if word in gauge.unused])
-            for quantity, word in gauge.columns.items():
-                _assign(at, quantity, [k for k, its in enumerate(words) if its == word])
-        layers = [k for k, heading in enumerate(headings) if _layer(heading)]
-        if len(layers) > 1 and 'thickness' not in at:
-            _assign(at, 'thickness', layers)
-        also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
-        if also and 'thickness' not in at:
-            at['thickness'] = also
-    at |= own
+    all_own = {*AXES, 'thickness'} <= {*own}
+    at = own if all_own else _known_columns(headings) | own
     small = [text.casefold() for text in texts]
     for quantity in layout.columns:
         wanted = []
@@ -95,6 +80,37 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
                 return {}
         _assign(at, 'thickness' if quantity == 'layers' else quantity, wanted)
     return at
+
+
+def _known_columns(headings: list[Heading]) -> dict[str, list[int]]:
+    """The columns of each quantity by the names of any table, of a gauge's layout, of layers."""
+    at: dict[str, list[int]] = {}
+    for quantities, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
+        found = [_quantity(heading, beside) for heading in headings]
+        for quantity in (q for q in quantities if q in found and q not in at):
+            at[quantity] = [k for k, one in enumerate(found) if one == quantity]
+    if {*AXES} <= {*at}:
+        at = {q: columns for q, columns in at.items() if q not in ON_FACE}
+    if gauge := format_of(headings):
+        words = [plain(heading) for heading in headings]
+        _assign(at, '', [k for k, word in enumerate(words) if word in gauge.unused])
+        for quantity, word in gauge.columns.items():
+            _assign(at, quantity, [k for k, its in enumerate(words) if its == word])
+    layers = [k for k, heading in enumerate(headings) if _layer(heading)]
+    if len(layers) > 1 and 'thickness' not in at:
+        _assign(at, 'thickness', layers)
+    also = [k for k, heading in enumerate(headings) if _begins_as_thickness(heading)]
+    return at if 'thickness' in at or not also else at | {'thickness': also}
+
+
+def _assign(at: dict[str, list[int]], quantity: str, columns: list[int]) -> None:
+    """Let columns be those of one quantity alone, or of none ('')."""
+    for other in [*at]:
+        at[other] = [k for k in at[other] if k not in columns and other != quantity]
+        if not at[other]:
+            del at[other]
+    if quantity and columns:
+        at[quantity] = columns
 
 
 def layers_of(headings: list[Heading], layout: Layout, films: list[int]) -> list[str]:
@@ -116,23 +132,16 @@ def plain(heading: Heading) -> str:
     return ' '.join('#' if word.isdigit() else word for word in heading.words)
 
 
-def _assign(at: dict[str, list[int]], quantity: str, columns: list[int]) -> None:
-    """Let columns be those of one quantity alone, or of none ('')."""
-    for other in [q for q in at if {*at[q]} & {*columns} or q == quantity]:
-        at[other] = [k for k in at[other] if k not in columns and other != quantity]
-        if not at[other]:
-            del at[other]
-    if quantity and columns:
-        at[quantity] = columns
+def _is_of_film(heading: Heading) -> bool:
+    """Whether a heading has the unit of a film, or none."""
+    return not heading.unit or heading.unit_m in FILM_UNITS
 
 
 def _layer(heading: Heading) -> str:
     """The layer whose thickness a column holds by its heading, '' for none."""
-    if heading.unit and heading.unit_m not in FILM_UNITS:
-        return ''
-    words = [word for word in heading.words if word not in FILM_WORDS]
-    layer = LAYER.get(' '.join('#' if word.isdigit() else word for word in words), '')
-    return layer + ''.join(filter(str.isdigit, words)) if layer else ''
+    words = tuple(word for word in heading.words if word not in FILM_WORDS)
+    layer = LAYER.get(plain(replace(heading, words=words)), '') if _is_of_film(heading) else ''
+    return layer and layer + ''.join(filter(str.isdigit, words))
 
 
 def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
@@ -144,7 +153,7 @@ def _quantity(heading: Heading, beside: Collection[str] = BESIDE) -> str | None:
     dicke = any(w.endswith('dicke') and not w.startswith(OTHER_DICKEN) for w in without[-1:])
     known = QUANTITY.get(' '.join(words)) or QUANTITY.get(' '.join(without))
     if dicke or known == 'thickness':
-        return None if heading.unit and heading.unit_m not in FILM_UNITS else 'thickness'
+        return 'thickness' if _is_of_film(heading) else None
     return known
 
 
@@ -155,11 +164,12 @@ def _begins_as_thickness(heading: Heading) -> bool:
     """
     if not (heading.unit and heading.text.endswith((']', ')'))) or {*heading.words} & NO_READING:
         return False
-    for count in (1, 2):
-        words = heading.words[:count]
-        if words[-1:] and words[-1].endswith(('dicke', 'dft', 'thickness')):
-            return _quantity(replace(heading, words=words)) == 'thickness'
-    return False
+    return any(
+        words[-1].endswith(('dicke', 'dft', 'thickness'))
+        and _quantity(replace(heading, words=words)) == 'thickness'
+        for words in (heading.words[:1], heading.words[:2])
+        if words
+    )
 
 
 def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout) -> str:
@@ -170,51 +180,46 @@ def not_found(sheet: Sheet, headings: list[Heading], films: bool, layout: Layout
     if not sheet.rows:
         return 'there is nothing to read in it; give a table with a heading over each column'
     headings = headings or headings_in(widest(sheet))
-    texts = [heading.text for heading in headings]
-    named = [(q, n) for q in layout.columns for n in layout.named(q) if isinstance(n, str)]
-    for quantity, name in ((q, name) for q, name in named if name not in texts):
-        remedy = did_you_mean(name, filter(None, texts), 'copy the heading')
-        return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
-    if films:
-        bare = [replace(heading, unit='') for heading in headings]
-        foreign = [
-            heading
-            for heading, plain in zip(headings, bare, strict=True)
-            if _quantity(heading) != 'thickness' == _quantity(plain)
-        ]
-        likely = [h.text for h in bare if _quantity(replace(h, words=h.words[-1:])) == 'thickness']
-        remedy = 'call it thickness_um, DFT, film thickness or Schichtdicke, or name it'
-        if foreign:
-            remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
-            remedy += ', or say unit: {thickness: ...} and name it'
-        elif wet := [h.text for h in headings if h.words and WET.match(' '.join(h.words))]:
-            remedy = f"'{wet[0]}' is a wet film: say wet: true, give its solids, and name it"
-        elif likely:
-            remedy = f'it may be {" or ".join(map(repr, likely))}: name one'
-        return (
-            f'no column is known as the thickness {shown(headings)}; {remedy} '
-            'with columns: {thickness: ...} in the campaign'
-        )
-    return f'no columns are known as x, y, z, or from_left, height {shown(headings)}; rename them'
+    texts = [heading.text for heading in headings if heading.text]
+    for quantity in layout.columns:
+        for name in layout.named(quantity):
+            if isinstance(name, str) and name not in texts:
+                remedy = did_you_mean(name, texts, 'copy the heading')
+                return f"no column '{name}' for {quantity} {shown(headings)}; {remedy}"
+    if not films:
+        missing = 'no columns are known as x, y, z, or from_left, height'
+        return f'{missing} {shown(headings)}; rename them'
+    last = [replace(heading, words=heading.words[-1:], unit='') for heading in headings]
+    likely = [h for h, its in zip(headings, last, strict=True) if _quantity(its) == 'thickness']
+    remedy = 'call it thickness_um, DFT, film thickness or Schichtdicke, or name it'
+    if foreign := [heading for heading in likely if not _is_of_film(heading)]:
+        remedy = f"'{foreign[0].text}' is in '{foreign[0].unit}': give it in µm, mil or mm"
+        remedy += ', or say unit: {thickness: ...} and name it'
+    elif wet := [h.text for h in headings if h.words and WET.match(' '.join(h.words))]:
+        remedy = f"'{wet[0]}' is a wet film: say wet: true, give its solids, and name it"
+    elif likely:
+        remedy = f'it may be {" or ".join(repr(heading.text) for heading in likely)}: name one'
+    return (
+        f'no column is known as the thickness {shown(headings)}; {remedy} '
+        'with columns: {thickness: ...} in the campaign'
+    )
 
 
 def headings_again(table: Table, header: int, known: Callable[[list[Heading]], int]) -> list[int]:
     """Rows that repeat the row of headings; a second table with others is refused."""
-    wide = len(table.rows[header]) > 1
-    again = [
-        k
-        for k, row in enumerate(table.rows)
-        if k != header and not any(map(is_value, row))
-        and (not wide or sum(cell != '' for cell in row) > 1)
-        and known(headings_in(row))
-    ]  # fmt: skip
-    for k in again:
-        if table.rows[k] != table.rows[header]:
+    again, wide = [], len(table.rows[header]) > 1
+    for k, row in enumerate(table.rows):
+        if k == header or any(map(is_value, row)) or not known(headings_in(row)):
+            continue
+        if wide and sum(cell != '' for cell in row) < 2:
+            continue
+        if row != table.rows[header]:
             lines = sorted([table.lines[k], table.lines[header]])
             raise table.error(
                 f'lines {lines[0]} and {lines[1]} are headings of two tables; put each into a '
                 'file of its own, or both under one row of headings'
             )
+        again.append(k)
     return again
 
 
@@ -243,17 +248,18 @@ def refuse_misleading(
     films = [] if of_user else at.get('thickness', [])
     beside = range(max(films, default=len(every)) + 1, len(every))
     for column in takewhile(lambda k: not every[k], beside):
-        for row, line in zip(table.rows, table.lines, strict=True):
-            if column < len(row) and is_value(row[column]):
+        for text, line in zip(table.texts(column), table.lines, strict=True):
+            if is_value(text):
                 raise table.error(
                     f"'{every[films[-1]]}' stands over several columns or is a title: "
-                    f"'{text_of(row[column])}' beside it in line {line} has no heading; "
+                    f"'{text}' beside it in line {line} has no heading; "
                     'give each column one, or say columns: {thickness: ...} in the campaign'
                 )
     cells = [text_of(cell) for row in table.rows for cell in row] if bare else []
     in_doubt = layout.decimal != '.' and table.form.startswith('commas')
     if cells and in_doubt and len(cells) == 2 * len(table) and all(map(str.isdigit, cells)):
         raise table.error(
-            f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with a "
-            'decimal comma; say decimal: point if it is two, else put a heading over the column'
+            f"'{cells[0]},{cells[1]}' in line {table.lines[0]} may be two numbers or one with "
+            'a decimal comma; say decimal: point if it is two, else put a heading over the '
+            'column'
         )

@@ -11,7 +11,7 @@ from io import BytesIO, StringIO
 from pathlib import Path
 
 from paint_deposition.errors import PaintError, some
-from paint_deposition.files.atomic import MAGIC, read_file, require_pyarrow, require_small_package
+from paint_deposition.files.atomic import read_file, require_small_package
 from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 
 # Texts without blanks around them; the numbers of a workbook are numbers.
@@ -28,7 +28,7 @@ XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
 ODS_TABLE = '{urn:oasis:names:tc:opendocument:xmlns:table:1.0}'
 # What a spreadsheet would take for a formula, and no number: written with a ' before it.
 FORMULA = re.compile(r'[=@\t\r]|[+-](?![\d.,]*(e[+-]?\d+)?$)', re.IGNORECASE)
-EXPECTED = 'give a table as CSV, TSV, TXT, JSON or Parquet, or a workbook (.xlsx, .xls, .ods)'
+EXPECTED = 'give a table as CSV, TSV, TXT or JSON, or a workbook (.xlsx, .xls, .ods)'
 
 
 @dataclass(frozen=True)
@@ -61,16 +61,13 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
         raise refusal(f'{path}: no such file; {EXPECTED}') from None
     except OSError as error:
         raise refusal(f'{path}: cannot be read ({error.strerror}); {EXPECTED}') from None
-    except (zipfile.BadZipFile, RuntimeError, ValueError) as error:  # also encrypted ones
+    except (zipfile.BadZipFile, zlib.error, RuntimeError, ValueError) as error:  # also encrypted
         raise refusal(f'{path}: cannot be read as a zip ({error}); {EXPECTED}') from None
     try:
         if content.startswith(WORKBOOKS):
             return _sheets_of_workbook(content)
-        if content.startswith(MAGIC):
-            require_pyarrow(str(path))
-            return [_sheet_of_parquet(content)]
         texts = _decoded(content)
-        if content.lstrip()[:1] in (b'[', b'{') and (records := _records(texts[0][0])):
+        if records := _records(texts[0][0]):
             return [records]
         return [sheet for text, encoding in texts for sheet in _sheets_of_text(text, encoding)]
     except ValueError as error:
@@ -79,28 +76,24 @@ def read_sheets(path: Path, refusal: type[PaintError]) -> list[Sheet]:
 
 
 def _content(path: Path, refusal: type[PaintError]) -> bytes:
-    """What a file holds, or the table in a folder or a zip of files.
-
-    That is its only file, or what ``FOLDERS`` has of it, one below the other.
-    """
+    """What a file holds, or the files of a folder or a zip that are its one table."""
     if path.is_dir():
-        named = {file.name: file for file in path.iterdir() if file.is_file()}
-        wanted = _table_in(named, path, refusal)
-        return b'\n'.join(read_file(named[name], refusal, MOST_TABLE_MB) for name in wanted)
+        files = {file.name: file for file in path.iterdir() if file.is_file()}
+        wanted = _table_in(files, path, refusal)
+        return b'\n'.join(read_file(files[name], refusal, MOST_TABLE_MB) for name in wanted)
     content = read_file(path, refusal, MOST_TABLE_MB)
     if not (content.startswith(WORKBOOKS[0]) and zipfile.is_zipfile(BytesIO(content))):
         return content
     with zipfile.ZipFile(BytesIO(content)) as package:
-        members = [name for name in package.namelist() if not name.endswith('/')]
-        if {'[Content_Types].xml', 'content.xml'} & {*members}:
+        names = {Path(name).name: name for name in package.namelist() if name[-1:] != '/'}
+        if {'[Content_Types].xml', 'content.xml'} & {*names}:
             return content  # a workbook
         require_small_package(package)
-        names = {Path(name).name: name for name in members}
         return b'\n'.join(package.read(names[name]) for name in _table_in(names, path, refusal))
 
 
 def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> Sequence[str]:
-    """The names of the files, of those in a folder, that are its one table."""
+    """The names of those that ``FOLDERS`` has, one below the other, else of the only file."""
     for wanted in FOLDERS.values():
         if {*wanted} <= {*names}:
             return wanted
@@ -108,6 +101,14 @@ def _table_in(names: Collection[str], path: Path, refusal: type[PaintError]) -> 
     if len(visible) != 1:
         raise refusal(f'{path} holds {some(visible, 6) or "no file"}; name the one with the table')
     return visible
+
+
+def is_gauge_file(path: Path) -> bool:
+    """Whether a path can be that of readings only: JSON, a zip, or a gauge's folder."""
+    if path.is_dir():
+        names = {file.name for file in path.iterdir()}
+        return any({*files} <= names for files in FOLDERS.values())
+    return path.suffix.lower() in ('.json', '.zip')
 
 
 def text_of(cell: Cell) -> str:
@@ -137,24 +138,19 @@ def _decoded(content: bytes) -> list[tuple[str, str]]:
 def _records(text: str) -> Sheet | None:
     """The first list of records in JSON as a table, what stands beside it above; else None."""
     try:
-        found = json.loads(text, parse_int=float)
+        found = json.loads(text, parse_int=float) if text.lstrip()[:1] in ('[', '{') else None
     except (ValueError, RecursionError):
         return None
-    above = list[list[Cell]]()
+    above: list[list[Cell]] = []
     while isinstance(found, dict):
-        above += [[_cell(key), _cell(v)] for key, v in found.items() if not _is_nested(v)]
-        found = next((value for value in found.values() if _is_nested(value)), None)
+        above += [[_cell(key), _cell(value)] for key, value in found.items()]
+        found = next((value for value in found.values() if isinstance(value, list | dict)), None)
     records = [one for one in found or () if isinstance(one, dict)]
     if not records:
         return None
     keys = list(dict.fromkeys(key for record in records for key in record))
-    cells = [[record.get(key) for key in keys] for record in records]
-    rows = [['' if v is None or _is_nested(v) else _cell(v) for v in row] for row in cells]
+    rows = [[_cell(record.get(key)) for key in keys] for record in records]
     return Sheet.of(enumerate([*above, [*map(_cell, keys)], *rows], 1), 'JSON')
-
-
-def _is_nested(value: object) -> bool:
-    return isinstance(value, dict | list)
 
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
@@ -173,11 +169,13 @@ def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     by_lines = enumerate((list[Cell]([_cell(line)]) for line in lines), 1)
     whole = Sheet.of(by_lines, f'one column, {encoding}')
     for name, pattern in LINES.items():
-        found = [(number, pattern.fullmatch(line)) for number, line in enumerate(lines, 1)]
-        rows = [(n, [_cell(part or '') for part in one.groups()]) for n, one in found if one]
+        rows = [
+            (number, [_cell(part or '') for part in found.groups()])
+            for number, line in enumerate(lines, 1)
+            if (found := pattern.fullmatch(line))
+        ]
         if 2 * len(rows) > len(whole.rows):
-            headings = (max(rows[0][0] - 1, 0), [*map(_cell, pattern.groupindex)])
-            sheets.append(Sheet.of([headings, *rows], f'{name}, {encoding}'))
+            sheets.append(Sheet.of([(0, [*pattern.groupindex]), *rows], f'{name}, {encoding}'))
     return [*sheets, Sheet.of(by_blanks, f'blanks, {encoding}'), whole]
 
 
@@ -242,28 +240,10 @@ def _cells_of_open_document(content: bytes) -> int:
     return cells
 
 
-def _sheet_of_parquet(content: bytes) -> Sheet:
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    try:
-        file = pq.ParquetFile(BytesIO(content))
-        # A few bytes may claim any number of rows.
-        cells = file.metadata.num_rows * file.metadata.num_columns
-        if cells > MOST_CELLS:
-            raise ValueError(f'{cells} values, more than {MOST_CELLS}')
-        table = file.read()
-        columns = [
-            ['' if value is None or value != value else _cell(value) for value in column]
-            for column in (column.to_pylist() for column in table.columns)
-        ]
-    except (pa.ArrowException, ValueError, OSError) as error:  # of texts that are none, too
-        raise ValueError(f'Parquet ({error})') from None
-    rows = [list(table.column_names), *map(list, zip(*columns, strict=True))]
-    return Sheet.of(enumerate(rows, 1), 'Parquet')
-
-
 def _cell(value: object) -> Cell:
+    """A value as a cell; nothing of what JSON has nested."""
+    if value is None or isinstance(value, list | dict):
+        return ''
     if isinstance(value, int | float) and not isinstance(value, bool):
         return float(value)
     text = ' '.join(str(value).strip().splitlines())

@@ -18,7 +18,7 @@ from paint_deposition.files.tables.sheets import (
     text_of,
 )
 
-MOST_COMPLAINTS_SHOWN, MOST_REPEATS = 8, 50
+MOST_ERRORS_SHOWN, MOST_REPEATS = 8, 50
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
 NUMBER = re.compile(r'[+-]?(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|[+-]?(?:nan|inf(?:inity)?)')
 Kind = TypeVar('Kind', bound='Table')
@@ -55,9 +55,9 @@ class Table:
     def numbers(
         self, column: int, may_be_empty: bool = False, finite: bool = True, switch: bool = False
     ) -> np.ndarray:
-        """A column (N,) as written; what is no number is complained of.
+        """A column (N,) as written; what is no number is an error.
 
-        Blank cells may give nan without a complaint, nan and inf may be taken (not ``finite``),
+        Blank cells may give nan, nan and inf may be taken (not ``finite``),
         and with ``switch`` on, off, yes, no, true and false are numbers too.
         """
         values = np.full(len(self), np.nan)
@@ -73,10 +73,14 @@ class Table:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
                 wanted += ', or n/a where there is none' if may_be_empty else ''
-                wanted += '; write the one unit in the heading' if _behind(cell) else ''
-                self.complain(index, f"{name} is '{text_of(cell)}'; {wanted}")
+                wanted += (
+                    '; write the one unit in the heading'
+                    if NUMBER_AND_MORE.fullmatch(text_of(cell))
+                    else ''
+                )
+                self.add_error(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
-                self.complain(index, f'{name} is {cell}; expected a finite number')
+                self.add_error(index, f'{name} is {cell}; expected a finite number')
             else:
                 values[index] = value
         return values
@@ -93,17 +97,17 @@ class Table:
         """Headings as the file has them; of all columns where none are given."""
         return ' '.join(self.headings[k].text for k in columns or range(len(self.headings)))
 
-    def complain(self, row: int, text: str) -> None:
+    def add_error(self, row: int, text: str) -> None:
         """Note what is wrong in a row; the first of a row counts, others may follow from it."""
         self._errors.setdefault(self.lines[row], text)
 
-    def complain_of_width(self, row: int) -> None:
+    def add_width_error(self, row: int) -> None:
         """Note that a row has not as many values as there are headings."""
         cells = self.rows[row]
         text = f'{len(cells)} values under {len(self.headings)} column names'
         if self.form.startswith('commas') and len(cells) > len(self.headings):
             text += '; with decimal commas, put semicolons between the columns'
-        self.complain(row, text)
+        self.add_error(row, text)
 
     def error(self, text: str) -> PaintError:
         """What is wrong with the file as a whole, as an error to raise."""
@@ -115,8 +119,8 @@ class Table:
             return
         lines = [f'line {line}: {text}' for line, text in sorted(self._errors.items())]
         count = f'{len(lines)} errors: ' if len(lines) > 1 else ''
-        if (more := len(lines) - MOST_COMPLAINTS_SHOWN) > 0:
-            lines[MOST_COMPLAINTS_SHOWN:] = [f'and {more} more']
+        if (more := len(lines) - MOST_ERRORS_SHOWN) > 0:
+            lines[MOST_ERRORS_SHOWN:] = [f'and {more} more']
         raise self.error(count + '; '.join(lines))
 
     def select(self: Kind, rows: Sequence[int]) -> Kind:
@@ -139,54 +143,56 @@ class Table:
         """Whether a cell is the number 0."""
         return self._number(cell) == 0.0
 
-    def with_repeats_apart(self: Kind, at: dict[str, list[int]]) -> Kind:
+    def with_repeats_apart(self: Kind, columns: Sequence[int]) -> tuple[Kind, list[int]]:
         """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.
 
-        ``at`` gets the new columns of the thickness.
+        Then the columns of all these numbers.
         """
-        width, extra = len(self.headings), list[int]()
-        cells = [
-            [text_of(cell_at(row, k)).split(';') for k in at['thickness']] for row in self.rows
-        ]
-        most = max((len(parts) for row in cells for parts in row), default=1)
-        if not 1 < most <= MOST_REPEATS or max(map(len, self.rows)) > width:
-            return self
-        headings, rows = [*self.headings], [[*r, *[''] * (width - len(r))] for r in self.rows]
-        for place, k in enumerate(at['thickness']):
-            for number in range(most):
-                column = k if number == 0 else len(headings)
-                if number:
-                    text = f'{self.headings[k].text} ({number + 1})'
-                    headings.append(replace(self.headings[k], text=text))
-                    extra.append(column)
-                for row, parts in zip(rows, cells, strict=True):
-                    part = parts[place][number].strip() if number < len(parts[place]) else ''
-                    row[column : column + 1] = [part]
-        at['thickness'] = [*at['thickness'], *extra]
-        return replace(self, headings=headings, rows=rows)
+        headings, found, width = [*self.headings], [*columns], len(self.headings)
+        repeats = any(';' in text for k in columns for text in self.texts(k))
+        if not repeats or max(map(len, self.rows)) > width:
+            return self, found
+        rows = [[*row, *[''] * (width - len(row))] for row in self.rows]
+        for k in columns:
+            cells = [[part.strip() for part in text.split(';')] for text in self.texts(k)]
+            most = max(map(len, cells))
+            if not 1 < most <= MOST_REPEATS:
+                continue
+            found += range(len(headings), len(headings) + most - 1)
+            headings += [
+                replace(headings[k], text=f'{headings[k].text} ({number})')
+                for number in range(2, most + 1)
+            ]
+            for row, parts in zip(rows, cells, strict=True):
+                row[k] = parts[0]
+                row += [*parts[1:], *[''] * (most - len(parts))]
+        return replace(self, headings=headings, rows=rows), found
 
     def without_units_in_cells(self: Kind, columns: Iterable[int]) -> Kind:
-        """The table with the units behind all numbers of a column in its heading instead.
+        """The table with the unit behind the numbers of a column in its heading instead.
 
-        Units that differ, also from the heading's, stay where they are, to be complained of.
+        Units that differ, also from the heading's, stay where they are, to be refused.
         """
         headings, rows = [*self.headings], self.rows
         for k in columns:
-            if not any(_behind(cell_at(row, k)) for row in rows[:MOST_LINES_ABOVE]):
+            texts, heading = self.texts(k), self.headings[k]
+            if not any(map(NUMBER_AND_MORE.fullmatch, texts[:MOST_LINES_ABOVE])):
                 continue
-            split = [_behind(cell_at(row, k)) for row in rows]
-            bare = any(
-                not s and is_value(cell_at(row, k)) for s, row in zip(split, rows, strict=True)
-            )
-            units = [unit_of(found[2]) for found in split if found]
-            all_units = {*units, headings[k].unit or ('' if bare else units[0])}
-            if len(all_units) > 1 or units[0] not in UNITS:
+            split = [NUMBER_AND_MORE.fullmatch(text) for text in texts]
+            units = {
+                unit_of(one[2]) if one else heading.unit
+                for one, text in zip(split, texts, strict=True)
+                if one or is_value(text)
+            }
+            units |= {heading.unit} - {''}
+            if len(units) > 1 or not units <= {*UNITS}:
                 continue
-            text = headings[k].text if headings[k].unit else f'{headings[k].text} [{units[0]}]'
-            headings[k] = replace(headings[k], text=text, unit=units[0])
+            (unit,) = units
+            text = heading.text if heading.unit else f'{heading.text} [{unit}]'
+            headings[k] = replace(heading, text=text, unit=unit)
             rows = [
-                [*row[:k], found[1], *row[k + 1 :]] if found else row
-                for row, found in zip(rows, split, strict=True)
+                [*row[:k], one[1], *row[k + 1 :]] if one else row
+                for row, one in zip(rows, split, strict=True)
             ]
         return replace(self, headings=headings, rows=rows)
 
@@ -223,8 +229,3 @@ class Table:
             raise self.error(doubt)
         form = self.form + (', decimal comma' if mark == ',' else '')
         return replace(self, decimal=mark, form=form)
-
-
-def _behind(cell: Cell) -> re.Match | None:
-    """A number and what stands behind it, such as its unit."""
-    return None if isinstance(cell, float) else NUMBER_AND_MORE.fullmatch(cell)

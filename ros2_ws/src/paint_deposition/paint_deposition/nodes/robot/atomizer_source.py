@@ -13,10 +13,9 @@ from paint_msgs.msg import AtomizerState
 from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.bags import MAX_CLOCK_OFFSET_S
 from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, JointNotation, Robot
-from paint_deposition.files.recordings.triggers import Signal
+from paint_deposition.files.recordings.joint_states import DEFAULT_TIP, Robot
+from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S, Signal
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH
@@ -147,8 +146,8 @@ class AtomizerSource(PaintNode):
             robot = Robot.read(
                 Path(values['urdf_file']), values['tip_link'] or None, values['base_link'] or None
             )
-            notation = JointNotation(values['joint_prefix'], values['angle_unit'] or None)
-            self._robot = replace(robot, recorded_as=notation)
+            prefix, unit = values['joint_prefix'], values['angle_unit'] or None
+            self._robot = replace(robot, joint_prefix=prefix, angle_unit=unit)
         self._tcp = Rigid.of(values['tcp_offset'] or [0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
         named = {name: Signal.parse(values[name]) for name in SIGNALS}
         self._signals = {name: signal for name, signal in named.items() if signal is not None}

@@ -26,7 +26,6 @@ from paint_deposition.files.provenance import (
 from paint_deposition.files.rapid.program import module_text
 from paint_deposition.files.recordings.bag_files import TRIGGER
 from paint_deposition.files.recordings.bags import STATE_TOPIC, write_pose_bag
-from paint_deposition.files.tool_path import write_tool_path
 from paint_deposition.film.spray_geometry import spray_geometry
 from paint_deposition.inference.design.reading_choice import ChosenReadings
 from paint_deposition.motion.part_frame import Rigid, moved
@@ -50,7 +49,6 @@ from paint_deposition.report.style import save_picture
 from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
-TOOL_PATH = 'passes.yaml'
 COLUMNS = (
     'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
     'brush',
@@ -95,10 +93,9 @@ def write_passes(
     head += [f'WARNING: {contact}' for contact in result.contacts]
     module = module_text(result.moves, head, part[1] if part else None, paint_moves)
     write_text(folder / PROGRAM, module)
-    write_tool_path(folder / TOOL_PATH, moves)
     write_model(folder / MODEL_FILE, result.model)
     if not result.drive:
-        return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE]
+        return [BAG, TABLE, PROGRAM, MODEL_FILE]
     arm = result.drive.arm
     units = np.where(arm.slides, 'm', 'rad')
     names = [f'{name}_{unit}' for name, unit in zip(arm.joints, units, strict=True)]
@@ -107,7 +104,7 @@ def write_passes(
         for time_s, values in zip(result.drive.seconds, result.drive.joints, strict=True)
     ]
     write_table(folder / JOINTS, [['time_s', *names], *rows])
-    return [BAG, TABLE, PROGRAM, TOOL_PATH, MODEL_FILE, JOINTS]
+    return [BAG, TABLE, PROGRAM, MODEL_FILE, JOINTS]
 
 
 def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
