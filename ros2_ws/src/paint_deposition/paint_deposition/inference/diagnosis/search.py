@@ -44,6 +44,8 @@ from paint_deposition.inference.fitting.least_squares import Fit
 # So many proposals are refitted each time, but for single effects: these are all refitted once, as
 # the pattern that was fitted without any may imitate the one that acts.
 TRIALS = 5
+# Around so many of the single effects that fit best another pattern is looked for.
+PATTERNS = 3
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
 # Log evidence that two fits of one set may differ by and be the same.
@@ -268,17 +270,18 @@ class Search:
         tried = {n: self.with_effect(nothing, n) for n in nothing.space.alone if n != UNKNOWN}
         order = sorted(tried, key=lambda name: -tried[name].log_weight)
         self._leading = tuple(order[:TRIALS])
-        best = tried[order[0]] if order else nothing
-        if best.log_evidence <= nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN:
+        least = nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN
+        near: list[EffectSet] = []
+        for one in (tried[name] for name in order[:PATTERNS]):
+            if one.log_evidence > least:
+                anew = self.state.fitted_with(
+                    [*one.effects.values()], self.state.start, starts=STARTS,
+                    sizes=one.fit.parameters.sizes,
+                )  # fmt: skip
+                near += [EffectSet.around(self.state, one.names, fit) for fit in (one.fit, anew)]
+        if not near:
             return nothing
-        others = self.state.fitted_with(
-            [*best.effects.values()],
-            self.state.start,
-            starts=STARTS,
-            sizes=best.fit.parameters.sizes,
-        )
-        anew = [EffectSet.around(self.state, best.names, fit) for fit in (best.fit, others)]
-        best = max(anew, key=lambda one: one.log_evidence)
+        best = max(near, key=lambda one: one.log_evidence)
         self._trials, self._tried = {best.names: best}, set()
         self._patterns = (nothing.fit.model,)
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
