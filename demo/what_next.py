@@ -37,7 +37,7 @@ def settle(folder: Path, paint: Paint, say: Callable[[str], None]) -> Path:
     painted = generate(SEED, HIDDEN, readings=80, repeats=20, heldout=1, scale=SCALE,
                        parcels=PARCELS)  # fmt: skip
     campaign = write(painted, folder / 'one_door')
-    print(f'{len(painted.experiments[0].readings)} readings: {campaign}')
+    print(f'{len(painted.experiments[0].readings.point)} readings: {campaign}')
 
     say('Diagnosing it: what is missing, and what next?')
     first = folder / 'one_door_diagnosis'
