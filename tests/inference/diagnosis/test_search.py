@@ -82,7 +82,7 @@ def test_effects_are_fitted_beside_what_nature_leaves_over(stages):
     best = stages[-1].here
     assert best.fit.discrepancy is not None
     # What is usual is not their prior: both are stronger.
-    assert best.fit.parameters.sizes == dict.fromkeys(PLANTED, SIZES[-1])
+    assert best.fit.parameters.amplitude_sizes == dict.fromkeys(PLANTED, SIZES[-1])
     assert best.effects['edge_build'].gain == pytest.approx(EDGE.gain, rel=0.2)
     drift = best.effects['flow_drift'].drift_per_pass
     assert drift == pytest.approx(DRIFT.drift_per_pass, rel=0.2)

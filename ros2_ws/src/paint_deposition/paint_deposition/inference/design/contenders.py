@@ -39,9 +39,9 @@ from paint_deposition.inference.diagnosis.model_space import (
     PRIOR_EFFECT,
     SIZES,
     SURE,
-    amplitude_sizes,
+    best_amplitude_sizes,
+    gain_of_sizes,
     log_odds,
-    of_sizes,
     space_around,
 )
 from paint_deposition.inference.diagnosis.smooth_laws import NEGLIGIBLE
@@ -74,15 +74,20 @@ class Contender:
         """Whether it is an effect of the library."""
         return self.name not in LOG_PRIOR
 
-    def null(self, study: Study, usual: ModelDiscrepancy) -> NullModel:
+    def null(
+        self, study: Study, usual: ModelDiscrepancy, errors: np.ndarray | None = None
+    ) -> NullModel:
         """What it gives the readings of a study, among them those that it was fitted to.
 
         Args:
             study: the readings.
             usual: their discrepancy around one model of all contenders.
+            errors: (P, n) by which its laws are off, if they are known, see ``ways_off``.
         """
         fit = study.beside(self.fit.parameters, self.fit.vector)
-        columns = [study.nuisance, ways_off(study, fit, _laws_of(fit), usual.model)[self.off][0]]
+        if errors is None:
+            errors, _ = ways_off(study, fit, _laws_of(fit), usual.model)[self.off]
+        columns = [study.nuisance, errors]
         if self.covariate:
             values = standardised(study, usual.model)[self.covariate]
             law = SIZES[-1] * FACTOR * field_over_values(values, LAW_LENGTH, NEGLIGIBLE)
@@ -96,7 +101,7 @@ class Contender:
         if not self.is_effect:
             return evidence + LOG_PRIOR[self.name]
         prior = log_odds(PRIOR_EFFECT) + float(np.log(self.share))
-        return evidence + of_sizes(self.fit, [self.name]) + prior
+        return evidence + gain_of_sizes(self.fit, [self.name]) + prior
 
 
 def _laws_of(fit: Fit) -> frozenset[str]:
@@ -127,9 +132,9 @@ def contenders_of(
         sizes: Mapping[str, float] = MappingProxyType({}),
     ) -> Fit:
         model = without.model_copy(update={'effects': (*rest, *effects)})
-        sizes = {**fit.parameters.sizes, **sizes}
+        sizes = {**fit.parameters.amplitude_sizes, **sizes}
         parameters = FreeParameters.of(
-            model, *model.effects, known=fit.parameters.known, sizes=sizes
+            model, *model.effects, known=fit.parameters.known, amplitude_sizes=sizes
         )
         return study.fit(parameters, nuisance=study.nuisance, discrepancy=discrepancy)
 
@@ -141,13 +146,14 @@ def contenders_of(
     for name in names:
         effect = fit.model.effect(name) or space.central.by_law(name)[1]
         rough = fitted(effect, discrepancy=best.null.discrepancy)
-        sizes = amplitude_sizes(rough, [name])
+        sizes = best_amplitude_sizes(rough, [name])
         there = fitted(effect, discrepancy=best.null.discrepancy, sizes=sizes)
-        ways = [
-            Contender(name, there, best.sizes, off=k, share=share)
-            for k, (_, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model))
-        ]
-        found.append(max(ways, key=lambda way: way.log_weight(way.null(study, usual), freedom)))
+        weights, ways = [], []
+        for k, (errors, share) in enumerate(ways_off(study, there, _laws_of(there), usual.model)):
+            way = Contender(name, there, best.sizes, off=k, share=share)
+            weights.append(way.log_weight(way.null(study, usual, errors), freedom))
+            ways.append(way)
+        found.append(ways[int(np.argmax(weights))])
     if diagnosis.unknown is not None:
         found.append(Contender(UNKNOWN, base, best.sizes, diagnosis.unknown.covariate))
     return (*found, Contender(FOOTPRINT, base, best.sizes))

@@ -11,7 +11,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.discrepancy import ModelDiscrepancy
 from paint_deposition.inference.diagnosis.explanations import (
-    neutral_shapes,
+    candidates_beside,
     nonparametric_laws_of,
     of_effects,
 )
@@ -42,11 +42,7 @@ class UnmeasuredPart:
     @cached_property
     def candidates(self) -> dict[str, list[Effect]]:
         """Effects that the model does not have, neutral and in a few shapes, by id."""
-        return {
-            key: neutral_shapes(effect)
-            for key, effect in self.library.items()
-            if self.model.effect(key) is None
-        }
+        return candidates_beside(self.model, self.library)
 
     @cached_property
     def film_um(self) -> np.ndarray:

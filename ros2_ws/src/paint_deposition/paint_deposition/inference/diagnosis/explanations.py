@@ -78,6 +78,15 @@ def neutral_shapes(effect: type[Effect]) -> list[Effect]:
     ]
 
 
+def candidates_beside(
+    model: DepositionModel, library: Mapping[str, type[Effect]]
+) -> dict[str, list[Effect]]:
+    """The effects of a library that a model does not have, see ``neutral_shapes``, by id."""
+    return {
+        key: neutral_shapes(effect) for key, effect in library.items() if model.effect(key) is None
+    }
+
+
 def sensitivity_um(
     forward: Forward, model: DepositionModel, effect: Effect, name: str, predicted_um: np.ndarray
 ) -> np.ndarray:

@@ -326,7 +326,7 @@ def space_around(study: Study, fit: Fit, explanations: Sequence[Explanation] = (
     return ModelSpace(weighed, explanations, discrepancy, freedom)
 
 
-def amplitude_sizes(fit: Fit, names: Iterable[str]) -> dict[str, float]:
+def best_amplitude_sizes(fit: Fit, names: Iterable[str]) -> dict[str, float]:
     """The most probable size of each effect's amplitudes, times their typical ones.
 
     With the typical size an effect that is stronger would be drawn towards none.
@@ -334,7 +334,7 @@ def amplitude_sizes(fit: Fit, names: Iterable[str]) -> dict[str, float]:
     return {name: float(SIZES[_by_size(fit, name).argmax()]) for name in names}
 
 
-def of_sizes(fit: Fit, names: Iterable[str]) -> float:
+def gain_of_sizes(fit: Fit, names: Iterable[str]) -> float:
     """What it adds to a fit's log evidence that the amplitudes of effects have any of the sizes.
 
     The fit takes each as normal with one size as the standard deviation.
@@ -345,7 +345,7 @@ def of_sizes(fit: Fit, names: Iterable[str]) -> float:
 
 def _by_size(fit: Fit, name: str) -> np.ndarray:
     """(S,) log odds of each size of an effect's amplitudes against that of the fit."""
-    entries, fitted = fit.parameters.of_effects, fit.parameters.sizes.get(name, 1.0)
+    entries, fitted = fit.parameters.of_effects, fit.parameters.amplitude_sizes.get(name, 1.0)
     amounts = fit.vector[len(fit.vector) - len(entries) :]
     own = [amount for amount, entry in zip(amounts, entries, strict=True)
            if entry.effect == name and not entry.is_shape]  # fmt: skip

@@ -86,7 +86,7 @@ def diagnose(
     stages = search.stages() if sought else [SearchStage(nothing, [])]
     best, groups = search.groups(stages[-1].here)
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
-    state = replace(state, sizes=best.fit.parameters.sizes)
+    state = replace(state, amplitude_sizes=best.fit.parameters.amplitude_sizes)
     fit = state.fitted_with([*best.effects.values()], state.fit.model)
     options = [
         *of_corrections(state.study, fit, best.names),

@@ -79,7 +79,9 @@ def refit(
     progress(f'fitting with {added.id}')
     before, with_it = state.history[-1], search.with_effect(nothing, added.id)
     probability = inclusion_of([with_it.log_evidence], [nothing.log_evidence])
-    state = replace(_beside(state, with_it), sizes=with_it.fit.parameters.sizes)
+    state = replace(
+        _beside(state, with_it), amplitude_sizes=with_it.fit.parameters.amplitude_sizes
+    )
     fit = state.fitted_with([*with_it.effects.values()], state.fit.model)
     state = state.with_step(added.id, fit)
     state = state.accepting((added.id,), probability, before)

@@ -32,10 +32,10 @@ from paint_deposition.inference.diagnosis.model_space import (
     SURE,
     ModelSpace,
     WeightedNull,
-    amplitude_sizes,
+    best_amplitude_sizes,
+    gain_of_sizes,
     inclusion_of,
     log_odds,
-    of_sizes,
     probable_hyperparameters,
 )
 from paint_deposition.inference.diagnosis.state import STARTS, DiagnosisState
@@ -136,7 +136,7 @@ class EffectSet:
         The fit takes each as normal with one size as the standard deviation.
         """
         nature = [one.log_weight for one in self.weighed if not one.sizes.is_beyond_nature]
-        return float(np.logaddexp.reduce(nature)) + of_sizes(self.fit, self.names)
+        return float(np.logaddexp.reduce(nature)) + gain_of_sizes(self.fit, self.names)
 
     @property
     def log_prior(self) -> float:
@@ -161,7 +161,10 @@ class EffectSet:
         some = self.best.null.select(rows)
         evidence = some.log_evidence(some.deviation[:, np.newaxis], self.state.freedom)[0]
         return (
-            evidence + self.best.sizes.log_prior + of_sizes(self.fit, self.names) + self.log_prior
+            evidence
+            + self.best.sizes.log_prior
+            + gain_of_sizes(self.fit, self.names)
+            + self.log_prior
         )
 
 
@@ -226,10 +229,13 @@ class Search:
             [*effects.values()], model, discrepancy=discrepancy, others=others
         )
         trial = replace(start, names=frozenset(effects), fit=fit)
-        sizes = amplitude_sizes(fit, effects)
+        sizes = best_amplitude_sizes(fit, effects)
         if any(size != 1.0 for size in sizes.values()):
             fit = self.state.fitted_with(
-                [*trial.effects.values()], fit.model, discrepancy=discrepancy, sizes=sizes
+                [*trial.effects.values()],
+                fit.model,
+                discrepancy=discrepancy,
+                amplitude_sizes=sizes,
             )
             trial = replace(trial, fit=fit)
         known = self._trials.get(trial.names)
@@ -276,7 +282,7 @@ class Search:
             if one.log_evidence > least:
                 anew = self.state.fitted_with(
                     [*one.effects.values()], self.state.start, starts=STARTS,
-                    sizes=one.fit.parameters.sizes,
+                    amplitude_sizes=one.fit.parameters.amplitude_sizes,
                 )  # fmt: skip
                 near += [EffectSet.around(self.state, one.names, fit) for fit in (one.fit, anew)]
         if not near:

@@ -16,7 +16,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.inference.diagnosis.explanations import (
     Explanation,
-    neutral_shapes,
+    candidates_beside,
     nonparametric_laws_of,
     of_places,
 )
@@ -59,7 +59,7 @@ class DiagnosisState:
         history: every model so far, the one started from first.
         accepted: the effects and learned laws added so far, with what is confounded with each.
         testable: what the readings can show; None while it is not known.
-        sizes: of the amplitudes of effects that were found, times their typical ones, by id.
+        amplitude_sizes: of effects that were found, times their typical ones, by id.
         figures, discrepancy: of the discrepancy, and its covariance (P, P) over the noise, by
             which intervals are wider; None while they are not known.
     """
@@ -74,7 +74,7 @@ class DiagnosisState:
     history: tuple[Step, ...]
     accepted: tuple[EffectClass, ...] = ()
     testable: Testability | None = None
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    amplitude_sizes: Mapping[str, float] = field(default_factory=dict)
     figures: DiscrepancyFigures | None = None
     discrepancy: np.ndarray | None = None
 
@@ -87,11 +87,7 @@ class DiagnosisState:
         known: Posterior | None = None,
     ) -> 'DiagnosisState':
         """Fit a model to a campaign; effects of a library may be added to it."""
-        candidates = {
-            key: neutral_shapes(effect)
-            for key, effect in library.items()
-            if start.effect(key) is None
-        }
+        candidates = candidates_beside(start, library)
         prior, remarks = prior_for(known, campaign)
         effects = (*start.effects, *(shapes[0] for shapes in candidates.values()))
         study, fit = clean_and_fit(campaign, start, effects, STARTS, seed, prior)
@@ -100,7 +96,9 @@ class DiagnosisState:
 
     def _free(self, start: DepositionModel) -> FreeParameters:
         """All parameters of a model, with what is known of them."""
-        return FreeParameters.of(start, *start.effects, known=self.known, sizes=self.sizes)
+        return FreeParameters.of(
+            start, *start.effects, known=self.known, amplitude_sizes=self.amplitude_sizes
+        )
 
     @cached_property
     def nonparametric_laws(self) -> list[Explanation]:
@@ -126,7 +124,7 @@ class DiagnosisState:
         discrepancy: np.ndarray | None = None,
         others: Sequence[DepositionModel] = (),
         starts: int = 1,
-        sizes: Mapping[str, float] | None = None,
+        amplitude_sizes: Mapping[str, float] | None = None,
     ) -> Fit:
         """The start model refitted with these effects instead of what was added.
 
@@ -137,14 +135,16 @@ class DiagnosisState:
             discrepancy: (P, P) covariance of the discrepancy, if that is allowed for.
             others: models whose patterns are starts, too.
             starts: how many, as in the first fit.
-            sizes: of the effects' amplitudes, times their typical ones; default: the state's.
+            amplitude_sizes: of the effects, times their typical ones; default: the state's.
         """
         kept = tuple(e for e in model.effects if e.id not in self.candidates)
         start = model.model_copy(update={'effects': (*kept, *effects)})
         nuisance = self.study.nuisance
         if directions is not None:
             nuisance = np.hstack([nuisance, directions])
-        free = self._free(start) if sizes is None else replace(self._free(start), sizes=sizes)
+        free = self._free(start)
+        if amplitude_sizes is not None:
+            free = replace(free, amplitude_sizes=amplitude_sizes)
         return self.study.fit(free, starts, self.seed, nuisance, discrepancy, others)
 
     def learned(self, chosen: Sequence[tuple[Explanation, float]]) -> Fit:

@@ -97,21 +97,21 @@ class FreeParameters:
     varied: tuple[tuple[str, str], ...] = ()
     known: Posterior | None = None  # what is known of them from an earlier job, or None
     # Size of the amplitudes of an effect, times their typical one, by id; default: 1.
-    sizes: Mapping[str, float] = field(default_factory=dict)
+    amplitude_sizes: Mapping[str, float] = field(default_factory=dict)
 
     @staticmethod
     def of(
         start: DepositionModel,
         *effects: Effect,
         known: Posterior | None = None,
-        sizes: Mapping[str, float] = MappingProxyType({}),
+        amplitude_sizes: Mapping[str, float] = MappingProxyType({}),
     ) -> 'FreeParameters':
         """The pattern and all parameters of these effects; those the model lacks are added."""
         for effect in effects:
             if start.effect(effect.id) is None:
                 start = start.with_effect(effect)
         varied = [(e.id, name) for e in effects for name in e.parameters()]
-        return FreeParameters(start, tuple(varied), known, sizes)
+        return FreeParameters(start, tuple(varied), known, amplitude_sizes)
 
     @cached_property
     def pattern(self) -> PatternVector:
@@ -169,7 +169,9 @@ class FreeParameters:
     def weak_prior(self) -> Prior:
         """Prior of the vector where nothing is known of this bell."""
         of_pattern = [(c.centre, c.width) for c in self.pattern.coordinates]
-        widths = [1.0 if e.is_shape else self.sizes.get(e.effect, 1.0) for e in self.of_effects]
+        widths = [
+            1.0 if e.is_shape else self.amplitude_sizes.get(e.effect, 1.0) for e in self.of_effects
+        ]
         centre, width = np.array(of_pattern + [(0.0, width) for width in widths]).T
         return Prior(centre, np.diag(width))
 
