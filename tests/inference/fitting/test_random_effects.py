@@ -158,6 +158,26 @@ def test_the_error_on_a_part_left_out_is_that_of_a_model_that_never_saw_it(truth
     assert step.holdout_rmse_um > step.rmse_um
 
 
+@pytest.mark.slow
+def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
+    first, second, last = levelled(BASE).experiments
+    quarter_less = reading(last, 0.75 * last.readings.thickness_um)
+    off = replace(quarter_less, switched_off=frozenset(['voltage']))
+    study, fit = clean_and_fit(pd.Campaign((first, second, off)), BASE, starts=6)
+    model = pd.refit(pd.Campaign((first, second)), None, BASE).model
+    anew = pd.compare(pd.Campaign((off,)), model).points.rmse_um
+    found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
+    usual = study.campaign.experiment_of != 2
+    others = [
+        (study.measured_um - study.predicted_without_um(fit, out))[out]
+        for out in (study.campaign.experiment_of == 0, study.campaign.experiment_of == 1)
+    ]
+    squares = np.sum(usual) * root_mean_square(np.concatenate(others)) ** 2
+    expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))
+    assert found == pytest.approx(expected, rel=0.03)
+    assert anew < 0.1 * np.mean(study.measured_um[~usual])
+
+
 @pytest.fixture(scope='module')
 def study_and_fit():
     return clean_and_fit(levelled(MISSING), BASE)

@@ -44,8 +44,9 @@ from paint_deposition.inference.fitting.least_squares import Fit
 # So many proposals are refitted each time, but for single effects: these are all refitted once, as
 # the pattern that was fitted without any may imitate the one that acts.
 TRIALS = 5
-# Around so many of the single effects that fit best another pattern is looked for.
-PATTERNS = 3
+# Around so many of the single effects that fit best another pattern, and a second effect, is looked
+# for.
+LEADING = 3
 # Share of the significance level that the test for causes has.
 OF_CAUSES = 0.95
 # Log evidence that two fits of one set may differ by and be the same.
@@ -255,6 +256,8 @@ class Search:
             if again is not here:
                 here = again
                 continue
+            if not here.names and stage.chosen() is not here:
+                stage = replace(stage, tried=[*stage.tried, *self._pairs(stage)])
             best = stage.chosen()
             if best is here:
                 return [*found, stage]
@@ -278,7 +281,7 @@ class Search:
         self._leading = tuple(order[:TRIALS])
         least = nothing.log_evidence + MIN_LOG_EVIDENCE_GAIN
         near: list[EffectSet] = []
-        for one in (tried[name] for name in order[:PATTERNS]):
+        for one in (tried[name] for name in order[:LEADING]):
             if one.log_evidence > least:
                 anew = self.state.fitted_with(
                     [*one.effects.values()], self.state.start, starts=STARTS,
@@ -293,6 +296,11 @@ class Search:
         for start in (replace(nothing, usual=best.usual, sizes=best.sizes), best):
             self.nothing = self._refitted({}, start)
         return self.nothing
+
+    def _pairs(self, stage: SearchStage) -> list[EffectSet]:
+        """Two effects together: alone, each of them may fit worse than a third one."""
+        leading = sorted(stage.tried, key=lambda one: -one.log_weight)[:LEADING]
+        return [self.with_effect(one, name) for one in leading for name in one.proposed]
 
     def _in_another_pattern(self, stage: SearchStage) -> EffectSet:
         """The set of a stage, where a larger one has led to a pattern that suits it better."""
@@ -323,10 +331,13 @@ class Search:
     def groups(self, trial: EffectSet) -> tuple[EffectSet, dict[str, Group]]:
         """The set without effects that do not stand, and what could stand in place of each.
 
-        Here something unknown may have done it, too.
+        Here something unknown may have done it, too. What an effect is remains as it was judged
+        beside one that something unknown replaces.
         """
+        judged: dict[str, tuple[str, ...]] = {}
         while True:
             found = {name: self.group(trial, name) for name in trial.names}
+            found = {n: (judged.get(n, members), p) for n, (members, p) in found.items()}
             better = [name for name, (members, _) in found.items() if members[0] != name]
             if better:
                 others = self.without(trial, better[0])
@@ -335,6 +346,8 @@ class Search:
             if not found or min(p for _, p in found.values()) > SURE:
                 return trial, found
             trial = self.without(trial, min(found, key=lambda name: found[name][1]))
+            unknown = self._log_odds(trial, {})[UNKNOWN] > 0.0
+            judged = {name: members for name, (members, _) in found.items()} if unknown else {}
 
     def group(self, trial: EffectSet, name: str) -> Group:
         """The effects that could stand in place of one, and how probable one of them is.

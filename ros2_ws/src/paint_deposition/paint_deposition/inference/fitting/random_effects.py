@@ -72,8 +72,7 @@ def random_effects(
         used: (P,) bool, the points that the model is fitted to.
     """
     names = tuple(experiment.name for experiment in campaign.experiments)
-    part_of = campaign.experiment_of[:, np.newaxis] == np.arange(len(names))
-    off = np.array([bool(experiment.switched_off) for experiment in campaign.experiments])
+    part_of, off = _parts(campaign)
     known = part_of[used].any(axis=0)
     mixing = np.diag(OTHER_LEVEL_SHARE * (off & known)) + LEVEL_SHARE * _contrasts(known & ~off)
     level = RandomEffects(
@@ -91,6 +90,20 @@ def random_effects(
         'gauge zero', 'µm', sessions, zeros, shares @ zeros / sigma_um[:, np.newaxis]
     )
     return tuple(effects for effects in (level, zero) if effects.mixing.any())
+
+
+def levels_of_their_own(
+    campaign: Campaign, measured_um: np.ndarray, sigma_um: np.ndarray
+) -> np.ndarray:
+    """(P, n) directions of the levels that no other part tells, see ``random_effects``."""
+    part_of, off = _parts(campaign)
+    return OTHER_LEVEL_SHARE * part_of[:, off] * (measured_um / sigma_um)[:, np.newaxis]
+
+
+def _parts(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:
+    """(P, E) which part a point is on, and (E,) which were painted with something off."""
+    off = np.array([bool(experiment.switched_off) for experiment in campaign.experiments])
+    return campaign.experiment_of[:, np.newaxis] == np.arange(len(off)), off
 
 
 def amounts(fit: Fit, effects: tuple[RandomEffects, ...]) -> tuple[Amount, ...]:

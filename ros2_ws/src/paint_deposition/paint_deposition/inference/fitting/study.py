@@ -15,7 +15,11 @@ from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.fitting.least_squares import Fit, fit_at, fit_readings
 from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
-from paint_deposition.inference.fitting.random_effects import RandomEffects, random_effects
+from paint_deposition.inference.fitting.random_effects import (
+    RandomEffects,
+    levels_of_their_own,
+    random_effects,
+)
 from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.covariates import Covariate, Rays
 from paint_deposition.inference.readings.gauge_noise import GaugeNoise, gauge_noise
@@ -146,11 +150,8 @@ class Study:
         This is the one residual that all results quote: what the nuisance directions explain,
         such as the levels in which parts differ, is estimated and counts as predicted.
         """
-        nuisance = self.nuisance
         misfit = (self.measured_um - predicted_um) / self.sigma_um
-        precision = np.eye(nuisance.shape[1]) + nuisance.T @ nuisance
-        amounts = np.linalg.solve(precision, nuisance.T @ misfit)
-        levelled_um = predicted_um + self.sigma_um * (nuisance @ amounts)
+        levelled_um = self.measured_um - self.sigma_um * _beside(self.nuisance, misfit)
         return Residuals(self.measured_um, levelled_um, self.sigma_um)
 
     def residuals_by_experiment(self, predicted_um: np.ndarray) -> tuple[Residuals, ...]:
@@ -245,16 +246,21 @@ class Study:
     ) -> np.ndarray:
         """(...) root mean square errors on parts that are left out in turn [um].
 
+        The level of a part that was painted with something switched off is estimated from its own
+        readings, as in ``residuals``: the other parts say nothing of it.
+
         Args:
             predict: gives (..., P) films by models that were made without some readings, (P,)
                 bool [um].
             patches: leave out patches of parts, even where there are several parts.
         """
         folds = self.patches() if patches else self.folds()
+        levels = levels_of_their_own(self.campaign, self.measured_um, self.sigma_um)
         squares_um2 = 0.0
         for fold in np.unique(folds):
             out = folds == fold
-            away_um = (self.measured_um - predict(out))[..., out]
+            misfit = ((self.measured_um - predict(out)) / self.sigma_um)[..., out]
+            away_um = self.sigma_um[out] * _beside(levels[out], misfit)
             squares_um2 = squares_um2 + np.sum(away_um**2, axis=-1)
         return np.sqrt(squares_um2 / len(self))
 
@@ -323,6 +329,12 @@ class Study:
         """(P,) pass, from 0 in each experiment, that on average painted each point."""
         means = next(c for c in self.covariates(model) if c.name == 'spray_pass').values
         return np.round(means).astype(int)
+
+
+def _beside(columns: np.ndarray, misfit: np.ndarray) -> np.ndarray:
+    """(..., P) what directions (P, n), of unit variance, leave of a misfit over the noise."""
+    precision = np.eye(columns.shape[1]) + columns.T @ columns
+    return misfit - misfit @ columns @ np.linalg.solve(precision, columns.T)
 
 
 def _columns(effects: Sequence[RandomEffects], count: int) -> np.ndarray:
