@@ -87,8 +87,7 @@ def diagnose(
     best, groups = search.groups(stages[-1].here)
     stages = [*(s for s in stages if s.here.names < best.names), SearchStage(best, [])]
     state = replace(state, amplitude_sizes=best.fit.parameters.amplitude_sizes)
-    patterns = best.fit.model, state.fit.model
-    fit = state.fitted_with([*best.effects.values()], patterns[0], others=patterns[1:])
+    fit = best.result
     options = [
         *of_corrections(state.study, fit, best.names),
         *nonparametric_laws_of(state.study, fit.model),

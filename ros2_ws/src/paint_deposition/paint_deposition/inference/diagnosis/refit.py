@@ -82,8 +82,7 @@ def refit(
     state = replace(
         _beside(state, with_it), amplitude_sizes=with_it.fit.parameters.amplitude_sizes
     )
-    fit = state.fitted_with([*with_it.effects.values()], state.fit.model)
-    state = state.with_step(added.id, fit)
+    state = state.with_step(added.id, with_it.result)
     state = state.accepting((added.id,), probability, before)
     reason = (
         f'{added.id} was added as asked; it is missing with a probability of '
