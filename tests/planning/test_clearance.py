@@ -6,7 +6,7 @@ import pytest
 import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.clearance import contacts
+from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import GunEnvelope
 
 # The gun runs along x at 0.25 m before the panel; the screen stands 0.1 m before it at |x| < 0.05.

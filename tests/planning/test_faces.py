@@ -9,9 +9,9 @@ from folded_parts import bumper, hood
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.faces import FacePasses, join_motions, order_faces, plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
+from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import PlanRequest
 from scenes import painted
 from surfaces import solid

@@ -140,7 +140,7 @@ def test_the_written_motion_keeps_the_limits_and_names_those_that_cost(panel, ev
 def test_a_mean_that_the_limits_do_not_allow_is_warned_of(panel, even):
     """The programme runs at 0.3 m/s: slower than 0.24 it lays a quarter more."""
     slow = pd.improve(panel, even.trajectory, NARROW, speed_max_m_per_s=0.24)
-    assert slow.after.mean_um > 1.1 * slow.target_um
+    assert slow.after.mean_um > 1.1 * slow.retiming.target_um
     (warning,) = slow.warnings
     assert 'the greatest speed' in warning
     assert 'allow a greater speed (speed_max_m_per_s) or a lower flow' in warning
@@ -230,7 +230,7 @@ def test_the_gun_is_closed_in_turns_beside_the_part(panel):
     assert np.abs(sprayed[:, 2]).max() < 0.11
     assert np.abs(np.abs(sprayed[:, 2]) - 0.1).max() < 0.01
     assert closed.after.paint_cm3 < 0.9 * kept.after.paint_cm3
-    assert closed.target_um == pytest.approx(closed.before.mean_um, rel=1e-3)
+    assert closed.retiming.target_um == pytest.approx(closed.before.mean_um, rel=1e-3)
     assert [change.number for change in closed.changes] == [1, 2]
     assert np.unique(path.spray_pass[path.flow > 0.0]).tolist() == [0, 1]
     assert 'earlier' not in ''.join(change.sentence for change in closed.changes)

@@ -75,7 +75,7 @@ def test_passes_cover_the_width_to_its_edges():
     assert any('target of 20 µm would need' in note for note in answer.notes)
     film, fewer = (
         sum(
-            answer.collapse.thickness_um(
+            answer.curve.parallel.first.thickness_um(
                 np.linspace(-0.5, 0.5, 201) * width - (k - 0.5 * (count - 1)) * answer.index_m
             )
             for k in range(count)
@@ -116,7 +116,7 @@ def test_gun_that_turns_makes_an_asymmetric_pattern_less_even():
     assert 'keeps its orientation' in kept.request.assumption
     assert 'turns' in turned.request.assumption
     note = next(line for line in kept.notes if 'turned by 180 deg' in line)
-    profile = kept.collapse
+    profile = kept.curve.parallel.first
     other_way = SampledCollapse(-profile.x_m[::-1], profile.film_um[::-1], profile.finest_m)
     mirrored = ParallelPasses(profile, other_way).sigma_n(kept.index_m)
     assert float(note.split()[-2]) == pytest.approx(100 * mirrored, abs=0.01)

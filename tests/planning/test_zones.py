@@ -34,7 +34,7 @@ def test_each_zone_comes_to_its_target(panel, even):  # noqa: F811
         ('left', left.mean_um), ('right', right.mean_um),
     ]  # fmt: skip
     x = panel.vertices_m[:, 0]
-    assert not found.target_region[np.abs(x) < 0.059].any()
+    assert not found.wanted.region[np.abs(x) < 0.059].any()
 
 
 @pytest.mark.slow
@@ -43,7 +43,7 @@ def test_one_zone_over_all_is_the_target_of_the_part(panel, even):  # noqa: F811
     whole = Zones((zone('all', target, 0.1 * target),))
     of_zone = pd.improve(panel, even.trajectory, NARROW, zones=whole)
     of_part = pd.improve(panel, even.trajectory, NARROW, target_um=target, tolerance=0.1)
-    np.testing.assert_allclose(of_zone.film_um, of_part.film_um, rtol=1e-9)
+    np.testing.assert_allclose(of_zone.after.film_um, of_part.after.film_um, rtol=1e-9)
     assert of_zone.after.sigma_n == pytest.approx(of_part.after.sigma_n, rel=1e-9)
     assert of_zone.after.within == pytest.approx(of_part.after.within)
 

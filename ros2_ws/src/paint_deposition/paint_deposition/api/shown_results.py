@@ -21,7 +21,7 @@ from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_stat
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.live.scene import Scene
+from paint_deposition.report.live.page import Scene
 
 DIAGNOSIS, COMPARISON, FILM = 'diagnosis.json', 'comparison.json', 'film.ply'
 

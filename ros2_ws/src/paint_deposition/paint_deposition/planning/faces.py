@@ -24,7 +24,6 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.passes import (
     PassStyle,
     PlannedPass,
@@ -33,13 +32,16 @@ from paint_deposition.planning.passes import (
     trajectory_of,
 )
 from paint_deposition.planning.plan import Plan, plan
-from paint_deposition.planning.planned_film import PlannedFilm, WantedFilm, evenness, predicted
+from paint_deposition.planning.planned_film import (
+    PlannedFilm,
+    WantedFilm,
+    contacts,
+    evenness,
+    predicted,
+)
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
-
-# Margins along the seams that are tried, as shares of the overspray.
-MARGINS = (0.0, 0.35, 0.7, 1.0)
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,15 @@ class FacePasses:
 
     def reversed(self) -> 'FacePasses':
         """Passes of the face run the other way round, the last one first."""
-        return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
+        turned = tuple(
+            replace(
+                one, positions_m=one.positions_m[::-1], rotations=one.rotations[::-1],
+                along_m=one.along_m[-1] - one.along_m[::-1],
+                on_m=float(one.along_m[-1]) - one.off_m, off_m=float(one.along_m[-1]) - one.on_m,
+            )
+            for one in self.passes[::-1]
+        )  # fmt: skip
+        return replace(self, passes=turned)
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -98,7 +108,7 @@ class PartPlan(PlannedFilm):
                 {'area_m2': face.surface.area_m2, 'outward': face.surface.outward.tolist()}
                 for face in self.faces
             ],
-            'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
+            'speeds_m_per_s': [planned.style.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
         }  # fmt: skip
@@ -189,8 +199,10 @@ def _blended(
     target = request.target_um if request.speed_m_per_s is None else None
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     overspray_m, unblended, tried = 0.0, math.nan, []
-    for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
-        progress('faces', number / len(MARGINS))
+    # Margins along the seams, as shares of the overspray.
+    shares = (0.0, 0.35, 0.7, 1.0) if len(faces) > 1 else (0.0,)
+    for number, share in enumerate(shares):
+        progress('faces', number / len(shares))
         margin_m, films = share * overspray_m, []
         plans = [plan(face.without_margin(margin_m).surface, model, request) for face in faces]
         for face in plans:
@@ -231,7 +243,8 @@ def _with_dwell(
     for face in plans:
         passes = []
         for number, planned in enumerate(face.passes):
-            style = replace(face.style, speed_m_per_s=planned.speed_m_per_s / next(shares))
+            speed = planned.style.speed_m_per_s / next(shares)
+            style = replace(face.style, speed_m_per_s=speed)
             backwards = bool(number % 2) and not request.one_way
             surface_map = face.line_films.surface_map
             passes.append(plan_pass(surface_map, planned.across_m, style, backwards))
@@ -248,22 +261,18 @@ def order_faces(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
     A face may run the other way round, unless its passes all run one way.
     """
     ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
-    tried = [_nearest_next(k, first, ways) for k, own in enumerate(ways) for first in own]
+    tried = []
+    for number, first in [(number, way) for number, own in enumerate(ways) for way in own]:
+        order, left = [first], dict(enumerate(ways))
+        del left[number]
+        while left:
+            there = [(_travel_m(order[-1], way), k, way) for k, own in left.items() for way in own]
+            _, nearest, way = min(there, key=lambda one: one[0])
+            order.append(way)
+            del left[nearest]
+        tried.append(tuple(order))
     # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
     return min(tried, key=lambda order: round(sum(map(_travel_m, order, order[1:])), 6))
-
-
-def _nearest_next(
-    number: int, first: FacePasses, ways: Sequence[Sequence[FacePasses]]
-) -> tuple[FacePasses, ...]:
-    order, left = [first], dict(enumerate(ways))
-    del left[number]
-    while left:
-        there = [(_travel_m(order[-1], way), k, way) for k, own in left.items() for way in own]
-        _, nearest, way = min(there, key=lambda one: one[0])
-        order.append(way)
-        del left[nearest]
-    return tuple(order)
 
 
 def _travel_m(before: FacePasses, after: FacePasses) -> float:
@@ -326,15 +335,3 @@ def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
         stamps, positions, quaternions, frame_id=frame_id,
         trigger_stamps_ns=switched, trigger_flow=flow, trigger_brush=brush,
     )  # fmt: skip
-
-
-def _reversed(planned: PlannedPass) -> PlannedPass:
-    length = float(planned.along_m[-1])
-    return replace(
-        planned,
-        positions_m=planned.positions_m[::-1],
-        rotations=planned.rotations[::-1],
-        along_m=length - planned.along_m[::-1],
-        on_m=length - planned.off_m,
-        off_m=length - planned.on_m,
-    )

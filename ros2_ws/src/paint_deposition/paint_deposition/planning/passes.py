@@ -14,7 +14,6 @@ from paint_deposition.planning.surface_map import SurfaceMap
 WAYPOINT_STEP_M = 0.01
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
 WAYPOINTS_PER_MOVE = 4
-POSE_RATE_HZ = 250.0
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,6 @@ class PlannedPass:
     style: PassStyle  # how it is run
 
     @property
-    def speed_m_per_s(self) -> float:
-        """While spraying [m/s]."""
-        return self.style.speed_m_per_s
-
-    @property
     def sprayed_m(self) -> float:
         """Travel with the gun on [m]."""
         return self.off_m - self.on_m
@@ -74,7 +68,14 @@ def plan_pass(
     beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
-    positions, rotations = tool_poses(surface_map, line, np.full(count, across_m), style)
+    across = np.full(count, across_m)
+    tool_z, travel = -surface_map.normals(line, across), surface_map.axes[0]
+    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    side = np.cross(tool_z, way)
+    cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
+    rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
+    positions = surface_map.places_m(line, across) - style.standoff_m * tool_z
     if backwards:
         line, positions, rotations = line[::-1], positions[::-1], rotations[::-1]
     step = np.linalg.norm(np.diff(positions, axis=0), axis=1)
@@ -83,28 +84,9 @@ def plan_pass(
     order = 1.0 if not backwards else -1.0
     on, off = np.sort(np.interp(order * ends, order * line, along))
     return PlannedPass(
-        float(across_m),
-        np.ascontiguousarray(positions),
-        np.ascontiguousarray(rotations),
-        along,
-        float(on),
-        float(off),
-        style,
-    )
-
-
-def tool_poses(
-    surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
-) -> tuple[np.ndarray, np.ndarray]:
-    """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
-    on_surface = surface_map.places_m(travel_m, across_m)
-    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[0]
-    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    side = np.cross(tool_z, way)
-    cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
-    rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
-    return on_surface - style.standoff_m * tool_z, rotations
+        float(across_m), np.ascontiguousarray(positions), np.ascontiguousarray(rotations), along,
+        float(on), float(off), style,
+    )  # fmt: skip
 
 
 def plan_passes(
@@ -123,7 +105,7 @@ def trajectory_of(
     passes: tuple[PlannedPass, ...],
     style: PassStyle,
     frame_id: str = '',
-    rate_hz: float = POSE_RATE_HZ,
+    rate_hz: float = 250.0,
 ) -> Trajectory:
     """The timed motion: poses at an even rate, and the trigger.
 
@@ -138,7 +120,7 @@ def trajectory_of(
             legs.append(between)
             clock += duration_s
         duration_s, travel_m, reached_s = _ramp(
-            float(planned.along_m[-1]), planned.speed_m_per_s, style
+            float(planned.along_m[-1]), planned.style.speed_m_per_s, style
         )
         triggers += [clock + reached_s(planned.on_m), clock + reached_s(planned.off_m)]
         times = _sample_times(duration_s, rate_hz)
@@ -167,7 +149,7 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
         stops = [0.0, planned.on_m, *between, planned.off_m, float(planned.along_m[-1])]
         positions, quaternions = _poses_at(planned, np.array(stops))
         for k, pose in enumerate(zip(positions, quaternions, strict=True)):
-            speed = planned.speed_m_per_s if k else style.transfer_speed_m_per_s
+            speed = planned.style.speed_m_per_s if k else style.transfer_speed_m_per_s
             spraying = 2 <= k < len(stops) - 1
             moves.append(Move(*pose, speed, spraying, brush=style.brush))
     return moves

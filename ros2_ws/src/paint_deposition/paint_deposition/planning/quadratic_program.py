@@ -18,15 +18,6 @@ from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT, Nodes
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
 
-# Converged when the density changes by less than this share; largest number of rounds.
-SETTLED, ROUNDS = 3e-3, 8
-# Weight of the film's bounds over that of evenness: they are kept where possible.
-BOUND_WEIGHT = 100.0
-# Weight that holds the mean of the best known film at the target. The levels of the
-# other models are free: holding them too would cost evenness.
-LEVEL_WEIGHT = 30.0
-# Additional weight of film outside the tolerance.
-BEYOND_TOLERANCE = 3.0
 LIMIT_NAMES = {
     ROBOT: 'the greatest speed',
     BEND: 'the speed in bends',
@@ -93,7 +84,7 @@ class Problem:
         )
 
 
-def solve(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
+def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
     """Minimise in ``rounds`` at most; the first tangents are taken at the start.
 
     Raises:
@@ -104,7 +95,7 @@ def solve(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
         found = _step(problem, now)
         change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
         now = found
-        if change < SETTLED:
+        if change < 3e-3:
             break
     return now
 
@@ -114,9 +105,15 @@ def _step(problem: Problem, now: Density) -> Density:
     matrix, linear = _objective(problem, now)
     answer = _minimise(matrix, linear, constraints)
     if answer is None:
-        raise PlanError(
-            f'no motion along this path keeps {_infeasible_limit(matrix, linear, constraints)}'
-        )
+        names, rows, limit = constraints
+        contradicting = 'the limits'
+        for name in dict.fromkeys(names.tolist()):
+            others = names != name
+            without = names[others], rows[others], limit[others]
+            if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
+                contradicting = f'{LIMIT_NAMES[name]} with the other limits'
+                break
+        raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
     values, multipliers = answer
     count = len(problem.nodes)
     # A multiplier times a density is what its limit costs, in the units of the objective.
@@ -141,9 +138,11 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     matrix = np.zeros((problem.size, problem.size))
     linear = np.zeros(problem.size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
-    level = problem.films[0].mean(axis=1) / problem.target_um
-    matrix[:count, :count] += 2.0 * LEVEL_WEIGHT * np.outer(level, level)
-    linear[:count] -= 2.0 * LEVEL_WEIGHT * level
+    # The mean of the best known film is held at the target by this weight. The levels of the
+    # other models are free: holding them too would cost evenness.
+    weight, level = 30.0, problem.films[0].mean(axis=1) / problem.target_um
+    matrix[:count, :count] += 2.0 * weight * np.outer(level, level)
+    linear[:count] -= 2.0 * weight * level
     for films in problem.films:
         scaled = films / problem.target_um
         error = now.density @ films / problem.target_um - 1.0
@@ -179,11 +178,12 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     for points, target, off in problem.bands:
         sides = []
         if off is not None:
-            sides += [(1.0, off, BEYOND_TOLERANCE), (-1.0, -off, BEYOND_TOLERANCE)]
+            sides += [(1.0, off, 3.0), (-1.0, -off, 3.0)]
+        # The film's bounds are kept where possible.
         if request.film_min_um is not None:
-            sides.append((-1.0, request.film_min_um / target - 1.0, BOUND_WEIGHT))
+            sides.append((-1.0, request.film_min_um / target - 1.0, 100.0))
         if request.film_max_um is not None:
-            sides.append((1.0, request.film_max_um / target - 1.0, BOUND_WEIGHT))
+            sides.append((1.0, request.film_max_um / target - 1.0, 100.0))
         found += [
             (points & (side * (error - edge) > 0.0), edge, weight) for side, edge, weight in sides
         ]
@@ -250,13 +250,3 @@ def _minimise(
     if answer.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
     return np.array(answer.x), np.array(answer.z)
-
-
-def _infeasible_limit(matrix: np.ndarray, linear: np.ndarray, constraints: Constraints) -> str:
-    names, rows, limit = constraints
-    for name in dict.fromkeys(names.tolist()):
-        others = names != name
-        without = names[others], rows[others], limit[others]
-        if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
-            return f'{LIMIT_NAMES[name]} with the other limits; allow more'
-    return 'the limits; allow more'

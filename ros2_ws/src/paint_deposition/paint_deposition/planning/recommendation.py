@@ -8,7 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.eq3_collapse import Collapse, half_width_m
+from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.index_search import (
     SEARCHED,
@@ -72,12 +72,7 @@ class Recommendation:
     @property
     def travel(self) -> str:
         """'alternating' or 'one_way'."""
-        return self.request.travel
-
-    @property
-    def collapse(self) -> Collapse:
-        """Film of one pass at the speed."""
-        return self.curve.parallel.first
+        return 'one_way' if self.request.one_way else 'alternating'
 
     @property
     def sentence(self) -> str:
@@ -96,9 +91,10 @@ class Recommendation:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
         figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'request')}
-        assumed = ('travel', 'gun_turns', 'travel_rad', 'assumption')
+        assumed = ('gun_turns', 'travel_rad', 'assumption')
         return {
             **figures,
+            'travel': self.travel,
             **{name: getattr(self.request, name) for name in assumed},
             'minima': [vars(minimum) for minimum in self.minima],
             'curve': {

@@ -41,7 +41,6 @@ from paint_deposition.report.pictures.planning import improved_figures
 from paint_deposition.report.pictures.readings import (
     part_figures,
     profile_figures,
-    profile_legend,
     residual_figures,
 )
 from paint_deposition.report.style import DOTS_PER_INCH, TWO_SIDED_95
@@ -81,6 +80,7 @@ def report_html(data: ReportData) -> str:
     figures = [figure for figure in drawn if figure]
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
     films, git, diagnosis = film_rows(data), git_version(), data.diagnosis
+    profiles, profile_legend = profile_figures(data)
     later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
     zone_films = {row['name']: row['film'].zones for row in films}
     return _filled(
@@ -109,8 +109,8 @@ def report_html(data: ReportData) -> str:
         figures=[figure['name'] for figure in figures],
         content=content.replace('<', '\\u003c'),  # it stands inside a script element
         parts=[[*map(_embedded, part_figures(data, k))] for k in range(len(data.experiments))],
-        profiles=list(map(_embedded, profile_figures(data))),
-        profile_legend=profile_legend(data),
+        profiles=list(map(_embedded, profiles)),
+        profile_legend=profile_legend,
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
     )

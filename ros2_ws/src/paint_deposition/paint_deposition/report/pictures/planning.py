@@ -162,7 +162,7 @@ def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndar
 def _scale(result: Improvement) -> ColourScale:
     """Colours for all but the most extreme film of both, between round figures."""
     films = np.concatenate(
-        [one.film_um[result.target_region] for one in (result.before, result.after)]
+        [one.film_um[result.wanted.region] for one in (result.before, result.after)]
     )
     return film_scale(np.quantile(films, [0.01, 0.99]))
 

@@ -105,9 +105,13 @@ def comparison_figure(data: ReportData) -> Figure:
     return figure
 
 
-def profile_figures(data: ReportData) -> list[Figure]:
-    """A picture of each column or row, without a legend."""
-    return [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+def profile_figures(data: ReportData) -> tuple[list[Figure], list[tuple[str, str, str]]]:
+    """A picture of each column or row; and words, colour and kind of mark of their legend."""
+    drawn = [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+    kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
+    models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
+    measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
+    return drawn, [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
 def _free_figure(width_in: float, height_in: float) -> Figure:
@@ -115,14 +119,6 @@ def _free_figure(width_in: float, height_in: float) -> Figure:
     figure = new_figure(width_in, height_in)
     figure.set_layout_engine('none')
     return figure
-
-
-def profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
-    """Words, colour and kind of mark of what the profiles show."""
-    kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
-    models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
-    measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
-    return [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
 def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFigure:

@@ -1,7 +1,7 @@
 """What readings say of a model on disk: figures, residuals, models, effect files, the report."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -119,23 +119,20 @@ def _write_results(
     residuals = residuals or {'residuals.csv': data.comparisons[-1]}
     write_json(folder / name, figures | _provenance(data.study, models or data.model))
     for file, comparison in residuals.items():
-        write_table(folder / file, _residual_rows(comparison))
+        columns = comparison.columns()
+        rows = [[*columns]]
+        # A row a reading; those that were left out are without a prediction.
+        for row in zip(*columns.values(), strict=True):
+            told = dict(zip(columns, row, strict=True))
+            for column in ('x_m', 'y_m', 'z_m'):
+                told[column] = f'{told[column]:.5f}'
+            for column in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
+                told[column] = '' if np.isnan(told[column]) else f'{told[column]:.3f}'
+            rows.append([*map(str, (told | {'used': int(told['used'])}).values())])
+        write_table(folder / file, rows)
     picture = save_picture(comparison_figure(data), folder / f'comparison.{pictures}')
     write_text(folder / 'report.html', report_html(data))
     return [*(folder / file for file in (name, *residuals)), picture, folder / 'report.html']
-
-
-def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
-    """A heading and a row a reading; those that were left out are without a prediction."""
-    columns = comparison.columns()
-    yield [*columns]
-    for row in zip(*columns.values(), strict=True):
-        told = dict(zip(columns, row, strict=True))
-        for name in ('x_m', 'y_m', 'z_m'):
-            told[name] = f'{told[name]:.5f}'
-        for name in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
-            told[name] = '' if np.isnan(told[name]) else f'{told[name]:.3f}'
-        yield [*map(str, (told | {'used': int(told['used'])}).values())]
 
 
 def file_name(name: str) -> str:

@@ -189,8 +189,9 @@ def _passes(
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
     zones = result.wanted.zones
+    laid = result.after if isinstance(result, Improvement) else result
     files += write_film(
-        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True,
+        folder, surface, laid.film_um, laid.whole_part, zones=zones, overwrite=True,
         details={'region': 'the painted area of the whole part'},
     )  # fmt: skip
     if isinstance(result, Improvement):
