@@ -160,8 +160,6 @@ def test_no_weights_reach_below_the_most_even_film_of_the_path(panel, even, leve
     ('wanted', 'words'),
     [
         ({'speed_min_m_per_s': 0.5, 'speed_max_m_per_s': 0.4}, 'speed_min_m_per_s is 0.5, above'),
-        ({'acceleration_m_per_s2': 0.0}, 'acceleration_m_per_s2 is 0'),
-        ({'paint_weight': -1.0}, 'paint_weight is -1'),
         ({'speed': 0.4}, "unknown key 'speed'"),
         ({'flow': (0.0, 1.0)}, 'flow.0 is 0'),
         ({'flow': (1.2, 0.8)}, 'swap the two'),

@@ -101,33 +101,25 @@ def panel_study(
     seed: int,
     index_m: float = 0.577,
     *,
-    pattern: Pattern | None = None,
-    truth: str | None = None,
     readings: int = 75,
     repeats: int = 15,
-    heldout: int = 40,
-    noise: GaugeNoise = USUAL_NOISE,
-    film_um: float = 20.0,
-    amplitude: float | None = None,
     parcels: int = PARCELS,
 ) -> Campaign:
     """A flat panel, three passes at `index_m`; the bell depends on the seed alone.
 
-    Without a pattern: 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the
-    model plane, speed by mass balance for a mean film of `film_um` at 0.577 m.
+    It is a 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the model
+    plane, its speed by mass balance for a mean film of 20 um at 0.577 m.
     """
     rng = stream(seed, 11)
-    if pattern is None:
-        pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
-    truths = choose(truth, stream(seed, 1), amplitude)
-    speed = pattern.K1_cm3_per_s / (film_um * 0.577)
+    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
+    speed = pattern.K1_cm3_per_s / (20.0 * 0.577)
     plan = Plan(index_m=index_m, passes=3, standoff_m=0.25, follow=0.0, overrun_m=0.55,
                 gun_margin_m=0.50, teach_error_m=0.0, speed_m_per_s=speed)  # fmt: skip
     part = flat_panel(0.6, 2 * index_m + 0.5)
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
-    taking = Taking(readings, repeats, heldout, 'columns', noise)
-    painted = [_paint(seed, 0, job, pattern, truths, taking, parcels)]
-    return _campaign(seed, pattern, painted, truths, {})
+    taking = Taking(readings, repeats, 40, 'columns', USUAL_NOISE)
+    painted = [_paint(seed, 0, job, pattern, [], taking, parcels)]
+    return _campaign(seed, pattern, painted, [], {})
 
 
 def _paint(

@@ -43,25 +43,8 @@ from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
 
-
-@dataclass(frozen=True)
-class FacePasses:
-    """The passes of one face in running order, and how they are run."""
-
-    passes: tuple[PlannedPass, ...]
-    style: PassStyle
-
-    def reversed(self) -> 'FacePasses':
-        """Passes of the face run the other way round, the last one first."""
-        turned = tuple(
-            replace(
-                one, positions_m=one.positions_m[::-1], rotations=one.rotations[::-1],
-                along_m=one.along_m[-1] - one.along_m[::-1],
-                on_m=float(one.along_m[-1]) - one.off_m, off_m=float(one.along_m[-1]) - one.on_m,
-            )
-            for one in self.passes[::-1]
-        )  # fmt: skip
-        return replace(self, passes=turned)
+# Of one face, in running order.
+Passes = tuple[PlannedPass, ...]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -108,7 +91,7 @@ class PartPlan(PlannedFilm):
                 {'area_m2': face.surface.area_m2, 'outward': face.surface.outward.tolist()}
                 for face in self.faces
             ],
-            'speeds_m_per_s': [planned.style.speed_m_per_s for planned in self.passes],
+            'speeds_m_per_s': [planned.speed_m_per_s for planned in self.passes],
             'margin_m': self.margin_m,
             'sigma_n_unblended': self.sigma_n_unblended,
         }  # fmt: skip
@@ -149,7 +132,7 @@ def plan_faces(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
     )
     if request.optimise:
-        asked = request.improvement(running[0].style.overspray_m, request.target_um)
+        asked = request.improvement(running[0][0].style.overspray_m, request.target_um)
         retimed = retime_for_evenness(
             surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
         ).programme
@@ -163,7 +146,7 @@ def plan_faces(
             'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
-        **found, passes=tuple(planned for face in running for planned in face.passes),
+        **found, passes=tuple(planned for face in running for planned in face),
         moves=moves, faces=faces, margin_m=margin_m,
         sigma_n_unblended=unblended,
     )  # fmt: skip
@@ -188,7 +171,7 @@ def _blended(
     faces: tuple[Face, ...],
     wanted: WantedFilm,
     progress: Callable[[str, float], None],
-) -> tuple[float, list[FacePasses], float]:
+) -> tuple[float, list[Passes], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
     Even is the film over its own target, where one is wanted. Returned are the margin, by how much
@@ -207,9 +190,7 @@ def _blended(
         plans = [plan(face.without_margin(margin_m).surface, model, request) for face in faces]
         for face in plans:
             for one in face.passes:
-                path, _ = spray_path(
-                    trajectory_of((one,), face.style), max_step_m=model.max_step_m
-                )
+                path, _ = spray_path(trajectory_of((one,)), max_step_m=model.max_step_m)
                 integrator.reset()
                 integrator.add(path)
                 films.append(integrator.raw_um / wanted.share)
@@ -235,32 +216,39 @@ def _dwell(films_um: np.ndarray, area: np.ndarray, target_um: float | None) -> n
     ).x
 
 
-def _with_dwell(
-    plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest
-) -> list[FacePasses]:
+def _with_dwell(plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest) -> list[Passes]:
     """The passes at their new speeds, with a lead-in to match."""
     found, shares = [], iter(dwell.tolist())
     for face in plans:
         passes = []
         for number, planned in enumerate(face.passes):
-            speed = planned.style.speed_m_per_s / next(shares)
-            style = replace(face.style, speed_m_per_s=speed)
+            speed = planned.speed_m_per_s / next(shares)
             backwards = bool(number % 2) and not request.one_way
             surface_map = face.line_films.surface_map
-            passes.append(plan_pass(surface_map, planned.across_m, style, backwards))
-        found.append(FacePasses(tuple(passes), face.style))
+            passes.append(plan_pass(surface_map, planned.across_m, face.style, backwards, speed))
+        found.append(tuple(passes))
     return found
 
 
 # --- order, and the way from face to face
 
 
-def order_faces(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+def order_faces(faces: Sequence[Passes]) -> tuple[Passes, ...]:
     """The faces in that order, each time the nearest next, which has least travel between them.
 
     A face may run the other way round, unless its passes all run one way.
     """
-    ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
+    ways: list[tuple[Passes, ...]] = []
+    for face in faces:
+        turned = tuple(
+            replace(
+                one, positions_m=one.positions_m[::-1], rotations=one.rotations[::-1],
+                along_m=one.along_m[-1] - one.along_m[::-1],
+                on_m=float(one.along_m[-1]) - one.off_m, off_m=float(one.along_m[-1]) - one.on_m,
+            )
+            for one in face[::-1]
+        )  # fmt: skip
+        ways.append((face,) if face[0].style.one_way else (face, turned))
     tried = []
     for number, first in [(number, way) for number, own in enumerate(ways) for way in own]:
         order, left = [first], dict(enumerate(ways))
@@ -275,13 +263,13 @@ def order_faces(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
     return min(tried, key=lambda order: round(sum(map(_travel_m, order, order[1:])), 6))
 
 
-def _travel_m(before: FacePasses, after: FacePasses) -> float:
-    ends = before.passes[-1].positions_m[-1], after.passes[0].positions_m[0]
+def _travel_m(before: Passes, after: Passes) -> float:
+    ends = before[-1].positions_m[-1], after[0].positions_m[0]
     return float(np.linalg.norm(ends[1] - ends[0]))
 
 
 def join_motions(
-    faces: Sequence[FacePasses], frame_id: str, is_clear: Callable[[Trajectory], bool]
+    faces: Sequence[Passes], frame_id: str, is_clear: Callable[[Trajectory], bool]
 ) -> tuple[Trajectory, tuple[Move, ...]]:
     """The timed motion that sprays one face after the other, and the moves of a robot program.
 
@@ -290,12 +278,12 @@ def join_motions(
     parts: list[Trajectory] = []
     moves: list[Move] = []
     for number, face in enumerate(faces):
-        own = planned_moves(face.passes, face.style)
+        own = planned_moves(face)
         if number:
-            between = _between(moves[-1], own[0], face.style, is_clear)
+            between = _between(moves[-1], own[0], face[0].style, is_clear)
             parts.append(timed([moves[-1], *between, own[0]], gun_known=False))
             moves += between
-        parts.append(trajectory_of(face.passes, face.style, frame_id))
+        parts.append(trajectory_of(face, frame_id))
         moves += own
     return _joined(parts, frame_id), tuple(moves)
 

@@ -45,15 +45,6 @@ class Nodes:
         """(k,) nodes with a next one in the same opening."""
         return np.flatnonzero(self.opening[1:] == self.opening[:-1])
 
-    @property
-    def weights_m(self) -> np.ndarray:
-        """(n,) length that each node stands for: slowness times this sums to the time."""
-        steps = np.diff(self.travel_m)[self.followed]
-        weights = np.zeros(len(self))
-        np.add.at(weights, self.followed, 0.5 * steps)
-        np.add.at(weights, self.followed + 1, 0.5 * steps)
-        return weights
-
     def rows(self, opening: int) -> slice:
         """The nodes of an opening."""
         first, last = np.searchsorted(self.opening, [opening, opening + 1])

@@ -163,7 +163,7 @@ def plan(
         passes = plan_passes(surface_map, lines, style)
         found = predicted(
             surface, model, request, wanted,
-            trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
+            trajectory_of(passes, frame_id), lambda share: progress('film', share),
         )  # fmt: skip
         mean, _ = evenness(found['film_um'][wanted.region], area)
         ratio = mean / target if target else 1.0
@@ -171,7 +171,7 @@ def plan(
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     return Plan(
-        **found, passes=passes, moves=tuple(planned_moves(passes, style)), style=style,
+        **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
         placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
     )  # fmt: skip
 
@@ -253,10 +253,10 @@ def _timed_plan(
     style = replace(unoptimised.style, speed_m_per_s=1.3 * speed)
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     passes = tuple(
-        replace(planned, style=replace(style, speed_m_per_s=speed))
+        replace(planned, speed_m_per_s=speed)
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
-    programme = Programme.of(trajectory_of(passes, style, unoptimised.trajectory.frame_id))
+    programme = Programme.of(trajectory_of(passes, unoptimised.trajectory.frame_id))
     start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)
     zones = unoptimised.wanted.zones
     wanted = request.improvement(

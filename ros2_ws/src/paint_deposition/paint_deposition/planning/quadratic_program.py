@@ -152,18 +152,22 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
             some = scaled[:, beyond]
             matrix[:count, :count] += share * weight * some @ some.T
             linear[:count] -= share * weight * (1.0 + edge) * some.sum(axis=1)
-    weights = nodes.weights_m
+    # Length that each node stands for: slowness times this sums to the time [m].
+    pairs = nodes.followed
+    steps_m = nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]
+    weights = np.zeros(count)
+    np.add.at(weights, pairs, 0.5 * steps_m)
+    np.add.at(weights, pairs + 1, 0.5 * steps_m)
     linear[:count] += request.paint_weight * weights / problem.original_s
     flow = now.flow[nodes.opening]
     linear[:count] += request.time_weight * weights / (flow * problem.original_s)
     seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
     linear[count:] -= request.time_weight * seconds / (now.flow * problem.original_s)
-    pairs = nodes.followed
     mean = float(weights @ now.density / weights.sum())
     unit = np.eye(problem.size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
     # Smoothness is that of slowness over this length [m].
-    slope *= (0.1 / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
+    slope *= (0.1 / steps_m)[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
