@@ -9,7 +9,6 @@ import pytest
 import yaml
 
 from . import conner
-from .bench import Bench
 from .doors import Part
 from .draw import draw_jobs
 from .files import write
@@ -17,7 +16,7 @@ from .gauge import scatter
 from .jobs import Job, Plan, drive
 from .parcels import Pattern
 from .respray import sprayed_again
-from .shop import PARCELS, generate
+from .shop import PARCELS, Bench, generate
 from .truths import DOWN, library
 
 FEW = {'parcels': 300_000, 'readings': 40, 'repeats': 10, 'heldout': 10}

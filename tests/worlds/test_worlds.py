@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import paint_deposition as pd
-from virtual_paint_shop.cases import draw_case
 from virtual_paint_shop.gauge import GaugeNoise
 from worlds import droplets, semi_real
 from worlds.measured import available
@@ -104,7 +103,7 @@ def test_amounts_are_compared_where_they_mean_the_same():
 
 @pytest.mark.slow
 def test_a_painted_case_knows_how_visible_each_effect_is():
-    case = draw_case(11, 'pair', ('gauge_zero', 'edge_build'))
+    case = droplets.draw_case(11, 'pair', ('gauge_zero', 'edge_build'))
     quiet = GaugeNoise(floor_um=0.5, relative=0.0, session_offset_um=0.3, texture=0.01, level=0.02)
     case = replace(case, layout=('panel', 'door'), amplitudes=(6.0, 0.6), noise=quiet, readings=80)
     one, other = (droplets.paint(11, 'pair', case=c, parcels=100_000) for c in (

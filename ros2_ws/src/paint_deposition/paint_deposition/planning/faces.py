@@ -25,7 +25,6 @@ from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_fa
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.planning.passes import (
-    PassStyle,
     PlannedPass,
     plan_pass,
     planned_moves,
@@ -179,6 +178,7 @@ def _blended(
     and sigma_n without margin, each face for itself.
     """
     area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
+    weight = area_m2 / area_m2.sum()
     target = request.target_um if request.speed_m_per_s is None else None
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     overspray_m, unblended, tried = 0.0, math.nan, []
@@ -195,25 +195,19 @@ def _blended(
                 integrator.add(path)
                 films.append(integrator.raw_um / wanted.share)
         films_um = np.array(films)
-        dwell = _dwell(films_um, area_m2, target)
+        # The time on each pass, over what it is on its face alone, for an even film of all. It
+        # stays within half and twice that, and near it.
+        level_um = target or float(weight @ films_um.sum(axis=0))
+        rows = np.sqrt(weight)[:, np.newaxis] * films_um.T / level_um
+        ridge = 0.02 * np.eye(len(films_um)) / math.sqrt(len(films_um))
+        wished = np.concatenate([np.sqrt(weight), ridge.sum(axis=1)])
+        dwell = lsq_linear(np.vstack([rows, ridge]), wished, (0.5, 2.0)).x
         tried.append((evenness(dwell @ films_um, area_m2)[1], margin_m, plans, dwell))
         if not number:
             overspray_m = plans[0].style.overspray_m
             _, unblended = evenness(films_um.sum(axis=0), area_m2)
     _, margin_m, plans, dwell = min(tried, key=lambda one: one[0])
     return margin_m, _with_dwell(plans, dwell, request), unblended
-
-
-def _dwell(films_um: np.ndarray, area: np.ndarray, target_um: float | None) -> np.ndarray:
-    """(n,) time on each pass, over what it is on its face alone, for an even film of all."""
-    weight = area / area.sum()
-    wanted = target_um or float(weight @ films_um.sum(axis=0))
-    rows = np.sqrt(weight)[:, np.newaxis] * films_um.T / wanted
-    # The times stay within half and twice those for evenness on each face alone, and near them.
-    ridge = 0.02 * np.eye(len(films_um)) / math.sqrt(len(films_um))
-    return lsq_linear(
-        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), (0.5, 2.0)
-    ).x
 
 
 def _with_dwell(plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest) -> list[Passes]:
@@ -280,29 +274,21 @@ def join_motions(
     for number, face in enumerate(faces):
         own = planned_moves(face)
         if number:
-            between = _between(moves[-1], own[0], face[0].style, is_clear)
-            parts.append(timed([moves[-1], *between, own[0]], gun_known=False))
+            before, after, speed = moves[-1], own[0], face[0].style.transfer_speed_m_per_s
+            # Retractions [m]: the first that keeps the gun clear of the part is taken.
+            for retreat_m in (0.1, 0.2, 0.4, 0.8):
+                between = []
+                for move in (before, after):
+                    tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
+                    back_m = move.position_m - retreat_m * tool_z
+                    between.append(Move(back_m, move.quaternion_xyzw, speed, spraying=False))
+                if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
+                    break
+            parts.append(timed([before, *between, after], gun_known=False))
             moves += between
         parts.append(trajectory_of(face, frame_id))
         moves += own
     return _joined(parts, frame_id), tuple(moves)
-
-
-def _between(
-    before: Move, after: Move, style: PassStyle, is_clear: Callable[[Trajectory], bool]
-) -> list[Move]:
-    """Moves from the end of a face to the start of the next, without both."""
-    speed = style.transfer_speed_m_per_s
-    # Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
-    for retreat_m in (0.1, 0.2, 0.4, 0.8):
-        between = []
-        for move in (before, after):
-            tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
-            back_m = move.position_m - retreat_m * tool_z
-            between.append(Move(back_m, move.quaternion_xyzw, speed, spraying=False))
-        if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
-            break
-    return between
 
 
 def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:

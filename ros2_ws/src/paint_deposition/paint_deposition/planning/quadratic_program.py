@@ -90,46 +90,36 @@ def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
     Raises:
         PlanError: the limits contradict each other; names one of them.
     """
-    now = start
+    count, now = len(problem.nodes), start
+    least, most = problem.request.flow
     for _ in range(rounds):
-        found = _step(problem, now)
+        constraints = names, rows, limit = _constraints(problem, now)
+        matrix, linear = _objective(problem, now)
+        answer = _minimise(matrix, linear, constraints)
+        if answer is None:
+            contradicting = 'the limits'
+            for name in dict.fromkeys(names.tolist()):
+                others = names != name
+                without = names[others], rows[others], limit[others]
+                if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
+                    contradicting = f'{LIMIT_NAMES[name]} with the other limits'
+                    break
+            raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
+        values, multipliers = answer
+        # A multiplier times a density is what its limit costs, in the units of the objective. A
+        # constraint that costs more than this, in units of sigma_n squared, binds.
+        costly = names[multipliers * float(values[:count].mean()) > 1e-6]
+        binding = [name for name in dict.fromkeys(costly.tolist()) if name in LIMIT_NAMES]
+        flow = values[count:]
+        if least >= most:
+            flow = np.array([opening.flow for opening in problem.nodes.openings])
+            binding = [name for name in binding if name != 'flow']
+        found = Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
         change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
         now = found
         if change < 3e-3:
             break
     return now
-
-
-def _step(problem: Problem, now: Density) -> Density:
-    constraints = _constraints(problem, now)
-    matrix, linear = _objective(problem, now)
-    answer = _minimise(matrix, linear, constraints)
-    if answer is None:
-        names, rows, limit = constraints
-        contradicting = 'the limits'
-        for name in dict.fromkeys(names.tolist()):
-            others = names != name
-            without = names[others], rows[others], limit[others]
-            if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
-                contradicting = f'{LIMIT_NAMES[name]} with the other limits'
-                break
-        raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
-    values, multipliers = answer
-    count = len(problem.nodes)
-    # A multiplier times a density is what its limit costs, in the units of the objective.
-    costs = multipliers * float(values[:count].mean())
-    # A constraint that costs more than this, in units of sigma_n squared, binds.
-    binding = [
-        name
-        for name in dict.fromkeys(constraints[0][costs > 1e-6].tolist())
-        if name in LIMIT_NAMES
-    ]
-    flow = values[count:]
-    least, most = problem.request.flow
-    if least >= most:
-        flow = np.array([opening.flow for opening in problem.nodes.openings])
-        binding = [name for name in binding if name != 'flow']
-    return Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
 
 
 def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:

@@ -259,22 +259,18 @@ def _chosen_readings(
         position, quaternion = part.applied(*pose) if part else pose
         poses.append([name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)])
     write_json(files[0], result.to_dict() | about)
-    write_table(files[1], _points(result))
-    write_table(files[2], poses)
-    return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
-
-
-def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
-    """A line a reading: all points once, then those that are read twice."""
-    yield (
+    # A line a reading: all points once, then those that are read twice.
+    points: list[Sequence[object]] = [(
         'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm',
         'height_mm', 'expected_um', 'speaks_for',
-    )  # fmt: skip
-    face_mm = 1e3 * chosen.from_edges_m
-    for k in [*range(len(chosen)), *chosen.read_twice]:
-        place = (*chosen.positions_m[k], *chosen.normals[k])
-        yield [
-            chosen.names[k], *(f'{value:.4f}' for value in place), '',
-            *(f'{value:.0f}' for value in face_mm[k]), f'{chosen.expected_um[k]:.1f}',
-            ' '.join(chosen.speaks_for[k]),
-        ]  # fmt: skip
+    )]  # fmt: skip
+    for k in [*range(len(result)), *result.read_twice]:
+        place = (*result.positions_m[k], *result.normals[k])
+        points.append([
+            result.names[k], *(f'{value:.4f}' for value in place), '',
+            *(f'{1e3 * value:.0f}' for value in result.from_edges_m[k]),
+            f'{result.expected_um[k]:.1f}', ' '.join(result.speaks_for[k]),
+        ])  # fmt: skip
+    write_table(files[1], points)
+    write_table(files[2], poses)
+    return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
