@@ -55,12 +55,7 @@ FILTERS: dict[str, Callable[..., Any]] = {
     'micrometres': lambda value, signed=False: f'{words.fixed(value, signed=signed)} µm',
     'p': words.p_words,
     'percent': percent,
-    # Of a group; a learned law that was kept for what it predicts has none.
-    'probability': lambda found: (
-        'kept'
-        if words.is_learned(found.best) and found.probability == 1.0
-        else percent(found.probability)
-    ),
+    'probability': words.probability_words,
     # Plain text with its units as they are printed.
     'in_print': lambda text: re.sub(r'(\d)-(\d)', r'\1–\2', text.replace(' um', ' µm')),
     'effect': words.effect_name,

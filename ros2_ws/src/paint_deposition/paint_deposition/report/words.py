@@ -18,7 +18,7 @@ from paint_deposition.effects.learned.law import (
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.explanations import FOOTPRINT, UNKNOWN
 from paint_deposition.inference.diagnosis.proposals import Spray
-from paint_deposition.inference.diagnosis.verdict import percent
+from paint_deposition.inference.diagnosis.verdict import EffectClass, percent
 from paint_deposition.inference.fitting.study import Study
 
 COVARIATES: Mapping[str, tuple[str, str]] = {
@@ -143,6 +143,13 @@ def form_words(law: LearnedCurve) -> str:
         return 'No closed form of few parameters fits within its band.'
     more = f'; {len(forms) - FORMS_SHOWN} more fit' if len(forms) > FORMS_SHOWN else ''
     return f'Closed forms within its band: {"; ".join(forms[:FORMS_SHOWN])}{more}.'
+
+
+def probability_words(found: EffectClass) -> str:
+    """The probability of a group; a learned law that was kept for what it predicts has none."""
+    if is_learned(found.best) and found.probability == 1.0:
+        return 'kept'
+    return percent(found.probability)
 
 
 def parameter_words(name: str, unit: str) -> str:
