@@ -118,7 +118,13 @@ class _Search:
         limits: dict[str, float] = {}
         of_path = now = _sigma_n(laid)
         if explain:
-            limits = self._binding_limits(problem, found, now)
+            for number, name in enumerate(found.binding):
+                self.progress('limits', number / len(found.binding))
+                without = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
+                # A limit is reported if sigma_n would be lower by 2 % without it.
+                if without < 0.98 * now:
+                    limits[LIMIT_NAMES[name]] = without
+            limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
             free = [_solved_sigma_n(problem.relaxed(), found)]
             if relaxed is not None:
                 free.append(_solved_sigma_n(relaxed.relaxed(), density))
@@ -153,18 +159,6 @@ class _Search:
         openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
         programme = replace(self.original, openings=openings)
         return retime(programme, nodes, density.slowness(nodes), self.request)
-
-    def _binding_limits(
-        self, problem: Problem, found: Density, sigma_n: float
-    ) -> dict[str, float]:
-        limits: dict[str, float] = {}
-        for number, name in enumerate(found.binding):
-            self.progress('limits', number / len(found.binding))
-            relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
-            # A limit is reported if sigma_n would be lower by 2 % without it.
-            if relaxed < 0.98 * sigma_n:
-                limits[LIMIT_NAMES[name]] = relaxed
-        return dict(sorted(limits.items(), key=lambda limit: limit[1]))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:
