@@ -309,9 +309,10 @@ def part_places(
     reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
     # So many poses are enough for a motion that is only tried.
     times_s = np.linspace(0.0, trajectory.duration_s, 150)
-    for number, at in enumerate(np.ndindex(shape)):
+    for number, (row, column) in enumerate(np.ndindex(shape)):
         progress('places', number / reached.size)
-        tried = replace(cell, part=_placed(cell.part, x_m[at[1]], y_m[at[0]]))
+        at = row, column
+        tried = replace(cell, part=_placed(cell.part, x_m[column], y_m[row]))
         positions_m, turns = tried.poses(trajectory, times_s)
         _, ways, followed = ways_of(arm, positions_m, turns, free_roll)
         reached[at] = followed.max(initial=0) / len(times_s)

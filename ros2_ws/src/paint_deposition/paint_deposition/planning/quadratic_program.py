@@ -63,11 +63,6 @@ class Problem:
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
     left_out: frozenset[str] = frozenset()  # names of limits that are left out
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns: densities, and a flow for each opening."""
-        return len(self.nodes) + len(self.nodes.openings)
-
     def films_um(self, found: Density) -> list[np.ndarray]:
         """(V,) film of each model for a density [um]."""
         return [found.density @ films for films in self.films]
@@ -125,8 +120,9 @@ def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
 def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
     nodes, request, count = problem.nodes, problem.request, len(problem.nodes)
-    matrix = np.zeros((problem.size, problem.size))
-    linear = np.zeros(problem.size)
+    # The unknowns are densities, and a flow for each opening.
+    size = count + len(nodes.openings)
+    matrix, linear = np.zeros((size, size)), np.zeros(size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
     # The mean of the best known film is held at the target by this weight. The levels of the
     # other models are free: holding them too would cost evenness.
@@ -154,14 +150,14 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
     linear[count:] -= request.time_weight * seconds / (now.flow * problem.original_s)
     mean = float(weights @ now.density / weights.sum())
-    unit = np.eye(problem.size)
+    unit = np.eye(size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
     # Smoothness is that of slowness over this length [m].
     slope *= (0.1 / steps_m)[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
-    matrix[np.arange(count, problem.size), np.arange(count, problem.size)] += 1e-4
+    matrix[np.arange(count, size), np.arange(count, size)] += 1e-4
     linear[count:] -= 1e-4 * now.flow
     return matrix, linear
 
@@ -186,7 +182,7 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
 
 def _constraints(problem: Problem, now: Density) -> Constraints:
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
-    unit = identity(problem.size, format='csr')
+    unit = identity(count + len(nodes.openings), format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest, limited_by = problem.bounds

@@ -274,19 +274,17 @@ def law_rows(data: ReportData) -> list[dict[str, str]]:
         elif isinstance(law, LearnedCurve):
             _, ends, unit = words.learned_words(law)[1]
             row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
+            if law.sd:  # where the band of the curve is narrow, and where it is wide
+                at = np.linspace(law.low, law.high, 101)
+                half, shown = TWO_SIDED_95 * law.deviation(at), words.counted_from_1(law, at)
+                of_half = ' µm' if law.kind == 'addition' else ''
+                best, least = (
+                    f'± {words.number(half[k], 2)}{of_half} at {words.number(shown[k])} '
+                    f'{words.unit_words(law.unit)}'.rstrip()
+                    for k in (half.argmin(), half.argmax())
+                )
+                row |= {'best': best, 'least': least, 'forms': words.form_words(law)}
             rows.append(row)
-            if not law.sd:
-                continue
-            # Where the band of the curve is narrow, and where it is wide.
-            values = np.linspace(law.low, law.high, 101)
-            half, shown = TWO_SIDED_95 * law.deviation(values), words.counted_from_1(law, values)
-            of_half = ' µm' if law.kind == 'addition' else ''
-            best, least = (
-                f'± {words.number(half[at], 2)}{of_half} at {words.number(shown[at])} '
-                f'{words.unit_words(law.unit)}'.rstrip()
-                for at in (half.argmin(), half.argmax())
-            )
-            row |= {'best': best, 'least': least, 'forms': words.form_words(law)}
     return rows
 
 
