@@ -116,7 +116,13 @@ def plan_faces(
         PlanError: a face has no passes, or the film is less even than the tolerance.
     """
     envelope = envelope or GunEnvelope()
-    faces = _facing_gun(sprayable_faces(surface, widest_rad), request)
+    faces = sprayable_faces(surface, widest_rad)
+    if request.outward is not None:
+        side = np.asarray(request.outward) / np.linalg.norm(request.outward)
+        # Faces that turn further from the side of the gun are its back.
+        faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
+        if not faces:
+            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     wanted = WantedFilm.of(surface, painted, request.target_um, zones)
@@ -149,18 +155,6 @@ def plan_faces(
         moves=moves, faces=faces, margin_m=margin_m,
         sigma_n_unblended=unblended,
     )  # fmt: skip
-
-
-def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ...]:
-    """Without those on the back, if the direction to the gun is given."""
-    if request.outward is None:
-        return faces
-    side = np.asarray(request.outward) / np.linalg.norm(request.outward)
-    # Faces that turn further from the side of the gun are its back.
-    kept = tuple(face for face in faces if face.surface.outward @ side > -0.1)
-    if not kept:
-        raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
-    return kept
 
 
 def _blended(

@@ -56,7 +56,22 @@ def film_picture(
     grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
-    _draw_legend(axes[-1], grid[rows - 1, 1], scale, film_um, statistics)
+    bar = figure.colorbar(colours_of(scale), ax=axes[-1], aspect=25, pad=0.02)
+    bar.set_label('film [µm]', color=MUTED)
+    bar.ax.tick_params(colors=MUTED, labelsize=9)
+    bar.ax.spines['outline'].set_visible(False)
+    s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
+    figures.set_axis_off()
+    if np.any(film_um <= s.painted_above_um):
+        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
+        _draw_patches(figures, [(colour, f'up to {s.painted_above_um:g} µm')])
+    _write(
+        figures,
+        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
+        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
+        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
+    )
     if rows == 2:
         _draw_band(axes[0], part, film_um, spray, statistics, zones)
         _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics, zones)
@@ -213,28 +228,6 @@ def _draw_histogram(
         axes.hist(film, 40, weights=100.0 * area / area.sum(), color=INK, alpha=0.75)
     for limit in (low, middle, high):
         axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
-
-
-def _draw_legend(
-    axes: Axes, place: SubplotSpec, scale: ColourScale, film_um: np.ndarray, s: FilmStatistics
-) -> None:
-    """The bar of the colours, and the figures beside it."""
-    bar = axes.figure.colorbar(colours_of(scale), ax=axes, aspect=25, pad=0.02)
-    bar.set_label('film [µm]', color=MUTED)
-    bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.ax.spines['outline'].set_visible(False)
-    beside = axes.figure.add_subplot(place)
-    beside.set_axis_off()
-    if np.any(film_um <= s.painted_above_um):
-        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
-        _draw_patches(beside, [(colour, f'up to {s.painted_above_um:g} µm')])
-    _write(
-        beside,
-        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
-        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
-        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
-    )
 
 
 def draw_tool_path(
