@@ -95,8 +95,8 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
         duration[inside] = nodes.elapsed_s(number, slowness, end[inside]) - nodes.elapsed_s(
             number, slowness, begin[inside]
         )
-    # Poses that are reached in no time are left out: the gun stood there and does so no more. The
-    # shortest time between two poses is that which is written [s].
+    # Poses that are reached in less than this [s] are left out: the gun stood there and does so no
+    # more.
     kept = np.append(True, duration > 1e-5)
     return replace(
         whole,

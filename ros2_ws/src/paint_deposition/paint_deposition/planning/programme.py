@@ -258,8 +258,7 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
     """
     ends, stops = programme.ends_m, []
     for on_m, off_m in ends:
-        # The speed is sampled so often along an opening. Moves are not too close in length, nor
-        # in time.
+        # Moves are neither too short in length nor in time; the speed is sampled so often.
         places = np.linspace(on_m, off_m, 401)
         speed = speed_along(programme, places)
         least = np.maximum(request.move_min_m, speed / request.settings_per_s)
