@@ -94,7 +94,7 @@ def _turned(world: World) -> dict:
     plan = paint.plan(surface, calibration.model, target_um=target, optimise=True)
     given = plan.trajectory
     judged = scatter(world.part, JUDGED, rng, 0.0)
-    judged = _on(surface, plan.painted, world.part, *judged)
+    judged = _on(surface, plan.wanted.region, world.part, *judged)
     spots = scatter(world.part, READINGS, rng, 0.015)
     films, doors, said = [], [], []
     best, trajectory = calibration, given

@@ -15,10 +15,10 @@ from pathlib import Path
 import click
 import numpy as np
 from benchmarks.records import add, kept, results_option
-from tests.virtual_paint_shop.bench import Bench
 from tests.virtual_paint_shop.draw import draw_jobs, stream
 from tests.virtual_paint_shop.gauge import GaugeNoise, measure
 from tests.virtual_paint_shop.jobs import record
+from tests.virtual_paint_shop.shop import Bench
 from tests.virtual_paint_shop.truths import choose as choose_truths
 
 from paint_deposition.api.simulation import look_at

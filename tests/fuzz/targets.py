@@ -31,7 +31,7 @@ from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
-from paint_deposition.report.live.scene import FIGURES
+from paint_deposition.report.live.page import FIGURES
 from robot_arm import urdf
 from workbook import write_workbook
 

@@ -1,12 +1,14 @@
 """Whether the gun keeps clear of the part."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import paint_deposition as pd
 from booth import panel, panel_with_screen, serpentine
 from paint_deposition.errors import PlanError
-from paint_deposition.planning.clearance import contacts
+from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import GunEnvelope
 
 # The gun runs along x at 0.25 m before the panel; the screen stands 0.1 m before it at |x| < 0.05.
@@ -14,11 +16,8 @@ SPEED, HALF = 0.3, 0.45
 MOTION = serpentine(speed_m_per_s=SPEED, half_width_m=HALF)
 
 
-def test_nothing_is_near():
-    assert contacts(panel(), MOTION, GunEnvelope()) == ()
-
-
 def test_a_screen_before_the_gun_is_met_while_it_passes():
+    assert contacts(panel(), MOTION, GunEnvelope()) == ()
     (contact,) = contacts(panel_with_screen(), MOTION, GunEnvelope(radius_m=0.04, before_m=0.2))
     assert not contact.by_gun
     # By 200 mm of cylinder over the 150 mm from the TCP to the screen; aside no further than 40.
@@ -40,10 +39,7 @@ def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path
 
 
 def test_a_gun_in_the_part_is_told_from_a_near_part():
-    motion = serpentine(speed_m_per_s=SPEED, half_width_m=HALF)
-    through = type(motion)(
-        motion.stamps_ns, motion.positions_m + np.array([0.0, 0.2, 0.0]), motion.quaternions_xyzw
-    )
+    through = replace(MOTION, positions_m=MOTION.positions_m + np.array([0.0, 0.2, 0.0]))
     (contact,) = contacts(panel_with_screen(), through, GunEnvelope(radius_m=0.04, before_m=0.0))
     assert contact.by_gun
     assert 'touches' in str(contact)

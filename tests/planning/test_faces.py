@@ -1,7 +1,5 @@
 """Plans for parts with several sides: film, order and files."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -9,9 +7,9 @@ from folded_parts import bumper, hood
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.clearance import contacts
-from paint_deposition.planning.faces import FacePasses, join_motions, order_faces, plan_faces
+from paint_deposition.planning.faces import join_motions, order_faces, plan_faces
 from paint_deposition.planning.passes import PassStyle, PlannedPass
+from paint_deposition.planning.planned_film import contacts
 from paint_deposition.planning.requests import PlanRequest
 from scenes import painted
 from surfaces import solid
@@ -19,7 +17,6 @@ from surfaces import solid
 NARROW = DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.1, sigma1_m=0.042, sigma2_m=0.07)
 )
-STYLE = PassStyle(standoff_m=0.2, speed_m_per_s=0.3)
 
 
 @pytest.fixture(scope='module')
@@ -27,11 +24,14 @@ def planned():
     return plan_faces(bumper(), NARROW, PlanRequest(target_um=20.0), 'part')
 
 
-def level_pass(y_m: float, begin_m: float = 0.0, end_m: float = 1.0) -> PlannedPass:
+def level_pass(
+    y_m: float, begin_m: float = 0.0, end_m: float = 1.0, one_way: bool = False
+) -> PlannedPass:
     """A straight pass along x."""
     places = np.array([[begin_m, y_m, 0.2], [end_m, y_m, 0.2]])
     turns = np.tile(np.diag([1.0, -1.0, -1.0]), (2, 1, 1))
-    return PlannedPass(y_m, places, turns, np.array([0.0, 1.0]), 0.1, 0.8, PassStyle(0.25, 0.3))
+    style = PassStyle(standoff_m=0.2, speed_m_per_s=0.3, one_way=one_way)
+    return PlannedPass(y_m, places, turns, np.array([0.0, 1.0]), 0.1, 0.8, 0.3, style)
 
 
 @pytest.mark.slow
@@ -66,19 +66,18 @@ def test_the_back_of_a_closed_part_stays_bare():
 
 def test_faces_follow_each_other_with_least_travel():
     """Two faces end to end: the second is run the other way round."""
-    first = FacePasses((level_pass(0.0), level_pass(0.3, 1.0, 0.0)), STYLE)
-    second = FacePasses((level_pass(0.9), level_pass(0.6, 1.0, 0.0)), STYLE)
-    one, other = order_faces([second, first])
-    between_m = other.passes[0].positions_m[0] - one.passes[-1].positions_m[-1]
-    assert np.linalg.norm(between_m) == pytest.approx(0.3)
-    fixed = replace(STYLE, one_way=True)
-    kept = order_faces([FacePasses(face.passes, fixed) for face in (second, first)])
-    begins = {face.passes[0].across_m for face in kept}
-    assert begins == {0.0, 0.9}
+    ends = ((0.0, 0.3), (0.9, 0.6))
+    faces, fixed = (
+        [(level_pass(y, one_way=k), level_pass(z, 1.0, 0.0, one_way=k)) for y, z in ends]
+        for k in (False, True)
+    )
+    one, other = order_faces(faces[::-1])
+    assert np.linalg.norm(other[0].positions_m[0] - one[-1].positions_m[-1]) == pytest.approx(0.3)
+    assert {face[0].across_m for face in order_faces(fixed[::-1])} == {0.0, 0.9}
 
 
 def test_between_faces_the_gun_is_drawn_back_until_it_is_clear():
-    faces = [FacePasses((level_pass(y),), STYLE) for y in (0.0, 1.0)]
+    faces = [(level_pass(y),) for y in (0.0, 1.0)]
     heights_m = []
 
     def clear_at_the_third(way) -> bool:

@@ -27,7 +27,7 @@ def bowed():
 
 @pytest.fixture(scope='module')
 def motion(bowed):
-    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), STYLE, 'part')
+    return trajectory_of(plan_passes(bowed, LINES_M, STYLE), 'part')
 
 
 def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
@@ -45,7 +45,7 @@ def test_pass_keeps_standoff_and_is_square_to_the_surface(bowed):
 
 def test_gun_is_on_from_before_the_part_to_behind_it(bowed):
     planned = plan_pass(bowed, 0.0, STYLE)
-    path, _ = spray_path(trajectory_of((planned,), STYLE))
+    path, _ = spray_path(trajectory_of((planned,)))
     # Where the gun's axis meets the surface: the TCP leans out over the bow.
     aimed_at = path.position_m + STYLE.standoff_m * path.rotation[:, :, 2]
     on = ((aimed_at[path.flow > 0.0] - bowed.origin_m) @ bowed.axes.T)[:, 0]
@@ -74,7 +74,7 @@ def test_serpentine_alternates_and_keeps_the_tool_as_it_is(bowed, motion):
     tool_x = [on.rotation[on.spray_pass == k].mean(axis=0)[:, 0] for k in range(3)]
     assert tool_x[0] @ tool_x[1] > 0.9
     one_way = PassStyle(0.25, 0.3, overspray_m=0.2, one_way=True)
-    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way), one_way))
+    path, _ = spray_path(trajectory_of(plan_passes(bowed, LINES_M, one_way)))
     on = path.select(path.flow > 0.0)
     ways = [on.velocity_m_per_s[on.spray_pass == k].mean(axis=0) for k in range(3)]
     assert min(ways[0] @ ways[1], ways[0] @ ways[2]) > 0.0
@@ -92,7 +92,7 @@ def test_travel_direction_in_the_tool_frame_is_the_angle_asked_for(bowed):
 
 def test_moves_of_the_robot_follow_the_same_way(bowed):
     passes = plan_passes(bowed, LINES_M, STYLE)
-    moves = planned_moves(passes, STYLE)
+    moves = planned_moves(passes)
     assert not moves[0].spraying
     switches = np.diff([move.spraying for move in moves])
     assert np.count_nonzero(switches) == 2 * len(passes)

@@ -93,8 +93,6 @@ def test_passes_begin_at_the_top_to_the_right_as_the_gun_sees_it_or_run_downward
     [
         ({'speed_m_per_s': None}, 'neither speed_m_per_s nor target_um'),
         ({'tolerance': 0.05, 'index_m': 0.3}, 'on this part within 5 %; the closest is'),
-        ({'index_m': -0.2}, 'index_m is -0.2'),
-        ({'standoff_m': -1.0}, 'standoff_m is -1'),
         ({'overspray_m': -0.1}, 'overspray_m is -0.1'),
         ({'direction': 'up'}, "'horizontal' or 'vertical'"),
     ],

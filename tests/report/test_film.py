@@ -1,4 +1,4 @@
-"""The picture of a painted part: seen from the gun's side, gravity down."""
+"""The picture of a painted part: seen from the gun's side, gravity down, with what rays meet."""
 
 import io
 import re
@@ -12,9 +12,11 @@ from booth import door, panel, serpentine
 from paint_deposition.film.statistics import film_statistics
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.part import View
+from paint_deposition.report.pictures.part import PartPicture, View
 from paint_deposition.report.style import BELOW, HIGH, WITHIN, save_picture
+from surfaces import triangulated
 
 X, Y, Z = np.eye(3)
 
@@ -130,3 +132,30 @@ def test_passes_beside_the_part_are_drawn_whole_and_those_far_off_left_out(heigh
     assert left < gun[:, 0].min() < gun[:, 0].max() < right
     assert (low < gun[:, 2].min() < gun[:, 2].max() < high) == whole
     assert high - low < 3.0
+
+
+def folded(spacing_m):
+    return triangulated(lambda x, z: 0.2 * x**2 + 0.9 * np.abs(z - 0.03), spacing_m, jitter=0.2)
+
+
+def test_what_is_seen_is_drawn_over_what_it_hides():
+    vertices, faces = folded(0.02)
+    behind = vertices + np.array([0.15, 0.4, 0.05])
+    both = np.concatenate([faces, faces + len(vertices)])
+    surface = Surface.from_triangles(np.concatenate([vertices, behind]), both, 0.05)
+    picture = PartPicture.of(surface)
+    assert 0.5 < picture.seen.mean() < 0.9
+    middle = surface.vertices_m[picture.faces].mean(axis=1)
+    eyes = middle[picture.seen] + 2.0 * picture.view.toward
+    met = surface.first_faces(eyes, -np.tile(picture.view.toward, (len(eyes), 1)))
+    drawn = {tuple(face): row for row, face in enumerate(picture.faces.tolist())}
+    rows = np.array([drawn[tuple(face)] for face in surface.faces[met].tolist()])
+    assert (rows == np.flatnonzero(picture.seen)).all()
+    far = (middle @ picture.view.toward)[~picture.seen]
+    assert far.max() < (middle @ picture.view.toward)[picture.seen].max()
+
+
+def test_edges_are_those_of_the_outline_and_the_fold_alone():
+    vertices, faces = folded(0.01)
+    picture = PartPicture.of(Surface.from_triangles(vertices, faces, 0.05))
+    assert 0 < len(picture.edges_m) < 400

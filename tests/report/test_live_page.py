@@ -16,8 +16,7 @@ from paint_deposition.cli.main import run
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import GunMotion, read_recording
-from paint_deposition.report.live.scene import STEP_UM, Scene, Seen
-from paint_deposition.report.live.server import Page
+from paint_deposition.report.live.page import STEP_UM, Page, Scene, Seen
 from paint_deposition.report.writers.write import write
 from small_campaign import small_campaign
 

@@ -25,7 +25,6 @@ def draw_jobs(
     experiments: tuple[str, ...],
     emission_offset_m: float = 0.05,
     gun: str | None = None,
-    follow: float | None = None,
 ) -> tuple[Pattern, list[Job]]:
     rng = stream(seed, 2)
     door = draw_door(rng)
@@ -52,8 +51,6 @@ def draw_jobs(
             part = door
             direction = 'vertical' if name == 'door_vertical' or vertical else 'horizontal'
             plan = draw_plan(own, part, index, half_width, direction, gun)
-            if follow is not None:
-                plan = replace(plan, follow=follow)
         roll = plan.roll_rad if roll is None else roll
         plan = replace(plan, roll_rad=roll, speed_m_per_s=flow / (film * index))
         jobs.append(Job(name, part, *timed(part, plan, own)))

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from .bench import Bench
 from .draw import stream
 from .gauge import GaugeNoise
 from .jobs import Job, Motion, Plan
 from .parcels import Pattern
-from .shop import PARCELS, Experiment, gauged
+from .shop import PARCELS, Bench, Experiment, gauged
 from .truths import Truth
 
 # The gun stands below this share of its greatest speed: there a pass ends.

@@ -7,12 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from .bench import Bench
 from .draw import stream, timed
 from .gauge import GaugeNoise
 from .jobs import Job, Plan, hold
 from .parcels import Pattern
-from .shop import PARCELS, USUAL_NOISE, Campaign, Experiment, gauged
+from .shop import PARCELS, USUAL_NOISE, Bench, Campaign, Experiment, gauged
 from .truths import Scene, Truth
 
 # A part's own level of film, as a share, and its gauge session's own zero [um].

@@ -1,4 +1,4 @@
-"""The paint shop: draws a job, hides an effect in it, paints, and takes readings."""
+"""The paint shop: draws a job, hides an effect in it, paints on its bench, and takes readings."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ from types import MappingProxyType
 
 import numpy as np
 
-from .bench import Bench
 from .doors import Part, flat_panel
 from .draw import EXPERIMENTS, brush_beside, draw_jobs, solids_cm3_per_s, stream, timed
+from .flight import Air, Landings, film_um, fly
 from .gauge import GaugeNoise, Readings, Spots, keep_clear, layout, scatter, tabulate
-from .jobs import Job, Log, Plan, record
-from .parcels import Pattern, draw_pattern
-from .truths import Truth, choose, plain
+from .jobs import Job, Log, Plan, record, slices
+from .parcels import Pattern, conner_plume, draw_pattern
+from .truths import Scene, Truth, changes_flight, choose, plain
 
 PARCELS = 8_000_000
+POOL = 1 << 19
 USUAL_NOISE = GaugeNoise()
 NO_BRUSHES: Mapping[int, Pattern] = MappingProxyType({})
 
@@ -101,33 +102,89 @@ def panel_study(
     seed: int,
     index_m: float = 0.577,
     *,
-    pattern: Pattern | None = None,
-    truth: str | None = None,
     readings: int = 75,
     repeats: int = 15,
-    heldout: int = 40,
-    noise: GaugeNoise = USUAL_NOISE,
-    film_um: float = 20.0,
-    amplitude: float | None = None,
     parcels: int = PARCELS,
 ) -> Campaign:
     """A flat panel, three passes at `index_m`; the bell depends on the seed alone.
 
-    Without a pattern: 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the
-    model plane, speed by mass balance for a mean film of `film_um` at 0.577 m.
+    It is a 50 mm bell like the paper's (SB50 near 0.57 m) at about the standoff of the model
+    plane, its speed by mass balance for a mean film of 20 um at 0.577 m.
     """
     rng = stream(seed, 11)
-    if pattern is None:
-        pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
-    truths = choose(truth, stream(seed, 1), amplitude)
-    speed = pattern.K1_cm3_per_s / (film_um * 0.577)
+    pattern = draw_pattern(rng, rng.uniform(0.55, 0.59), solids_cm3_per_s(rng), 0.05)
+    speed = pattern.K1_cm3_per_s / (20.0 * 0.577)
     plan = Plan(index_m=index_m, passes=3, standoff_m=0.25, follow=0.0, overrun_m=0.55,
                 gun_margin_m=0.50, teach_error_m=0.0, speed_m_per_s=speed)  # fmt: skip
     part = flat_panel(0.6, 2 * index_m + 0.5)
     job = Job('panel', part, *timed(part, plan, stream(seed, 12)))
-    taking = Taking(readings, repeats, heldout, 'columns', noise)
-    painted = [_paint(seed, 0, job, pattern, truths, taking, parcels)]
-    return _campaign(seed, pattern, painted, truths, {})
+    taking = Taking(readings, repeats, 40, 'columns', USUAL_NOISE)
+    painted = [_paint(seed, 0, job, pattern, [], taking, parcels)]
+    return _campaign(seed, pattern, painted, [], {})
+
+
+class Bench:
+    """Paints one job with any truths, always with the same parcels."""
+
+    def __init__(
+        self, seed: int, job: Job, pattern: Pattern, parcels: int,
+        brushes: Mapping[int, Pattern] = NO_BRUSHES,
+    ) -> None:  # fmt: skip
+        """Where the plan names brushes, each paints its own passes with its pattern."""
+        self.scene = Scene(job.part, pattern, job.motion)
+        self.parcels_total = parcels
+        self.plume = conner_plume(pattern, POOL, seed=seed)
+        self._clean_landings = {}
+        numbers = sorted(set(job.plan.brushes))
+        self._brushes = [
+            Bench(seed + n, job.of_brush(n), brushes[n], parcels // len(numbers)) for n in numbers
+        ]
+
+    def readings(
+        self, truths: list[Truth], x: np.ndarray, z: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(film, what a noise-free gauge says) at the points, um."""
+        scene = self.scene
+        film = self.film_at(truths, x, z)
+        for truth in truths:
+            film = truth.on_film(film, x, z, scene, lambda gx, gz: self.film_at(truths, gx, gz))
+        reading = film
+        for truth in truths:
+            reading = truth.on_gauge(reading, x, z, scene)
+        return film, reading
+
+    def film_at(self, truths: list[Truth], x: np.ndarray, z: np.ndarray) -> np.ndarray:
+        """Film of the parcels that land and stay, um."""
+        if self._brushes:
+            return sum(brush.film_at(truths, x, z) for brush in self._brushes)
+        landings = self._landings(truths, x, z)
+        kept = 1.0
+        for truth in truths:
+            kept = kept * truth.on_landing(landings, self.scene)
+        return film_um(landings, x.size, kept)
+
+    def _landings(self, truths: list[Truth], x: np.ndarray, z: np.ndarray) -> Landings:
+        flying = [t for t in truths if changes_flight(t)]
+        key = (x.tobytes(), z.tobytes())
+        if not flying and key in self._clean_landings:
+            return self._clean_landings[key]
+        nominal, pattern = self.scene.nominal, self.scene.pattern
+        plume, motion = self.plume, nominal
+        flow = lambda t: pattern.K1_cm3_per_s * nominal.commanded(t)  # noqa: E731
+        for truth in flying:
+            plume = truth.on_plume(plume, pattern)
+            motion = truth.on_motion(motion, self.scene)
+            flow = truth.on_flow(flow, self.scene)
+        spraying = slices(motion, flow)
+        air = Air(np.zeros_like(spraying.tcp_0_m), np.zeros_like(plume.x_m))
+        for truth in flying:
+            air = truth.on_air(air, spraying, plume)
+        part = self.scene.part
+        landings = fly(part, spraying, plume, air, part.point(x, z), pattern.model_plane_m,
+                       pattern.emission_offset_m, self.parcels_total)  # fmt: skip
+        if not flying:
+            self._clean_landings[key] = landings
+        return landings
 
 
 def _paint(

@@ -11,7 +11,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.kernel.laws import Ray
-from paint_deposition.report.writers.inference import effect_entry, write_effect_file
+from paint_deposition.report.writers.inference import effect_entry, file_name, write_effect_file
 from small_campaign import small_campaign
 
 KNOTS, SD = 12, 0.02
@@ -108,3 +108,8 @@ def test_the_name_of_an_effect_of_the_library_is_not_taken(tmp_path):
     law = learned('time_s')
     file = write_effect_file(tmp_path / 'air_drift.py', law, forms_of(law)[0])
     assert load_effect_file(file).id == 'learned_air_drift'
+
+
+def test_names_of_experiments_become_names_of_files():
+    names = {'door': 'door', 'Tür 2/left': 'Tür_2_left', '../..': 'experiment'}
+    assert {name: file_name(name) for name in names} == names

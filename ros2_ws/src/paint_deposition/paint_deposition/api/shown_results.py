@@ -21,7 +21,7 @@ from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, film_stat
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.data import ReportData
-from paint_deposition.report.live.scene import Scene
+from paint_deposition.report.live.page import Scene
 
 DIAGNOSIS, COMPARISON, FILM = 'diagnosis.json', 'comparison.json', 'film.ply'
 
@@ -114,7 +114,7 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
     scenes = []
     for row, (experiment, painted) in enumerate(zip(data.experiments, data.painted, strict=True)):
         wanted = data.study.campaign.target_of(experiment)
-        films = [film.film_um for film in painted]
+        films = [film_um for film_um, _ in painted]
         at = data.rows_of(row)
         residuals = [comparison.points.select(at) for comparison in data.comparisons]
         span = residual_scale(np.concatenate([found.residual_um for found in residuals]))
@@ -122,16 +122,15 @@ def _scenes(by_model: Mapping[str, Comparison]) -> list[Scene]:
             {'model': name, 'rmse_um': found.rmse_um}
             for name, found in zip(data.names, residuals, strict=True)
         ]
-        for name, film_um, film, found in [
-            *zip(data.names, films, painted, residuals, strict=True)
-        ][::-1]:
+        of_models = [*zip(data.names, painted, residuals, strict=True)]
+        for name, (film_um, emitted_cm3), found in of_models[::-1]:
             scene = Scene(experiment.name, name)
             scene.show_part(experiment.surface)
             scene.tell('about', text=experiment.name)
             scene.show_scale(film_scale(np.concatenate(films)), DEFAULT_PAINTED_ABOVE_UM, *wanted)
             scene.show_film(film_um)
             figures = film_statistics(
-                film_um, experiment.surface.vertex_areas_m2, film.emitted_cm3,
+                film_um, experiment.surface.vertex_areas_m2, emitted_cm3,
                 target_um=wanted[0], target_tolerance_um=wanted[1],
                 zones=experiment.zones,
             )  # fmt: skip

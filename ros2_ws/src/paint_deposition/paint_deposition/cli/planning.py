@@ -223,7 +223,7 @@ def _improvement_lines(result: pd.Improvement) -> Iterator[str]:
     yield f'{result.region}:'
     yield result.sentence
     films = {'there': (before.statistics, after.statistics)}
-    if not result.target_region.all():
+    if not result.wanted.region.all():
         films['on the whole part'] = before.whole_part, after.whole_part
     for where, (a, b) in films.items():
         yield (

@@ -45,8 +45,7 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.facing import turned
-from paint_deposition.report.live.scene import Scene
-from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
+from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
 
 # The simulator speaks twice a second [s].
 SILENT_S = 2.0

@@ -15,7 +15,6 @@ from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.planning.clearance import rows_apart
 from paint_deposition.planning.joints import (
     MARGIN,
     REACHED,
@@ -25,14 +24,13 @@ from paint_deposition.planning.joints import (
     Start,
     fastest_way,
     rolled,
+    rows_apart,
     towards,
     ways_of,
 )
 
 # Joints are looked at this often along the planned motion [s].
 STEP_S = 0.02
-# Poses of a motion that is only tried.
-TRIED = 150
 
 
 @dataclass(frozen=True)
@@ -125,7 +123,15 @@ class RobotCell:
         if self.acceleration is not None:
             most = np.full(len(arm), self.acceleration)
         pace = JointPace(arm.joints, times_s, CubicSpline(times_s, joints), arm.fastest, most)
-        spray_pass = _passes(trajectory, times_s)
+        # The pass that is sprayed at each time, as a simulation counts; -1 for none.
+        spray_pass = np.full(len(times_s), -1)
+        path, _ = spray_path(trajectory)
+        sprayed = path.select(path.flow > 0.0)
+        if len(sprayed):
+            at_s = 1e-9 * (sprayed.stamp_ns - first_ns)
+            nearest = np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), times_s)
+            near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
+            spray_pass[near] = sprayed.spray_pass[nearest][near]
         shares = pace.shares(spray_pass)
         reached_s, seconds, driven, speeds = pace.driven(shares)
 
@@ -157,21 +163,6 @@ class RobotCell:
         travel = np.append(0.0, np.cumsum(steps_m))
         moving = steps_m > 1e-6
         return (0.5 * (travel[1:] + travel[:-1])[moving], speed[moving]), begun
-
-    def reachability(self, trajectory: Trajectory, free_roll: bool) -> tuple[float, float, float]:
-        """How far a motion is followed, at which share of its speed, and with what room.
-
-        Of the whole, at the slowest moment, and of a joint's range; 0 where not all is reached.
-        Accelerations are not looked at.
-        """
-        times_s = np.linspace(0.0, trajectory.duration_s, TRIED)
-        positions, turns = self.poses(trajectory, times_s)
-        _, ways, reached = ways_of(self.arm, positions, turns, free_roll)
-        if not (reached == TRIED).any():
-            return float(reached.max(initial=0)) / TRIED, 0.0, 0.0
-        joints = ways[fastest_way(self.arm, ways, reached, times_s)]
-        speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / self.arm.fastest
-        return 1.0, min(1.0, 1.0 / float(speeds.max())), float(self.arm.room(joints).min())
 
     def _joints(
         self, trajectory: Trajectory, free_roll: bool, begin: Start | None = None
@@ -216,18 +207,6 @@ class RobotCell:
         clock_s = 1e-9 * (in_base.stamps_ns - in_base.stamps_ns[0])
         turns = Slerp(clock_s, Rotation.from_quat(in_base.quaternions_xyzw))
         return PchipInterpolator(clock_s, in_base.positions_m)(times_s), turns(times_s)
-
-
-def _passes(trajectory: Trajectory, times_s: np.ndarray) -> np.ndarray:
-    """(N,) number of the pass sprayed at each time, as a simulation counts; -1 for none."""
-    path, _ = spray_path(trajectory)
-    sprayed = path.select(path.flow > 0.0)
-    if not len(sprayed):
-        return np.full(len(times_s), -1)
-    at_s = 1e-9 * (sprayed.stamp_ns - trajectory.stamps_ns[0])
-    nearest = np.searchsorted(0.5 * (at_s[1:] + at_s[:-1]), times_s)
-    near = np.abs(at_s[nearest] - times_s) <= 0.5 * sprayed.dwell_s[nearest] + STEP_S
-    return np.where(near, sprayed.spray_pass[nearest], -1)
 
 
 def _words(place_m: np.ndarray) -> str:
@@ -319,20 +298,28 @@ def part_places(
 ) -> PartPlaces:
     """Try a motion, in the part's frame, with the part at each place of a grid.
 
-    ``cell.part`` gives the height and the turn of the part.
+    ``cell.part`` gives the height and the turn of the part. Accelerations are not looked at.
 
     Raises:
         PlanError: the grid is empty.
     """
     if not len(x_m) or not len(y_m):
         raise PlanError('the grid of places is empty; give FROM TO with FROM below TO')
-    shape = len(y_m), len(x_m)
+    arm, shape = cell.arm, (len(y_m), len(x_m))
     reached, speed, room = np.zeros(shape), np.zeros(shape), np.zeros(shape)
+    # So many poses are enough for a motion that is only tried.
+    times_s = np.linspace(0.0, trajectory.duration_s, 150)
     for number, (row, column) in enumerate(np.ndindex(shape)):
         progress('places', number / reached.size)
-        part = _placed(cell.part, x_m[column], y_m[row])
-        tried = replace(cell, part=part).reachability(trajectory, free_roll)
-        reached[row, column], speed[row, column], room[row, column] = tried
+        at = row, column
+        tried = replace(cell, part=_placed(cell.part, x_m[column], y_m[row]))
+        positions_m, turns = tried.poses(trajectory, times_s)
+        _, ways, followed = ways_of(arm, positions_m, turns, free_roll)
+        reached[at] = followed.max(initial=0) / len(times_s)
+        if reached[at] == 1.0:
+            joints = ways[fastest_way(arm, ways, followed, times_s)]
+            speeds = np.abs(np.diff(joints, axis=0)) / times_s[1] / arm.fastest
+            speed[at], room[at] = min(1.0, 1.0 / speeds.max()), arm.room(joints).min()
     return PartPlaces(cell, x_m, y_m, reached, speed, room)
 
 

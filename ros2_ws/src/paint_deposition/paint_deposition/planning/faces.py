@@ -24,34 +24,26 @@ from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.sprayable_faces import WIDEST_RAD, Face, sprayable_faces
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.passes import (
-    PassStyle,
     PlannedPass,
     plan_pass,
     planned_moves,
     trajectory_of,
 )
 from paint_deposition.planning.plan import Plan, plan
-from paint_deposition.planning.planned_film import PlannedFilm, WantedFilm, evenness, predicted
+from paint_deposition.planning.planned_film import (
+    PlannedFilm,
+    WantedFilm,
+    contacts,
+    evenness,
+    predicted,
+)
 from paint_deposition.planning.programme import Programme, moves_of
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
 from paint_deposition.planning.retiming import retime_for_evenness
 
-# Margins along the seams that are tried, as shares of the overspray.
-MARGINS = (0.0, 0.35, 0.7, 1.0)
-
-
-@dataclass(frozen=True)
-class FacePasses:
-    """The passes of one face in running order, and how they are run."""
-
-    passes: tuple[PlannedPass, ...]
-    style: PassStyle
-
-    def reversed(self) -> 'FacePasses':
-        """Passes of the face run the other way round, the last one first."""
-        return replace(self, passes=tuple(map(_reversed, self.passes[::-1])))
+# Of one face, in running order.
+Passes = tuple[PlannedPass, ...]
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -124,7 +116,13 @@ def plan_faces(
         PlanError: a face has no passes, or the film is less even than the tolerance.
     """
     envelope = envelope or GunEnvelope()
-    faces = _facing_gun(sprayable_faces(surface, widest_rad), request)
+    faces = sprayable_faces(surface, widest_rad)
+    if request.outward is not None:
+        side = np.asarray(request.outward) / np.linalg.norm(request.outward)
+        # Faces that turn further from the side of the gun are its back.
+        faces = tuple(face for face in faces if face.surface.outward @ side > -0.1)
+        if not faces:
+            raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
     painted = np.zeros(len(surface.vertices_m), dtype=bool)
     painted[np.concatenate([face.vertices for face in faces])] = True
     wanted = WantedFilm.of(surface, painted, request.target_um, zones)
@@ -139,7 +137,7 @@ def plan_faces(
         running, frame_id, lambda way: not contacts(surface, way, envelope)
     )
     if request.optimise:
-        asked = request.improvement(running[0].style.overspray_m, request.target_um)
+        asked = request.improvement(running[0][0].style.overspray_m, request.target_um)
         retimed = retime_for_evenness(
             surface, wanted, Programme.of(trajectory), [model], asked, progress, explain=False
         ).programme
@@ -153,22 +151,10 @@ def plan_faces(
             'allow that much, or narrower faces (--face-angle-deg)'
         )
     return PartPlan(
-        **found, passes=tuple(planned for face in running for planned in face.passes),
+        **found, passes=tuple(planned for face in running for planned in face),
         moves=moves, faces=faces, margin_m=margin_m,
         sigma_n_unblended=unblended,
     )  # fmt: skip
-
-
-def _facing_gun(faces: tuple[Face, ...], request: PlanRequest) -> tuple[Face, ...]:
-    """Without those on the back, if the direction to the gun is given."""
-    if request.outward is None:
-        return faces
-    side = np.asarray(request.outward) / np.linalg.norm(request.outward)
-    # Faces that turn further from the side of the gun are its back.
-    kept = tuple(face for face in faces if face.surface.outward @ side > -0.1)
-    if not kept:
-        raise PlanError('no surface faces the gun; give the direction to the gun (outward)')
-    return kept
 
 
 def _blended(
@@ -178,7 +164,7 @@ def _blended(
     faces: tuple[Face, ...],
     wanted: WantedFilm,
     progress: Callable[[str, float], None],
-) -> tuple[float, list[FacePasses], float]:
+) -> tuple[float, list[Passes], float]:
     """Lay passes on each face, and choose margin and speeds for an even film of all.
 
     Even is the film over its own target, where one is wanted. Returned are the margin, by how much
@@ -186,23 +172,30 @@ def _blended(
     and sigma_n without margin, each face for itself.
     """
     area_m2 = np.where(wanted.region, surface.vertex_areas_m2, 0.0)
+    weight = area_m2 / area_m2.sum()
     target = request.target_um if request.speed_m_per_s is None else None
     integrator = FilmIntegrator(surface.points(), model, occluder=surface.occluder)
     overspray_m, unblended, tried = 0.0, math.nan, []
-    for number, share in enumerate(MARGINS if len(faces) > 1 else MARGINS[:1]):
-        progress('faces', number / len(MARGINS))
+    # Margins along the seams, as shares of the overspray.
+    shares = (0.0, 0.35, 0.7, 1.0) if len(faces) > 1 else (0.0,)
+    for number, share in enumerate(shares):
+        progress('faces', number / len(shares))
         margin_m, films = share * overspray_m, []
         plans = [plan(face.without_margin(margin_m).surface, model, request) for face in faces]
         for face in plans:
             for one in face.passes:
-                path, _ = spray_path(
-                    trajectory_of((one,), face.style), max_step_m=model.max_step_m
-                )
+                path, _ = spray_path(trajectory_of((one,)), max_step_m=model.max_step_m)
                 integrator.reset()
                 integrator.add(path)
                 films.append(integrator.raw_um / wanted.share)
         films_um = np.array(films)
-        dwell = _dwell(films_um, area_m2, target)
+        # The time on each pass, over what it is on its face alone, for an even film of all. It
+        # stays within half and twice that, and near it.
+        level_um = target or float(weight @ films_um.sum(axis=0))
+        rows = np.sqrt(weight)[:, np.newaxis] * films_um.T / level_um
+        ridge = 0.02 * np.eye(len(films_um)) / math.sqrt(len(films_um))
+        wished = np.concatenate([np.sqrt(weight), ridge.sum(axis=1)])
+        dwell = lsq_linear(np.vstack([rows, ridge]), wished, (0.5, 2.0)).x
         tried.append((evenness(dwell @ films_um, area_m2)[1], margin_m, plans, dwell))
         if not number:
             overspray_m = plans[0].style.overspray_m
@@ -211,68 +204,60 @@ def _blended(
     return margin_m, _with_dwell(plans, dwell, request), unblended
 
 
-def _dwell(films_um: np.ndarray, area: np.ndarray, target_um: float | None) -> np.ndarray:
-    """(n,) time on each pass, over what it is on its face alone, for an even film of all."""
-    weight = area / area.sum()
-    wanted = target_um or float(weight @ films_um.sum(axis=0))
-    rows = np.sqrt(weight)[:, np.newaxis] * films_um.T / wanted
-    # The times stay within half and twice those for evenness on each face alone, and near them.
-    ridge = 0.02 * np.eye(len(films_um)) / math.sqrt(len(films_um))
-    return lsq_linear(
-        np.vstack([rows, ridge]), np.concatenate([np.sqrt(weight), ridge.sum(axis=1)]), (0.5, 2.0)
-    ).x
-
-
-def _with_dwell(
-    plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest
-) -> list[FacePasses]:
+def _with_dwell(plans: Sequence[Plan], dwell: np.ndarray, request: PlanRequest) -> list[Passes]:
     """The passes at their new speeds, with a lead-in to match."""
     found, shares = [], iter(dwell.tolist())
     for face in plans:
         passes = []
         for number, planned in enumerate(face.passes):
-            style = replace(face.style, speed_m_per_s=planned.speed_m_per_s / next(shares))
+            speed = planned.speed_m_per_s / next(shares)
             backwards = bool(number % 2) and not request.one_way
             surface_map = face.line_films.surface_map
-            passes.append(plan_pass(surface_map, planned.across_m, style, backwards))
-        found.append(FacePasses(tuple(passes), face.style))
+            passes.append(plan_pass(surface_map, planned.across_m, face.style, backwards, speed))
+        found.append(tuple(passes))
     return found
 
 
 # --- order, and the way from face to face
 
 
-def order_faces(faces: Sequence[FacePasses]) -> tuple[FacePasses, ...]:
+def order_faces(faces: Sequence[Passes]) -> tuple[Passes, ...]:
     """The faces in that order, each time the nearest next, which has least travel between them.
 
     A face may run the other way round, unless its passes all run one way.
     """
-    ways = [(f,) if f.style.one_way else (f, f.reversed()) for f in faces]
-    tried = [_nearest_next(k, first, ways) for k, own in enumerate(ways) for first in own]
+    ways: list[tuple[Passes, ...]] = []
+    for face in faces:
+        turned = tuple(
+            replace(
+                one, positions_m=one.positions_m[::-1], rotations=one.rotations[::-1],
+                along_m=one.along_m[-1] - one.along_m[::-1],
+                on_m=float(one.along_m[-1]) - one.off_m, off_m=float(one.along_m[-1]) - one.on_m,
+            )
+            for one in face[::-1]
+        )  # fmt: skip
+        ways.append((face,) if face[0].style.one_way else (face, turned))
+    tried = []
+    for number, first in [(number, way) for number, own in enumerate(ways) for way in own]:
+        order, left = [first], dict(enumerate(ways))
+        del left[number]
+        while left:
+            there = [(_travel_m(order[-1], way), k, way) for k, own in left.items() for way in own]
+            _, nearest, way = min(there, key=lambda one: one[0])
+            order.append(way)
+            del left[nearest]
+        tried.append(tuple(order))
     # An order and its reverse take the same way: of equal ones the first, whatever the last digit.
     return min(tried, key=lambda order: round(sum(map(_travel_m, order, order[1:])), 6))
 
 
-def _nearest_next(
-    number: int, first: FacePasses, ways: Sequence[Sequence[FacePasses]]
-) -> tuple[FacePasses, ...]:
-    order, left = [first], dict(enumerate(ways))
-    del left[number]
-    while left:
-        there = [(_travel_m(order[-1], way), k, way) for k, own in left.items() for way in own]
-        _, nearest, way = min(there, key=lambda one: one[0])
-        order.append(way)
-        del left[nearest]
-    return tuple(order)
-
-
-def _travel_m(before: FacePasses, after: FacePasses) -> float:
-    ends = before.passes[-1].positions_m[-1], after.passes[0].positions_m[0]
+def _travel_m(before: Passes, after: Passes) -> float:
+    ends = before[-1].positions_m[-1], after[0].positions_m[0]
     return float(np.linalg.norm(ends[1] - ends[0]))
 
 
 def join_motions(
-    faces: Sequence[FacePasses], frame_id: str, is_clear: Callable[[Trajectory], bool]
+    faces: Sequence[Passes], frame_id: str, is_clear: Callable[[Trajectory], bool]
 ) -> tuple[Trajectory, tuple[Move, ...]]:
     """The timed motion that sprays one face after the other, and the moves of a robot program.
 
@@ -281,31 +266,23 @@ def join_motions(
     parts: list[Trajectory] = []
     moves: list[Move] = []
     for number, face in enumerate(faces):
-        own = planned_moves(face.passes, face.style)
+        own = planned_moves(face)
         if number:
-            between = _between(moves[-1], own[0], face.style, is_clear)
-            parts.append(timed([moves[-1], *between, own[0]], gun_known=False))
+            before, after, speed = moves[-1], own[0], face[0].style.transfer_speed_m_per_s
+            # Retractions [m]: the first that keeps the gun clear of the part is taken.
+            for retreat_m in (0.1, 0.2, 0.4, 0.8):
+                between = []
+                for move in (before, after):
+                    tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
+                    back_m = move.position_m - retreat_m * tool_z
+                    between.append(Move(back_m, move.quaternion_xyzw, speed, spraying=False))
+                if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
+                    break
+            parts.append(timed([before, *between, after], gun_known=False))
             moves += between
-        parts.append(trajectory_of(face.passes, face.style, frame_id))
+        parts.append(trajectory_of(face, frame_id))
         moves += own
     return _joined(parts, frame_id), tuple(moves)
-
-
-def _between(
-    before: Move, after: Move, style: PassStyle, is_clear: Callable[[Trajectory], bool]
-) -> list[Move]:
-    """Moves from the end of a face to the start of the next, without both."""
-    speed = style.transfer_speed_m_per_s
-    # Retractions between faces [m]: the first that keeps the gun clear of the part is taken.
-    for retreat_m in (0.1, 0.2, 0.4, 0.8):
-        between = []
-        for move in (before, after):
-            tool_z = Rotation.from_quat(move.quaternion_xyzw).as_matrix()[:, 2]
-            back_m = move.position_m - retreat_m * tool_z
-            between.append(Move(back_m, move.quaternion_xyzw, speed, spraying=False))
-        if is_clear(timed([before, *between, replace(after, speed_m_per_s=speed)], False)):
-            break
-    return between
 
 
 def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
@@ -326,15 +303,3 @@ def _joined(parts: Sequence[Trajectory], frame_id: str) -> Trajectory:
         stamps, positions, quaternions, frame_id=frame_id,
         trigger_stamps_ns=switched, trigger_flow=flow, trigger_brush=brush,
     )  # fmt: skip
-
-
-def _reversed(planned: PlannedPass) -> PlannedPass:
-    length = float(planned.along_m[-1])
-    return replace(
-        planned,
-        positions_m=planned.positions_m[::-1],
-        rotations=planned.rotations[::-1],
-        along_m=length - planned.along_m[::-1],
-        on_m=length - planned.off_m,
-        off_m=length - planned.on_m,
-    )

@@ -14,20 +14,15 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
 from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT
-from paint_deposition.planning.planned_film import WantedFilm, evenness
+from paint_deposition.planning.planned_film import Contact, WantedFilm, evenness
 from paint_deposition.planning.programme import STANDING_M, Programme, speed_along, strokes_of
 from paint_deposition.planning.quadratic_program import LIMIT_NAMES
 from paint_deposition.planning.requests import ImproveRequest
 from paint_deposition.planning.retiming import Retiming
 
 DEFAULT_TOLERANCE = 0.1
-# The films of bag and robot program should agree to this share of the peak.
-ALIKE = 2e-3
-# Of an improvement, by their names in improvement.json.
-FIGURES = ('target_um', 'tolerance', 'sigma_n_of_path', 'program_difference', 'sentence')
 
 
 @dataclass(frozen=True)
@@ -132,10 +127,6 @@ class PassChange:
             parts.append(f'flow {self.flow[0]:.3f} → {self.flow[1]:.3f}')
         return f'pass {self.number}: ' + '; '.join(parts)
 
-    def to_dict(self) -> dict[str, Any]:
-        """The figures by name, with the sentence."""
-        return {**asdict(self), 'sentence': self.sentence}
-
 
 @dataclass(frozen=True)
 class Improvement:
@@ -172,10 +163,7 @@ class Improvement:
     @property
     def notes(self) -> tuple[str, ...]:
         """Remarks for the user on what was done unasked."""
-        sprayed, closed = (
-            Programme.of(self.original).openings, self.retiming.original.openings
-        )  # fmt: skip
-        if sprayed == closed:
+        if Programme.of(self.original).openings == self.retiming.original.openings:
             return ()
         return (
             'the programme sprays through turns beside the part; the gun is closed there now '
@@ -183,29 +171,9 @@ class Improvement:
         )
 
     @property
-    def target_region(self) -> np.ndarray:
-        """(V,) bool, vertices whose film counts."""
-        return self.wanted.region
-
-    @property
-    def target_um(self) -> float:
-        """Mean film aimed at [um]."""
-        return self.retiming.target_um
-
-    @property
     def tolerance(self) -> float:
         """Relative difference from the target that counts as good."""
         return self.request.tolerance or DEFAULT_TOLERANCE
-
-    @property
-    def film_um(self) -> np.ndarray:
-        """(V,) of the improved programme [um]."""
-        return self.after.film_um
-
-    @property
-    def whole_part(self) -> FilmStatistics:
-        """Statistics of the improved film on the whole part."""
-        return self.after.whole_part
 
     @cached_property
     def changes(self) -> tuple[PassChange, ...]:
@@ -250,7 +218,8 @@ class Improvement:
         """What may be wrong, a line each with its likely cause."""
         found = [*self.geometry_warnings, *map(str, self.drive.limits if self.drive else ())]
         found += self.wanted.doubts(self.after.statistics)
-        off = self.after.mean_um / self.target_um - 1.0
+        target_um = self.retiming.target_um
+        off = self.after.mean_um / target_um - 1.0
         # A mean film further from the target than this share gives a warning.
         if abs(off) > 0.02:
             thick = off > 0.0
@@ -266,12 +235,13 @@ class Improvement:
                 else 'a lower speed (speed_min_m_per_s) or a greater flow (flow)'
             )
             found.append(
-                f'the mean film is {self.after.mean_um:.1f} µm instead of {self.target_um:.1f}, '
+                f'the mean film is {self.after.mean_um:.1f} µm instead of {target_um:.1f}, '
                 f'bound by {" and ".join(names) or "the path"}; '
                 f'{100 * self.before.within:.0f} → {100 * self.after.within:.0f} % of the area '
                 f'within the tolerance; allow {remedy}'
             )
-        if self.program_difference > ALIKE:
+        # The films of bag and robot program should agree to this share of the peak.
+        if self.program_difference > 2e-3:
             found.append(
                 f'the film of the robot program differs from that of the bag by '
                 f'{100 * self.program_difference:.2f} % of the peak: its moves are too long for '
@@ -285,7 +255,7 @@ class Improvement:
         """The film accepted, in words."""
         if self.wanted.zones:
             return 'the band of its zone'
-        return f'±{100 * self.tolerance:g} % of {self.target_um:.1f} µm'
+        return f'±{100 * self.tolerance:g} % of {self.retiming.target_um:.1f} µm'
 
     @property
     def sentence(self) -> str:
@@ -303,7 +273,7 @@ class Improvement:
         area = self.surface.vertex_areas_m2
         where = ' and a film is wanted' if self.wanted.zones else ''
         return (
-            f'the {float(area[self.target_region].sum()):.2f} of {self.surface.area_m2:.2f} m2 '
+            f'the {float(area[self.wanted.region].sum()):.2f} of {self.surface.area_m2:.2f} m2 '
             f'that the programme paints{where}, by area'
         )
 
@@ -337,12 +307,16 @@ class Improvement:
         }
         films = {'before': self.before, 'after': self.after}
         laid = {when: film.statistics.to_dict().get('zones', []) for when, film in films.items()}
-        region = float(self.surface.vertex_areas_m2[self.target_region].sum())
+        region = float(self.surface.vertex_areas_m2[self.wanted.region].sum())
         return {
             'region': self.region,
             **both,
             'whole_part': {when: film.whole_part.to_dict() for when, film in films.items()},
-            **{name: getattr(self, name) for name in FIGURES},
+            'target_um': self.retiming.target_um,
+            'tolerance': self.tolerance,
+            'sigma_n_of_path': self.sigma_n_of_path,
+            'program_difference': self.program_difference,
+            'sentence': self.sentence,
             'zones': [
                 {'name': before['name'], 'before': before, 'after': after}
                 for before, after in zip(*laid.values(), strict=True)
@@ -353,7 +327,7 @@ class Improvement:
                 {'name': name, 'sigma_n': sigma_n}
                 for name, sigma_n in self.retiming.binding_limits.items()
             ],
-            'passes': [change.to_dict() for change in self.changes],
+            'passes': [{**asdict(one), 'sentence': one.sentence} for one in self.changes],
             'request': self.request.model_dump(),
             'robot': self.drive and self.drive.to_dict(),
             'warnings': list(self.warnings),

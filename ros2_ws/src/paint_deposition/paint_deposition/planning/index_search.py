@@ -14,8 +14,6 @@ from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.requests import IndexRequest
 
-# Passes that differ by less than this share of their peak are taken for the same.
-ALIKE = 1e-9
 # Where a window ends is found to this [m].
 PRECISION_M = 1e-7
 # With effects each pass goes through the integrator: a quarter of the sub-steps and samples is
@@ -42,8 +40,8 @@ def parallel_passes(
     second = sampled_collapse(
         model, speed_m_per_s, backwards=True, turned=request.gun_turns, **options
     )
-    difference = np.abs(second.film_um - first.film_um).max()
-    if difference <= ALIKE * first.film_um.max():
+    # Passes that differ by no more than rounding are the same.
+    if np.abs(second.film_um - first.film_um).max() <= 1e-9 * first.film_um.max():
         return ParallelPasses.one_way(first)
     return ParallelPasses(first, second)
 

@@ -17,18 +17,12 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.errors import PlanError
 from paint_deposition.motion.arm import Arm
 
-# Random starts, and how many of those that reach the first pose are followed.
-STARTS, FOLLOWED = 600, 40
-START_ROUNDS, ROUNDS = 60, 12
+# Steps towards a pose from a pose beside it.
+ROUNDS = 12
 # A pose is reached within this [m and rad].
 REACHED = 1e-5
-# A joint without limits begins within this of zero [rad or m].
-UNLIMITED = np.pi
 # Speeds and accelerations keep this share below the limits where they are looked at.
 MARGIN = 0.03
-# No motion is slowed down to less than this share: the robot stands in a singularity there.
-SLOWEST = 0.01
-
 
 # A configuration (J,) at the first pose, the tool rolled about its axis by so much [rad].
 Start = tuple[np.ndarray, float]
@@ -41,13 +35,14 @@ def starts(
 
     With ``free_roll`` the tool is turned about its own axis by any angle.
     """
-    rng = np.random.default_rng(seed)
-    lower = np.where(np.isfinite(arm.lower), arm.lower, -UNLIMITED)
-    upper = np.where(np.isfinite(arm.upper), arm.upper, UNLIMITED)
-    roll_rad = rng.uniform(-np.pi, np.pi, STARTS) if free_roll else np.zeros(STARTS)
+    rng, count = np.random.default_rng(seed), 600
+    # A joint without limits begins within pi of zero [rad or m].
+    lower = np.where(np.isfinite(arm.lower), arm.lower, -np.pi)
+    upper = np.where(np.isfinite(arm.upper), arm.upper, np.pi)
+    roll_rad = rng.uniform(-np.pi, np.pi, count) if free_roll else np.zeros(count)
     wanted = axes @ Rotation.from_rotvec(np.outer(roll_rad, (0, 0, 1))).as_matrix()
-    joints = rng.uniform(lower, upper, (STARTS, len(arm)))
-    joints, error = towards(arm, joints, position_m, wanted, START_ROUNDS)
+    joints = rng.uniform(lower, upper, (count, len(arm)))
+    joints, error = towards(arm, joints, position_m, wanted, rounds=60)
     middle, half = 0.5 * (lower + upper), 0.5 * (upper - lower)
     turns = np.round((joints - middle) / (2.0 * np.pi))
     joints = np.where(arm.slides, joints, joints - 2.0 * np.pi * turns)
@@ -57,7 +52,7 @@ def starts(
         # Configurations that differ by less are one [rad or m].
         if all(np.abs(joints[row] - other).max() > 0.1 for other, _ in found):
             found.append((joints[row], float(roll_rad[row])))
-    return found[:FOLLOWED]
+    return found[:40]
 
 
 def towards(
@@ -125,6 +120,16 @@ def ways_of(
     return begins, ways, reached
 
 
+def rows_apart(
+    positions_m: np.ndarray, turns: Rotation, step_m: float, step_rad: float
+) -> np.ndarray:
+    """Rows of poses (N,) that lie about so much travel or turn apart, both ends included."""
+    way = np.linalg.norm(np.diff(positions_m, axis=0), axis=1) / step_m
+    way += (turns[:-1].inv() * turns[1:]).magnitude() / step_rad
+    steps = np.floor(np.append(0.0, np.cumsum(way)))
+    return np.union1d(np.flatnonzero(np.diff(steps, prepend=-1.0) > 0.0), len(steps) - 1)
+
+
 def fastest_way(arm: Arm, ways: np.ndarray, reached: np.ndarray, times_s: np.ndarray) -> int:
     """Row of the way, of those that reach all, that is driven the fastest, clear of limits."""
     whole = np.flatnonzero(reached == len(times_s))
@@ -173,6 +178,8 @@ class JointPace:
         (Verscheure et al. 2009), so that the fastest motion is a linear program. A pass keeps one
         share, or its film would be uneven.
         """
+        # No motion is slowed down to less: the robot stands in a singularity there.
+        slowest = 0.01
         count, step = len(self.times_s), self.times_s[1]
         outside = spray_pass < 0
         column = np.where(outside, spray_pass.max() + 1 + np.cumsum(outside), spray_pass)
@@ -199,11 +206,11 @@ class JointPace:
         weights = np.bincount(column, minlength=len(bound)).astype(float)
         solved = linprog(
             -weights, A_ub=vstack(rows).tocsr(), b_ub=np.concatenate(sides),
-            bounds=np.stack([np.full_like(bound, SLOWEST**2), bound], axis=1), method='highs',
+            bounds=np.stack([np.full_like(bound, slowest**2), bound], axis=1), method='highs',
         )  # fmt: skip
         if solved.x is None:
             raise PlanError(
-                f'some joints have less than {100 * SLOWEST:.0f} % of the speed or acceleration '
+                f'some joints have less than {100 * slowest:.0f} % of the speed or acceleration '
                 'that the motion needs; let the part stand elsewhere, paint place shows where'
             )
         return np.sqrt(solved.x)[column]

@@ -16,9 +16,6 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.planning.programme import STANDING_M, Opening, Programme
 from paint_deposition.planning.requests import Limits
 
-# Half the length over which bends of the path and its programmed speed are measured [m].
-BEND_M = 0.02
-STEADY_M = 0.01
 ROBOT, BEND, LEAD, JOINT = 'speed', 'bend', 'lead', 'joint'
 
 
@@ -47,15 +44,6 @@ class Nodes:
     def followed(self) -> np.ndarray:
         """(k,) nodes with a next one in the same opening."""
         return np.flatnonzero(self.opening[1:] == self.opening[:-1])
-
-    @property
-    def weights_m(self) -> np.ndarray:
-        """(n,) length that each node stands for: slowness times this sums to the time."""
-        steps = np.diff(self.travel_m)[self.followed]
-        weights = np.zeros(len(self))
-        np.add.at(weights, self.followed, 0.5 * steps)
-        np.add.at(weights, self.followed + 1, 0.5 * steps)
-        return weights
 
     def rows(self, opening: int) -> slice:
         """The nodes of an opening."""
@@ -107,7 +95,16 @@ def retime(programme: Programme, nodes: Nodes, slowness: np.ndarray, limits: Lim
         duration[inside] = nodes.elapsed_s(number, slowness, end[inside]) - nodes.elapsed_s(
             number, slowness, begin[inside]
         )
-    return replace(whole, duration_s=duration).without_standstill()
+    # Poses that are reached in less than this [s] are left out: the gun stood there and does so no
+    # more.
+    kept = np.append(True, duration > 1e-5)
+    return replace(
+        whole,
+        positions_m=whole.positions_m[kept],
+        quaternions_xyzw=whole.quaternions_xyzw[kept],
+        travel_m=whole.travel_m[kept],
+        duration_s=duration[kept[1:]],
+    )
 
 
 def speed_bounds(
@@ -119,10 +116,12 @@ def speed_bounds(
     and closes, no faster than can be reached from its way there and slowed down on its way on.
     """
     places, at, length = nodes.travel_m, programme.positions_at_m, programme.travel_m[-1]
-    programmed = programme.speed_about(places, BEND_M)
-    inner = np.clip(places, BEND_M, length - BEND_M)
-    bend = at(inner + BEND_M) - 2.0 * at(inner) + at(inner - BEND_M)
-    curvature = np.linalg.norm(bend, axis=1) / BEND_M**2
+    # Half the length over which bends of the path and its programmed speed are measured [m].
+    half = 0.02
+    programmed = programme.speed_about(places, half)
+    inner = np.clip(places, half, length - half)
+    bend = at(inner + half) - 2.0 * at(inner) + at(inner - half)
+    curvature = np.linalg.norm(bend, axis=1) / half**2
     allowed = np.sqrt(limits.acceleration_m_per_s2 / np.maximum(curvature, 1e-9))
     greatest = np.full(len(nodes), limits.speed_max_m_per_s)
     limit = np.full(len(nodes), ROBOT, dtype=object)
@@ -135,26 +134,21 @@ def speed_bounds(
     for number, ends in enumerate(zip(programme.ends_m, programme.around_m, strict=True)):
         rows = nodes.rows(number)
         for end, far, node in zip(*ends, (rows.start, rows.stop - 1), strict=True):
-            fastest = _fastest_m_per_s(programme, end, far, limits)
+            # The closed path beside the opening: a place on it that is much slower sets how fast
+            # the gun can be where it opens or closes.
+            step = 0.01
+            count = math.ceil(abs(far - end) / step)
+            beside = np.linspace(end, far, count + 1)
+            speed = programme.speed_about(beside, step)
+            if count < 2 or speed.min() > 0.8 * speed[0]:
+                continue
+            slow = np.abs(beside - end)[speed <= 1.05 * speed.min()].min()
+            reached = math.sqrt(speed.min() ** 2 + 2.0 * limits.acceleration_m_per_s2 * slow)
+            # What the programme does there itself is possible, whatever is said of acceleration.
+            fastest = max(reached, speed[0])
             if fastest < greatest[node]:
                 greatest[node], limit[node] = fastest, LEAD
     return greatest, limit
-
-
-def _fastest_m_per_s(programme: Programme, end_m: float, far_m: float, limits: Limits) -> float:
-    """How fast the gun can be at an end of its opening, by the closed path up to ``far``."""
-    count = math.ceil(abs(far_m - end_m) / STEADY_M)
-    if count < 2:
-        return math.inf
-    places = np.linspace(end_m, far_m, count + 1)
-    speed = programme.speed_about(places, STEADY_M)
-    # A place much slower than the opening of the gun sets how fast that can be.
-    if speed.min() > 0.8 * speed[0]:
-        return math.inf
-    # What the programme does there itself is possible, whatever acceleration is said to be.
-    slow = np.abs(places - end_m)[speed <= 1.05 * speed.min()].min()
-    reach = 2.0 * limits.acceleration_m_per_s2 * float(slow)
-    return max(math.sqrt(float(speed.min()) ** 2 + reach), float(speed[0]))
 
 
 class FilmAtPoints:

@@ -1,7 +1,7 @@
 """Planned passes: lines over the smoothed surface, the timed motion along them, and its moves."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +14,6 @@ from paint_deposition.planning.surface_map import SurfaceMap
 WAYPOINT_STEP_M = 0.01
 # A robot program takes every so many waypoints: within 1 mm of a curve of 0.25 m radius.
 WAYPOINTS_PER_MOVE = 4
-POSE_RATE_HZ = 250.0
 
 
 @dataclass(frozen=True)
@@ -47,12 +46,8 @@ class PlannedPass:
     # Travel at which the gun opens and closes.
     on_m: float
     off_m: float
-    style: PassStyle  # how it is run
-
-    @property
-    def speed_m_per_s(self) -> float:
-        """While spraying [m/s]."""
-        return self.style.speed_m_per_s
+    speed_m_per_s: float  # of the TCP while spraying [m/s]
+    style: PassStyle  # of all passes of its face
 
     @property
     def sprayed_m(self) -> float:
@@ -61,20 +56,33 @@ class PlannedPass:
 
 
 def plan_pass(
-    surface_map: SurfaceMap, across_m: float, style: PassStyle, backwards: bool = False
+    surface_map: SurfaceMap,
+    across_m: float,
+    style: PassStyle,
+    backwards: bool = False,
+    speed_m_per_s: float | None = None,
 ) -> PlannedPass:
     """The pass along a line: standoff and orientation follow the smoothed surface.
 
-    The tool keeps its orientation about its axis whichever way the pass runs.
+    The tool keeps its orientation about its axis whichever way the pass runs. Its speed is that
+    of its style where none is given.
     """
+    speed = speed_m_per_s or style.speed_m_per_s
     first, last = surface_map.extent_near_m(across_m, style.band_m)
     # From standstill to full speed with the gun off.
     # Travel at full speed before the gun opens and after it closes.
-    lead = style.speed_m_per_s**2 / (2.0 * style.acceleration_m_per_s2) + 0.02
+    lead = speed**2 / (2.0 * style.acceleration_m_per_s2) + 0.02
     beyond = style.overspray_m + lead
     count = max(2, math.ceil((last - first + 2.0 * beyond) / WAYPOINT_STEP_M) + 1)
     line = np.linspace(first - beyond, last + beyond, count)
-    positions, rotations = tool_poses(surface_map, line, np.full(count, across_m), style)
+    across = np.full(count, across_m)
+    tool_z, travel = -surface_map.normals(line, across), surface_map.axes[0]
+    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
+    way /= np.linalg.norm(way, axis=1, keepdims=True)
+    side = np.cross(tool_z, way)
+    cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
+    rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
+    positions = surface_map.places_m(line, across) - style.standoff_m * tool_z
     if backwards:
         line, positions, rotations = line[::-1], positions[::-1], rotations[::-1]
     step = np.linalg.norm(np.diff(positions, axis=0), axis=1)
@@ -83,28 +91,9 @@ def plan_pass(
     order = 1.0 if not backwards else -1.0
     on, off = np.sort(np.interp(order * ends, order * line, along))
     return PlannedPass(
-        float(across_m),
-        np.ascontiguousarray(positions),
-        np.ascontiguousarray(rotations),
-        along,
-        float(on),
-        float(off),
-        style,
-    )
-
-
-def tool_poses(
-    surface_map: SurfaceMap, travel_m: np.ndarray, across_m: np.ndarray, style: PassStyle
-) -> tuple[np.ndarray, np.ndarray]:
-    """TCP (N, 3) [m] and tool axes (N, 3, 3), at the standoff over the smoothed surface."""
-    on_surface = surface_map.places_m(travel_m, across_m)
-    tool_z, travel = -surface_map.normals(travel_m, across_m), surface_map.axes[0]
-    way = travel - (tool_z @ travel)[:, np.newaxis] * tool_z
-    way /= np.linalg.norm(way, axis=1, keepdims=True)
-    side = np.cross(tool_z, way)
-    cos, sin = math.cos(style.travel_rad), math.sin(style.travel_rad)
-    rotations = np.stack([cos * way - sin * side, sin * way + cos * side, tool_z], axis=2)
-    return on_surface - style.standoff_m * tool_z, rotations
+        float(across_m), np.ascontiguousarray(positions), np.ascontiguousarray(rotations), along,
+        float(on), float(off), speed, style,
+    )  # fmt: skip
 
 
 def plan_passes(
@@ -120,10 +109,7 @@ def plan_passes(
 
 
 def trajectory_of(
-    passes: tuple[PlannedPass, ...],
-    style: PassStyle,
-    frame_id: str = '',
-    rate_hz: float = POSE_RATE_HZ,
+    passes: Sequence[PlannedPass], frame_id: str = '', rate_hz: float = 250.0
 ) -> Trajectory:
     """The timed motion: poses at an even rate, and the trigger.
 
@@ -134,11 +120,11 @@ def trajectory_of(
     clock = 0.0
     for number, planned in enumerate(passes):
         if number:
-            between, duration_s = _transfer(clock, passes[number - 1], planned, style, rate_hz)
+            between, duration_s = _transfer(clock, passes[number - 1], planned, rate_hz)
             legs.append(between)
             clock += duration_s
         duration_s, travel_m, reached_s = _ramp(
-            float(planned.along_m[-1]), planned.speed_m_per_s, style
+            float(planned.along_m[-1]), planned.speed_m_per_s, planned.style
         )
         triggers += [clock + reached_s(planned.on_m), clock + reached_s(planned.off_m)]
         times = _sample_times(duration_s, rate_hz)
@@ -154,11 +140,11 @@ def trajectory_of(
         frame_id=frame_id,
         trigger_stamps_ns=np.round(np.array(triggers) * 1e9).astype(np.int64),
         trigger_flow=np.tile([1.0, 0.0], len(passes)),
-        trigger_brush=numbered([style.brush] * (2 * len(passes))),
+        trigger_brush=numbered([planned.style.brush for planned in passes for _ in range(2)]),
     )
 
 
-def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Move]:
+def planned_moves(passes: Sequence[PlannedPass]) -> list[Move]:
     """Straight moves for a robot program: lead-in, waypoints with the gun on, lead-out."""
     moves = []
     for planned in passes:
@@ -167,9 +153,9 @@ def planned_moves(passes: tuple[PlannedPass, ...], style: PassStyle) -> list[Mov
         stops = [0.0, planned.on_m, *between, planned.off_m, float(planned.along_m[-1])]
         positions, quaternions = _poses_at(planned, np.array(stops))
         for k, pose in enumerate(zip(positions, quaternions, strict=True)):
-            speed = planned.speed_m_per_s if k else style.transfer_speed_m_per_s
+            speed = planned.speed_m_per_s if k else planned.style.transfer_speed_m_per_s
             spraying = 2 <= k < len(stops) - 1
-            moves.append(Move(*pose, speed, spraying, brush=style.brush))
+            moves.append(Move(*pose, speed, spraying, brush=planned.style.brush))
     return moves
 
 
@@ -205,7 +191,7 @@ def _ramp(
 
 
 def _transfer(
-    start_s: float, before: PlannedPass, after: PlannedPass, style: PassStyle, rate_hz: float
+    start_s: float, before: PlannedPass, after: PlannedPass, rate_hz: float
 ) -> tuple[tuple[np.ndarray, np.ndarray, np.ndarray], float]:
     """Straight from the end of a pass to the start of the next, turning evenly with the travel.
 
@@ -215,7 +201,7 @@ def _transfer(
     turn = Rotation.from_matrix(np.stack([before.rotations[-1], after.rotations[0]]))
     angle = float((turn[0].inv() * turn[1]).magnitude())
     length = float(np.linalg.norm(end - start))
-    ramp_s, travel_m, _ = _ramp(length, style.transfer_speed_m_per_s, style)
+    ramp_s, travel_m, _ = _ramp(length, after.style.transfer_speed_m_per_s, after.style)
     # Turn of the tool between passes is no faster than this.
     duration = max(ramp_s, angle / math.radians(90.0))
     if duration == 0.0:

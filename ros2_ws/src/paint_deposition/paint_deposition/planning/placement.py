@@ -58,7 +58,7 @@ class LineFilms:
         self.films_um = np.empty((count, len(rows)))
         for k, across in enumerate(self.lines_m):
             line = (plan_pass(surface_map, float(across), style),)
-            motion = trajectory_of(line, style, rate_hz=rate)
+            motion = trajectory_of(line, rate_hz=rate)
             path, _ = spray_path(motion, max_step_m=longest)
             integrator.reset()
             integrator.add(path)

@@ -11,7 +11,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import contacts
 from paint_deposition.planning.driving import RobotCell
 from paint_deposition.planning.index_search import passes_to_cover
 from paint_deposition.planning.passes import (
@@ -32,6 +31,7 @@ from paint_deposition.planning.placement import (
 from paint_deposition.planning.planned_film import (
     PlannedFilm,
     WantedFilm,
+    contacts,
     evenness,
     predicted,
     simulated,
@@ -44,11 +44,7 @@ from paint_deposition.planning.surface_map import SurfaceMap, pass_axes
 
 # Without a range the index is looked for about the one that is best on a plane.
 INDEX_SHARES = (0.75, 1.25)
-TARGET_ROUNDS = 4
 Planned = TypeVar('Planned', bound=PlannedFilm)
-# Of the robot program, as of one that keeps the planned speeds.
-SHORTEST_MOVE_M = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
-QUARTER = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
 
 
 @dataclass(frozen=True, kw_only=True, repr=False)
@@ -153,8 +149,8 @@ def plan(
         index_range = request.index_min_m or low, request.index_max_m or high
     style = _style(model, request, plane)
     films = LineFilms(
-        surface, surface_map, model, style, plane.collapse.finest_m, 0.5 * plane.half_width_m,
-        lambda share: progress('single passes', share),
+        surface, surface_map, model, style, plane.curve.parallel.first.finest_m,
+        0.5 * plane.half_width_m, lambda share: progress('single passes', share),
     )  # fmt: skip
     placement = place_passes(films, ends, index_range, request.tolerance)
     count = passes_to_cover(plane.curve.parallel, plane.index_m, height)
@@ -162,19 +158,20 @@ def plan(
     # Level passes go from the top down, vertical ones from the left to the right.
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     target = None if request.speed_m_per_s else wanted.target_um
-    for round_ in range(TARGET_ROUNDS):
+    rounds = 4
+    for round_ in range(rounds):
         passes = plan_passes(surface_map, lines, style)
         found = predicted(
             surface, model, request, wanted,
-            trajectory_of(passes, style, frame_id), lambda share: progress('film', share),
+            trajectory_of(passes, frame_id), lambda share: progress('film', share),
         )  # fmt: skip
         mean, _ = evenness(found['film_um'][wanted.region], area)
         ratio = mean / target if target else 1.0
-        if abs(ratio - 1.0) <= 2e-3 or round_ == TARGET_ROUNDS - 1:
+        if abs(ratio - 1.0) <= 2e-3 or round_ == rounds - 1:
             break
         style = replace(style, speed_m_per_s=style.speed_m_per_s * ratio)
     return Plan(
-        **found, passes=passes, moves=tuple(planned_moves(passes, style)), style=style,
+        **found, passes=passes, moves=tuple(planned_moves(passes)), style=style,
         placement=placement, plane=plane, plane_on_part=on_part, line_films=films,
     )  # fmt: skip
 
@@ -210,7 +207,9 @@ def optimise(
     """
     request, count = unoptimised.request, len(unoptimised.passes)
     target = unoptimised.wanted.target_um or unoptimised.mean_um
-    wanted_cm3 = target * float(unoptimised.surface.vertex_areas_m2[unoptimised.painted].sum())
+    wanted_cm3 = target * float(
+        unoptimised.surface.vertex_areas_m2[unoptimised.wanted.region].sum()
+    )
     low, high = unoptimised.line_films.surface_map.extent_m[1].tolist()
     least, most = (share * unoptimised.plane.index_m for share in INDEX_SHARES)
     placements = [unoptimised.placement]
@@ -254,10 +253,10 @@ def _timed_plan(
     style = replace(unoptimised.style, speed_m_per_s=1.3 * speed)
     lines = placement.lines_m if request.direction == 'horizontal' else placement.lines_m[::-1]
     passes = tuple(
-        replace(planned, style=replace(style, speed_m_per_s=speed))
+        replace(planned, speed_m_per_s=speed)
         for planned in plan_passes(unoptimised.line_films.surface_map, lines, style)
     )
-    programme = Programme.of(trajectory_of(passes, style, unoptimised.trajectory.frame_id))
+    programme = Programme.of(trajectory_of(passes, unoptimised.trajectory.frame_id))
     start_cm3 = unoptimised.model.planar.K1_cm3_per_s * sum(p.sprayed_m / speed for p in passes)
     zones = unoptimised.wanted.zones
     wanted = request.improvement(
@@ -286,10 +285,19 @@ def driven(planned: Planned, cell: RobotCell) -> Planned:
     Raises:
         PlanError: the robot does not reach all passes.
     """
-    request = planned.request
-    drive = cell.drive(planned.trajectory, _is_round(planned))
+    request, trajectory = planned.request, planned.trajectory
+    quarter = Rotation.from_rotvec([0.0, 0.0, 0.5 * np.pi])
+    turned = (Rotation.from_quat(trajectory.quaternions_xyzw) * quarter).as_quat()
+    film_um, _ = simulated(
+        planned.surface, planned.model, replace(trajectory, quaternions_xyzw=turned)
+    )
+    # It is round if a quarter turn of the tool changes the film by less than 1e-3 of its peak.
+    changed_um = np.abs(film_um - planned.film_um).max()
+    drive = cell.drive(trajectory, bool(changed_um < 1e-3 * planned.film_um.max()))
     found = predicted(planned.surface, planned.model, request, planned.wanted, drive.trajectory)
-    wanted = request.improvement(0.0, request.target_um, move_min_m=SHORTEST_MOVE_M)
+    # The robot program has moves as long as one that keeps the planned speeds.
+    shortest_m = WAYPOINT_STEP_M * WAYPOINTS_PER_MOVE
+    wanted = request.improvement(0.0, request.target_um, move_min_m=shortest_m)
     moves = tuple(moves_of(Programme.of(drive.trajectory), wanted))
     return replace(planned, **found, moves=moves, drive=drive)
 
@@ -309,11 +317,3 @@ def kept_clear(planned: Planned, envelope: GunEnvelope) -> Planned:
             'allow_contact keeps it'
         )
     return replace(planned, contacts=found, envelope=envelope)
-
-
-def _is_round(planned: PlannedFilm) -> bool:
-    turned = Rotation.from_quat(planned.trajectory.quaternions_xyzw) * QUARTER
-    trajectory = replace(planned.trajectory, quaternions_xyzw=turned.as_quat())
-    film_um, _ = simulated(planned.surface, planned.model, trajectory)
-    # It is round if a quarter turn of the tool changes the film by less than 1e-3 of its peak.
-    return bool(np.abs(film_um - planned.film_um).max() < 1e-3 * planned.film_um.max())

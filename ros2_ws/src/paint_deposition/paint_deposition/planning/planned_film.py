@@ -1,14 +1,16 @@
-"""The film that a plan aims at, and the film of a planned motion with its figures."""
+"""The film that a plan aims at, that of a planned motion, and where the gun comes too close."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
+from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
@@ -25,14 +27,10 @@ from paint_deposition.motion.programmed import Move
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
-from paint_deposition.planning.clearance import Contact
 from paint_deposition.planning.driving import Drive
+from paint_deposition.planning.joints import rows_apart
 from paint_deposition.planning.passes import PlannedPass
 from paint_deposition.planning.requests import GunEnvelope, PlanRequest
-
-# A mean film this close to the target is on it; speeds this close to a limit keep it.
-NEAR = 0.01
-
 
 # Some of V points, (V,) bool, the film wanted there [um], and the share of it that is accepted
 # either way; None: any film.
@@ -172,6 +170,72 @@ def predicted(
     }  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Contact:
+    """The part within the envelope for a while."""
+
+    # Since the first pose.
+    begin_s: float
+    end_s: float
+    place_m: np.ndarray  # (3,) of the part that is deepest inside [m]
+    depth_m: float  # how far it is inside [m]
+    by_gun: bool  # whether it meets the gun, not only the cylinder before it
+
+    def __str__(self) -> str:
+        where = ', '.join(f'{value:.3f}' for value in self.place_m)
+        what = 'the gun touches the part' if self.by_gun else 'the part is too near before the gun'
+        return (
+            f'{what} at ({where}) m from {self.begin_s:.1f} to {self.end_s:.1f} s, by '
+            f'{self.depth_m * 1e3:.0f} mm'
+        )
+
+
+def contacts(
+    surface: Surface, trajectory: Trajectory, envelope: GunEnvelope
+) -> tuple[Contact, ...]:
+    """Where the envelope meets the part, by the vertices of its refined mesh.
+
+    What is smaller than an edge of that mesh may be missed by half an edge.
+    """
+    turns = Rotation.from_quat(trajectory.quaternions_xyzw)
+    rows = rows_apart(trajectory.positions_m, turns, 0.01, math.radians(2.0))
+    positions, axes = trajectory.positions_m[rows], turns[rows].as_matrix()[:, :, 2]
+    # The spheres that hold gun and cylinder, about the middle of both.
+    whole_m = envelope.before_m + envelope.length_m
+    near = cKDTree(surface.vertices_m).query_ball_point(
+        positions + (envelope.before_m - 0.5 * whole_m) * axes,
+        math.hypot(envelope.radius_m, 0.5 * whole_m),
+    )
+    seconds = 1e-9 * (trajectory.stamps_ns[rows] - trajectory.stamps_ns[0])
+    found: list[Contact] = []
+    for time_s, position, axis, vertices in zip(seconds, positions, axes, near, strict=True):
+        if not vertices:
+            continue
+        way = surface.vertices_m[vertices] - position
+        along = way @ axis
+        aside = np.linalg.norm(way - along[:, np.newaxis] * axis, axis=1)
+        depth = np.minimum.reduce(
+            [envelope.radius_m - aside, envelope.before_m - along, along + envelope.length_m]
+        )
+        deepest = int(np.argmax(depth))
+        if depth[deepest] <= 0.0:
+            continue
+        by_gun = bool(((depth > 0.0) & (along < 0.0)).any())
+        here = Contact(
+            float(time_s), float(time_s), surface.vertices_m[vertices[deepest]],
+            float(depth[deepest]), by_gun,
+        )  # fmt: skip
+        # Contacts closer together in time than this are one.
+        if found and time_s - found[-1].end_s < 0.5:
+            before = found[-1]
+            deeper = max(before, here, key=lambda contact: contact.depth_m)
+            by_gun = before.by_gun or here.by_gun
+            found[-1] = replace(deeper, begin_s=before.begin_s, end_s=here.end_s, by_gun=by_gun)
+        else:
+            found.append(here)
+    return tuple(found)
+
+
 @dataclass(frozen=True, kw_only=True)
 class PlannedFilm:
     """Passes on a part with the film that the model predicts."""
@@ -194,20 +258,15 @@ class PlannedFilm:
     envelope: GunEnvelope = field(default_factory=GunEnvelope)  # of the gun
 
     @property
-    def painted(self) -> np.ndarray:
-        """(V,) bool, vertices whose film counts."""
-        return self.wanted.region
-
-    @property
     def mean_um(self) -> float:
         """Mean film on the painted part, bare metal included [um]."""
-        area = self.surface.vertex_areas_m2[self.painted]
-        return evenness(self.film_um[self.painted], area)[0]
+        region = self.wanted.region
+        return evenness(self.film_um[region], self.surface.vertex_areas_m2[region])[0]
 
     @property
     def region(self) -> str:
         """Where its figures are taken, in words."""
-        area_m2 = self.surface.vertex_areas_m2[self.painted].sum()
+        area_m2 = self.surface.vertex_areas_m2[self.wanted.region].sum()
         return f'the {area_m2:.2f} of {self.surface.area_m2:.2f} m2 to be painted'
 
     @property
@@ -237,18 +296,20 @@ class PlannedFilm:
     def warnings(self) -> Iterator[str]:
         """Where the plan is not what was asked for, a line each."""
         request, target = self.request, self.request.target_um
+        # A mean film this close to the target is on it; speeds this close to a limit keep it.
+        near = 0.01
         yield from map(str, self.drive.limits if self.drive else ())
         yield from map(str, self.contacts)
         yield from self.wanted.doubts(self.statistics)
         at_speed = request.speed_m_per_s and not self.wanted.zones
-        if target and at_speed and abs(self.mean_um / target - 1.0) > NEAR:
+        if target and at_speed and abs(self.mean_um / target - 1.0) > near:
             yield (
                 f'at the speed given the mean film will be {self.mean_um:.1f} µm, not the target '
                 f'of {target:g} µm; leave out the speed and it is chosen for the target'
             )
         slowest, fastest = min(self.sprayed_speeds_m_per_s), max(self.sprayed_speeds_m_per_s)
         least, most = request.speed_min_m_per_s, request.speed_max_m_per_s
-        outside = slowest < (1.0 - NEAR) * least or fastest > (1.0 + NEAR) * most
+        outside = slowest < (1.0 - near) * least or fastest > (1.0 + near) * most
         if outside and not request.optimise:  # which keeps them
             yield (
                 f'the passes run at {slowest:.3g} to {fastest:.3g} m/s, where {least:g} to '
@@ -271,7 +332,7 @@ class PlannedFilm:
             'whole_part': self.whole_part.to_dict(),
             'paint': paint_figures(self.model, self.paint, self.statistics),
             'gun': self.envelope.model_dump(),
-            'contacts': [contact.to_dict() for contact in self.contacts],
+            'contacts': [{**vars(one), 'place_m': one.place_m.tolist()} for one in self.contacts],
             'warnings': list(self.warnings),
             'robot': self.drive and self.drive.to_dict(),
         }

@@ -25,13 +25,6 @@ from paint_deposition.planning.requests import ImproveRequest
 STANDING_M = 1e-6
 # Stamps begin here: in ROS a stamp of 0 is none.
 BEGIN_NS = 1_000_000_000
-# Moves are straight: the path leaves them by no more than this [m]. A turn of the tool counts by
-# what it does at this lever, the distance of a surface.
-TOLERANCE_M, LEVER_M = 0.0005, 0.3
-# A program's speeds are written in steps of this [m/s].
-SPEED_STEP_M_PER_S = 1e-5
-# The gun is closed so far before a turn and opened so far behind it: their places are estimates.
-TURN_M = 0.02
 
 
 @dataclass(frozen=True)
@@ -161,18 +154,6 @@ class Programme:
             duration_s=np.diff(np.concatenate([clock, seconds])[order]),
         )
 
-    def without_standstill(self) -> 'Programme':
-        """Without poses that are reached in no time: the gun stood there and does so no more."""
-        # The shortest time between two poses that is written [s].
-        kept = np.append(True, self.duration_s > 1e-5)
-        return replace(
-            self,
-            positions_m=self.positions_m[kept],
-            quaternions_xyzw=self.quaternions_xyzw[kept],
-            travel_m=self.travel_m[kept],
-            duration_s=self.duration_s[kept[1:]],
-        )
-
     def trajectory(self) -> Trajectory:
         """The timed motion; the gun opens and closes at poses."""
         whole = self.with_poses_at(self.ends_m.ravel())
@@ -222,6 +203,9 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
     """
     ends_m, _, begins_pass = strokes_of(programme)
     openings = programme.openings
+    # The gun is closed so far before a turn and opened so far behind it: their places are
+    # estimates [m].
+    turn = 0.02
     for begin, end in ends_m[~begins_pass]:
         # Whether a link meets the part is looked at this often along it [m].
         places = np.linspace(begin, end, math.ceil((end - begin) / 0.01) + 2)[1:-1]
@@ -230,7 +214,7 @@ def closed_beside(programme: Programme, surface: Surface) -> Programme:
             pieces = [
                 replace(one, on_m=max(one.on_m, low), off_m=min(one.off_m, high))
                 for one in openings
-                for low, high in ((-math.inf, begin - TURN_M), (end + TURN_M, math.inf))
+                for low, high in ((-math.inf, begin - turn), (end + turn, math.inf))
             ]
             openings = tuple(one for one in pieces if one.off_m - one.on_m > STANDING_M)
     return replace(programme, openings=openings)
@@ -272,11 +256,19 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
     While the gun sprays, each move takes as long as the programme; else it has the programme's
     greatest speed on the way, so that the robot can reach the speed at which the gun opens.
     """
-    ends = programme.ends_m
-    stops = np.concatenate([_stops(programme, k, request) for k in range(len(ends))])
-    whole = programme.with_poses_at(stops)
+    ends, stops = programme.ends_m, []
+    for on_m, off_m in ends:
+        # Moves are neither too short in length nor in time; the speed is sampled so often.
+        places = np.linspace(on_m, off_m, 401)
+        speed = speed_along(programme, places)
+        least = np.maximum(request.move_min_m, speed / request.settings_per_s)
+        count = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])
+        whole_moves = np.linspace(0.0, count[-1], max(2, int(count[-1]) + 1))
+        stops.append(np.interp(whole_moves, count, places))
+    stops_m = np.concatenate(stops)
+    whole = programme.with_poses_at(stops_m)
     clock = whole.clock_s
-    rows = _rows_to_stop_at(whole, stops)
+    rows = _rows_to_stop_at(whole, stops_m)
     speed = np.append(np.diff(whole.travel_m) / whole.duration_s, 0.0)
     moves: list[Move] = []
     for before, row in zip([rows[0], *rows[:-1]], rows, strict=True):
@@ -293,23 +285,12 @@ def moves_of(programme: Programme, request: ImproveRequest) -> list[Move]:
             pace = length / (clock[row] - clock[left])
         else:
             pace = float(speed[before : max(row, before + 1)].max())
-        pace = max(round(pace / SPEED_STEP_M_PER_S) * SPEED_STEP_M_PER_S, 1e-3)
+        pace = max(round(pace / 1e-5) * 1e-5, 1e-3)  # a program's speeds have few digits
         pose = whole.positions_m[row], whole.quaternions_xyzw[row]
         opening = programme.openings[max(number, 0)]
         flow = opening.flow if spraying else 1.0
         moves.append(Move(*pose, pace, spraying, flow=flow, brush=opening.brush))
     return moves
-
-
-def _stops(programme: Programme, number: int, request: ImproveRequest) -> np.ndarray:
-    """Where moves begin and end in an opening: not too close in length, nor in time."""
-    opening = programme.openings[number]
-    # The speed is sampled so often along an opening.
-    places = np.linspace(opening.on_m, opening.off_m, 401)
-    speed = speed_along(programme, places)
-    least = np.maximum(request.move_min_m, speed / request.settings_per_s)
-    moves = np.concatenate([[0.0], np.cumsum(np.diff(places) / least)])
-    return np.interp(np.linspace(0.0, moves[-1], max(2, int(moves[-1]) + 1)), moves, places)
 
 
 def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
@@ -318,10 +299,11 @@ def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
     wanted[[0, -1]] = True
     nearest = np.searchsorted(whole.travel_m, stops_m - STANDING_M)
     wanted[np.minimum(nearest, len(wanted) - 1)] = True
-    axes = Rotation.from_quat(whole.quaternions_xyzw).as_matrix()
-    followed = np.concatenate(
-        [whole.positions_m, LEVER_M * axes[:, :, 0], LEVER_M * axes[:, :, 2]], axis=1
-    )
+    # Moves are straight: the path leaves them by no more than this [m]. A turn of the tool counts
+    # by what it does at this lever, the distance of a surface [m].
+    tolerance, lever = 0.0005, 0.3
+    axes = lever * Rotation.from_quat(whole.quaternions_xyzw).as_matrix()
+    followed = np.concatenate([whole.positions_m, axes[:, :, 0], axes[:, :, 2]], axis=1)
     anchors = np.flatnonzero(wanted)
     spans = list(zip(anchors[:-1].tolist(), anchors[1:].tolist(), strict=True))
     while spans:
@@ -333,7 +315,7 @@ def _rows_to_stop_at(whole: Programme, stops_m: np.ndarray) -> np.ndarray:
         share = (between - followed[first]) @ way / max(float(way @ way), 1e-12)
         nearest = followed[first] + np.outer(np.clip(share, 0.0, 1.0), way)
         off = np.linalg.norm(between - nearest, axis=1)
-        if off.max() > TOLERANCE_M:
+        if off.max() > tolerance:
             middle = first + 1 + int(off.argmax())
             wanted[middle] = True
             spans += [(first, middle), (middle, last)]

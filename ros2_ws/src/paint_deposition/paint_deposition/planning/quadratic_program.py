@@ -18,15 +18,6 @@ from paint_deposition.planning.nodes import BEND, JOINT, LEAD, ROBOT, Nodes
 from paint_deposition.planning.planned_film import Band
 from paint_deposition.planning.requests import ImproveRequest
 
-# Converged when the density changes by less than this share; largest number of rounds.
-SETTLED, ROUNDS = 3e-3, 8
-# Weight of the film's bounds over that of evenness: they are kept where possible.
-BOUND_WEIGHT = 100.0
-# Weight that holds the mean of the best known film at the target. The levels of the
-# other models are free: holding them too would cost evenness.
-LEVEL_WEIGHT = 30.0
-# Additional weight of film outside the tolerance.
-BEYOND_TOLERANCE = 3.0
 LIMIT_NAMES = {
     ROBOT: 'the greatest speed',
     BEND: 'the speed in bends',
@@ -72,11 +63,6 @@ class Problem:
     open_ends: np.ndarray  # (n,) bool, nodes at which the gun may be closed
     left_out: frozenset[str] = frozenset()  # names of limits that are left out
 
-    @property
-    def size(self) -> int:
-        """Number of unknowns: densities, and a flow for each opening."""
-        return len(self.nodes) + len(self.nodes.openings)
-
     def films_um(self, found: Density) -> list[np.ndarray]:
         """(V,) film of each model for a density [um]."""
         return [found.density @ films for films in self.films]
@@ -93,57 +79,56 @@ class Problem:
         )
 
 
-def solve(problem: Problem, start: Density, rounds: int = ROUNDS) -> Density:
+def solve(problem: Problem, start: Density, rounds: int = 8) -> Density:
     """Minimise in ``rounds`` at most; the first tangents are taken at the start.
 
     Raises:
         PlanError: the limits contradict each other; names one of them.
     """
-    now = start
+    count, now = len(problem.nodes), start
+    least, most = problem.request.flow
     for _ in range(rounds):
-        found = _step(problem, now)
+        constraints = names, rows, limit = _constraints(problem, now)
+        matrix, linear = _objective(problem, now)
+        answer = _minimise(matrix, linear, constraints)
+        if answer is None:
+            contradicting = 'the limits'
+            for name in dict.fromkeys(names.tolist()):
+                others = names != name
+                without = names[others], rows[others], limit[others]
+                if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
+                    contradicting = f'{LIMIT_NAMES[name]} with the other limits'
+                    break
+            raise PlanError(f'no motion along this path keeps {contradicting}; allow more')
+        values, multipliers = answer
+        # A multiplier times a density is what its limit costs, in the units of the objective. A
+        # constraint that costs more than this, in units of sigma_n squared, binds.
+        costly = names[multipliers * float(values[:count].mean()) > 1e-6]
+        binding = [name for name in dict.fromkeys(costly.tolist()) if name in LIMIT_NAMES]
+        flow = values[count:]
+        if least >= most:
+            flow = np.array([opening.flow for opening in problem.nodes.openings])
+            binding = [name for name in binding if name != 'flow']
+        found = Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
         change = np.abs(found.density - now.density).max() / np.abs(found.density).max()
         now = found
-        if change < SETTLED:
+        if change < 3e-3:
             break
     return now
-
-
-def _step(problem: Problem, now: Density) -> Density:
-    constraints = _constraints(problem, now)
-    matrix, linear = _objective(problem, now)
-    answer = _minimise(matrix, linear, constraints)
-    if answer is None:
-        raise PlanError(
-            f'no motion along this path keeps {_infeasible_limit(matrix, linear, constraints)}'
-        )
-    values, multipliers = answer
-    count = len(problem.nodes)
-    # A multiplier times a density is what its limit costs, in the units of the objective.
-    costs = multipliers * float(values[:count].mean())
-    # A constraint that costs more than this, in units of sigma_n squared, binds.
-    binding = [
-        name
-        for name in dict.fromkeys(constraints[0][costs > 1e-6].tolist())
-        if name in LIMIT_NAMES
-    ]
-    flow = values[count:]
-    least, most = problem.request.flow
-    if least >= most:
-        flow = np.array([opening.flow for opening in problem.nodes.openings])
-        binding = [name for name in binding if name != 'flow']
-    return Density(np.maximum(values[:count], 0.0), flow, tuple(binding))
 
 
 def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
     """Matrix and vector of x'Mx / 2 + v'x: evenness, hinges, paint, time, smoothness, flows."""
     nodes, request, count = problem.nodes, problem.request, len(problem.nodes)
-    matrix = np.zeros((problem.size, problem.size))
-    linear = np.zeros(problem.size)
+    # The unknowns are densities, and a flow for each opening.
+    size = count + len(nodes.openings)
+    matrix, linear = np.zeros((size, size)), np.zeros(size)
     share = 2.0 / (len(problem.films) * problem.films[0].shape[1])
-    level = problem.films[0].mean(axis=1) / problem.target_um
-    matrix[:count, :count] += 2.0 * LEVEL_WEIGHT * np.outer(level, level)
-    linear[:count] -= 2.0 * LEVEL_WEIGHT * level
+    # The mean of the best known film is held at the target by this weight. The levels of the
+    # other models are free: holding them too would cost evenness.
+    weight, level = 30.0, problem.films[0].mean(axis=1) / problem.target_um
+    matrix[:count, :count] += 2.0 * weight * np.outer(level, level)
+    linear[:count] -= 2.0 * weight * level
     for films in problem.films:
         scaled = films / problem.target_um
         error = now.density @ films / problem.target_um - 1.0
@@ -153,22 +138,26 @@ def _objective(problem: Problem, now: Density) -> tuple[np.ndarray, np.ndarray]:
             some = scaled[:, beyond]
             matrix[:count, :count] += share * weight * some @ some.T
             linear[:count] -= share * weight * (1.0 + edge) * some.sum(axis=1)
-    weights = nodes.weights_m
+    # Length that each node stands for: slowness times this sums to the time [m].
+    pairs = nodes.followed
+    steps_m = nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]
+    weights = np.zeros(count)
+    np.add.at(weights, pairs, 0.5 * steps_m)
+    np.add.at(weights, pairs + 1, 0.5 * steps_m)
     linear[:count] += request.paint_weight * weights / problem.original_s
     flow = now.flow[nodes.opening]
     linear[:count] += request.time_weight * weights / (flow * problem.original_s)
     seconds = np.bincount(nodes.opening, weights * now.density / flow, len(now.flow))
     linear[count:] -= request.time_weight * seconds / (now.flow * problem.original_s)
-    pairs = nodes.followed
     mean = float(weights @ now.density / weights.sum())
-    unit = np.eye(problem.size)
+    unit = np.eye(size)
     slope = (unit[pairs + 1] - unit[pairs]) / mean
     # Smoothness is that of slowness over this length [m].
-    slope *= (0.1 / (nodes.travel_m[pairs + 1] - nodes.travel_m[pairs]))[:, np.newaxis]
+    slope *= (0.1 / steps_m)[:, np.newaxis]
     matrix += 2.0 * request.smoothness / len(pairs) * slope.T @ slope
     # Keeps the problem definite where no film says more, and flows where they are.
     matrix[np.diag_indices(count)] += 1e-9 * matrix.max()
-    matrix[np.arange(count, problem.size), np.arange(count, problem.size)] += 1e-4
+    matrix[np.arange(count, size), np.arange(count, size)] += 1e-4
     linear[count:] -= 1e-4 * now.flow
     return matrix, linear
 
@@ -179,11 +168,12 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
     for points, target, off in problem.bands:
         sides = []
         if off is not None:
-            sides += [(1.0, off, BEYOND_TOLERANCE), (-1.0, -off, BEYOND_TOLERANCE)]
+            sides += [(1.0, off, 3.0), (-1.0, -off, 3.0)]
+        # The film's bounds are kept where possible.
         if request.film_min_um is not None:
-            sides.append((-1.0, request.film_min_um / target - 1.0, BOUND_WEIGHT))
+            sides.append((-1.0, request.film_min_um / target - 1.0, 100.0))
         if request.film_max_um is not None:
-            sides.append((1.0, request.film_max_um / target - 1.0, BOUND_WEIGHT))
+            sides.append((1.0, request.film_max_um / target - 1.0, 100.0))
         found += [
             (points & (side * (error - edge) > 0.0), edge, weight) for side, edge, weight in sides
         ]
@@ -192,7 +182,7 @@ def _hinges(problem: Problem, error: np.ndarray) -> list[tuple[np.ndarray, float
 
 def _constraints(problem: Problem, now: Density) -> Constraints:
     nodes, limits, count = problem.nodes, problem.request, len(problem.nodes)
-    unit = identity(problem.size, format='csr')
+    unit = identity(count + len(nodes.openings), format='csr')
     # At each node: the density, and the flow of its opening.
     y, f, closable = unit[:count], unit[count + nodes.opening], problem.open_ends
     greatest, limited_by = problem.bounds
@@ -250,13 +240,3 @@ def _minimise(
     if answer.status not in (clarabel.SolverStatus.Solved, clarabel.SolverStatus.AlmostSolved):
         return None
     return np.array(answer.x), np.array(answer.z)
-
-
-def _infeasible_limit(matrix: np.ndarray, linear: np.ndarray, constraints: Constraints) -> str:
-    names, rows, limit = constraints
-    for name in dict.fromkeys(names.tolist()):
-        others = names != name
-        without = names[others], rows[others], limit[others]
-        if name in LIMIT_NAMES and _minimise(matrix, linear, without) is not None:
-            return f'{LIMIT_NAMES[name]} with the other limits; allow more'
-    return 'the limits; allow more'

@@ -8,7 +8,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PlanError
-from paint_deposition.model.eq3_collapse import Collapse, half_width_m
+from paint_deposition.model.eq3_collapse import half_width_m
 from paint_deposition.model.eq4_eq5_uniformity import ParallelPasses
 from paint_deposition.planning.index_search import (
     SEARCHED,
@@ -35,10 +35,10 @@ class Recommendation:
         windows_m: index intervals in the range within tolerance.
         minima: all local minima inside the range.
         mean_um: mean film at index and speed.
-        speed_m_per_s: of the passes. target_um: film it was chosen for, or None.
+        speed_m_per_s: of the passes.
         passes, cycle_time_s: for the width asked for, or None. The time runs from the first
             opening of the gun to its last closing, transfers between passes included.
-        width_m, length_m: what they were counted for.
+        length_m: of a pass, that they were counted for.
         curve: sigma_n over the range.
         standoff_m: TCP to plane. request: how the passes run.
         half_width_m: SB50 of one pass.
@@ -56,10 +56,8 @@ class Recommendation:
     minima: tuple[Minimum, ...]
     mean_um: float
     speed_m_per_s: float
-    target_um: float | None
     passes: int | None
     cycle_time_s: float | None
-    width_m: float | None
     length_m: float | None
     curve: IndexCurve
     standoff_m: float
@@ -72,12 +70,7 @@ class Recommendation:
     @property
     def travel(self) -> str:
         """'alternating' or 'one_way'."""
-        return self.request.travel
-
-    @property
-    def collapse(self) -> Collapse:
-        """Film of one pass at the speed."""
-        return self.curve.parallel.first
+        return 'one_way' if self.request.one_way else 'alternating'
 
     @property
     def sentence(self) -> str:
@@ -96,9 +89,10 @@ class Recommendation:
     def to_dict(self) -> dict[str, Any]:
         """The content of ``recommendation.json``."""
         figures = {k: v for k, v in vars(self).items() if k not in ('curve', 'request')}
-        assumed = ('travel', 'gun_turns', 'travel_rad', 'assumption')
+        assumed = ('target_um', 'width_m', 'gun_turns', 'travel_rad', 'assumption')
         return {
             **figures,
+            'travel': self.travel,
             **{name: getattr(self.request, name) for name in assumed},
             'minima': [vars(minimum) for minimum in self.minima],
             'curve': {
@@ -166,10 +160,8 @@ def recommend(model: DepositionModel, request: IndexRequest) -> Recommendation:
         minima=curve.minima,
         mean_um=curve.parallel.mean_um(best.index_m),
         speed_m_per_s=speed,
-        target_um=request.target_um,
         passes=passes,
         cycle_time_s=cycle_time,
-        width_m=request.width_m,
         length_m=length,
         curve=curve,
         standoff_m=standoff,

@@ -92,11 +92,6 @@ class IndexRequest(SpeedLimits, PassRequest):
         return self
 
     @property
-    def travel(self) -> str:
-        """'one_way' or 'alternating'."""
-        return 'one_way' if self.one_way else 'alternating'
-
-    @property
     def assumption(self) -> str:
         """What is assumed about the gun, in words."""
         if self.one_way:

@@ -23,8 +23,6 @@ from paint_deposition.planning.quadratic_program import (
 )
 from paint_deposition.planning.requests import ImproveRequest
 
-# The film of the solution and that of the timed programme agree to this share of the target.
-FILM_AGREEMENT, ROUNDS = 5e-4, 4
 # Rounds of the solver where an approximate solution is enough: triggers, and the cost of limits.
 ROUGH_ROUNDS = 3
 
@@ -104,21 +102,29 @@ class _Search:
         nodes = Nodes.of(openings, self.spacing_m)
         closed = np.zeros(len(nodes), dtype=bool)
         found: Density | None = None
-        for round_ in range(ROUNDS):
-            self.progress('speeds', round_ / ROUNDS)
+        rounds = 4
+        for round_ in range(rounds):
+            self.progress('speeds', round_ / rounds)
             problem, start = self._problem(nodes, found, closed)
             found = solve(problem, start)
             timed = self._timed(nodes, found)
             laid = [one.film_um(timed) for one in self.films]
             expected = problem.films_um(found)
             off = max(float(np.abs(a - b).max()) for a, b in zip(expected, laid, strict=True))
-            if off <= FILM_AGREEMENT * self.target_um:
+            # The film of the solution and that of the timed programme agree.
+            if off <= 5e-4 * self.target_um:
                 break
         assert found is not None
         limits: dict[str, float] = {}
         of_path = now = _sigma_n(laid)
         if explain:
-            limits = self._binding_limits(problem, found, now)
+            for number, name in enumerate(found.binding):
+                self.progress('limits', number / len(found.binding))
+                without = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
+                # A limit is reported if sigma_n would be lower by 2 % without it.
+                if without < 0.98 * now:
+                    limits[LIMIT_NAMES[name]] = without
+            limits = dict(sorted(limits.items(), key=lambda limit: limit[1]))
             free = [_solved_sigma_n(problem.relaxed(), found)]
             if relaxed is not None:
                 free.append(_solved_sigma_n(relaxed.relaxed(), density))
@@ -129,48 +135,30 @@ class _Search:
     def _problem(
         self, nodes: Nodes, density: Density | None, open_ends: np.ndarray
     ) -> tuple[Problem, Density]:
-        """The problem about a density; without one, about even speeds."""
-        original = self.original
-        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, self.request)
-        now = density or self._mean_density(nodes)
-        timed = self._timed(nodes, now)
-        films = [one.of_nodes(timed, nodes, now.density) for one in self.films]
+        """The problem about a density; without one, about the original mean of each opening."""
+        original, request = self.original, self.request
+        bounds = speed_bounds(replace(original, openings=nodes.openings), nodes, request)
         flow = np.array([opening.flow for opening in original.openings])
         seconds = np.diff(original.seconds_at(original.ends_m))[:, 0]
+        if density is None:
+            slowness = np.clip(
+                self.target_over_mean * seconds / np.diff(original.ends_m)[:, 0],
+                1.0 / request.speed_max_m_per_s,
+                1.0 / request.speed_min_m_per_s,
+            )
+            density = Density((flow * slowness)[nodes.opening], flow)
+        timed = self._timed(nodes, density)
+        films = [one.of_nodes(timed, nodes, density.density) for one in self.films]
         sprayed_s = self.target_over_mean * float(flow @ seconds)
         return Problem(
-            films, self.target_um, self.bands, nodes, bounds, self.request, sprayed_s, open_ends
-        ), now
-
-    def _mean_density(self, nodes: Nodes) -> Density:
-        """The original mean density of each opening, scaled for the target."""
-        flow = np.array([opening.flow for opening in nodes.openings])
-        ends, request = self.original.ends_m, self.request
-        seconds = np.diff(self.original.seconds_at(ends))[:, 0]
-        slowness = np.clip(
-            self.target_over_mean * seconds / np.diff(ends)[:, 0],
-            1.0 / request.speed_max_m_per_s,
-            1.0 / request.speed_min_m_per_s,
-        )
-        return Density((flow * slowness)[nodes.opening], flow)
+            films, self.target_um, self.bands, nodes, bounds, request, sprayed_s, open_ends
+        ), density
 
     def _timed(self, nodes: Nodes, density: Density) -> Programme:
         flows = zip(nodes.openings, density.flow.tolist(), strict=True)
         openings = tuple(replace(opening, flow=flow) for opening, flow in flows)
         programme = replace(self.original, openings=openings)
         return retime(programme, nodes, density.slowness(nodes), self.request)
-
-    def _binding_limits(
-        self, problem: Problem, found: Density, sigma_n: float
-    ) -> dict[str, float]:
-        limits: dict[str, float] = {}
-        for number, name in enumerate(found.binding):
-            self.progress('limits', number / len(found.binding))
-            relaxed = _solved_sigma_n(replace(problem, left_out=frozenset({name})), found)
-            # A limit is reported if sigma_n would be lower by 2 % without it.
-            if relaxed < 0.98 * sigma_n:
-                limits[LIMIT_NAMES[name]] = relaxed
-        return dict(sorted(limits.items(), key=lambda limit: limit[1]))
 
 
 def _solved_sigma_n(problem: Problem, start: Density) -> float:

@@ -125,21 +125,17 @@ class SurfaceMap:
         slope_v = (vz * uu - uz * uv) / determinant
         grid_u, grid_v = np.meshgrid(*self._lines, indexing='ij')
         height = mean_z + slope_u * (grid_u - mean_u) + slope_v * (grid_v - mean_v)
-        surface_map = np.bincount(cells, minlength=math.prod(shape)).reshape(shape) > 0
-        return [self._extended(field, surface_map) for field in (height, slope_u, slope_v)]
-
-    def _extended(self, field: np.ndarray, surface_map: np.ndarray) -> np.ndarray:
-        """The field inside the part; outside it what it is at the nearest place inside."""
-        inside = binary_closing(surface_map, iterations=3) | surface_map
+        # Outside the part a field is what it is at the nearest place inside.
+        occupied = np.bincount(cells, minlength=math.prod(shape)).reshape(shape) > 0
+        inside = binary_closing(occupied, iterations=3) | occupied
         nearest = distance_transform_edt(~inside, return_distances=False, return_indices=True)
-        held = field[tuple(nearest)]
-        # The blend from the surface to what stands in for it outside, in radii.
-        deviation = 0.5 * self.radius_m / self._cell_m
-        blended = gaussian_filter(held, deviation, mode='nearest')
+        held = [field[tuple(nearest)] for field in (height, slope_u, slope_v)]
+        # Well inside the fitted plane stands; at the edge it goes over to a blend with what
+        # stands in for it outside.
         near = gaussian_filter(inside.astype(float), deviation, mode='nearest')
-        # Well inside the fitted plane stands; at the edge it goes over to the blend.
         share = np.clip(2.0 * near - 1.0, 0.0, 1.0)
-        return share * held + (1.0 - share) * blended
+        blended = [gaussian_filter(field, deviation, mode='nearest') for field in held]
+        return [share * a + (1.0 - share) * b for a, b in zip(held, blended, strict=True)]
 
 
 def painted_side(surface: Surface, outward: np.ndarray) -> np.ndarray:

@@ -30,18 +30,6 @@ from paint_deposition.report.words import (
 CLEAR = 'rgba(0,0,0,0)'
 # Two of the style's colours, so pale that grid and curves show through.
 PALE_ACCENT, PALE_BEFORE = 'rgba(0,112,140,0.18)', 'rgba(154,165,177,0.25)'
-FONT = 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif'
-AT_VALUE = '%{y:.2f} µm at %{x:.3g}'
-CURVE_POINTS, MOST_COVARIATES = 201, 8
-
-
-def figures_of(data: ReportData) -> list[dict[str, Any]]:
-    """All charts that the page draws, in groups by the name of the element that shows them."""
-    drawn = [
-        parity_figure(data), covariate_figure(data), learned_figure(data), map_figure(data),
-        profile_figure(data), footprint_figure(data),
-    ]  # fmt: skip
-    return [figure for figure in drawn if figure]
 
 
 def _figure(
@@ -65,7 +53,10 @@ def _chart(
     The page sets the title as text, so that it wraps on a narrow one.
     """
     layout = {
-        'font': {'family': FONT, 'size': 12, 'color': INK},
+        'font': {
+            'family': 'Inter, "Segoe UI", "Helvetica Neue", Arial, sans-serif',
+            'size': 12, 'color': INK,
+        },
         'paper_bgcolor': CLEAR, 'plot_bgcolor': CLEAR,
         'margin': {'l': 48, 'r': 12, 't': 8, 'b': 44},
         'showlegend': False,
@@ -138,69 +129,66 @@ def covariate_figure(data: ReportData) -> dict[str, Any] | None:
     reach = 1.1 * max(np.abs(r).max() for r in data.residuals_um)
     later = {d.covariate: d.correlation for d in data.comparisons[-1].dependences}
     charts = []
-    for dependence in dependences[:MOST_COVARIATES]:
+    for dependence in dependences[:8]:
         name = dependence.covariate
-        x_mean, residual_means = _means(values[name], data.residuals_um)
+        x = values[name]
+        # Means of the covariate, and of each model's residual, over sixths of the readings.
+        edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 7)))
+        sixth = np.minimum(np.digitize(x, edges), max(len(edges) - 1, 1))
+        counted = (np.ones(len(x)), x, *data.residuals_um)
+        sums = np.array([np.bincount(sixth, of_point) for of_point in counted])
+        x_mean, *means = sums[1:, sums[0] > 0.0] / sums[0, sums[0] > 0.0]
         traces: list[dict] = []
-        for label, residual, mean, colour in _of_each_model(
-            data, data.residuals_um, residual_means
-        ):
-            hover = f'{AT_VALUE}<extra>{label}</extra>'
+        for label, residual, mean, colour in _of_each_model(data, data.residuals_um, means):
+            hover = '%{y:.2f} µm at %{x:.3g}' + f'<extra>{label}</extra>'
             traces += [
-                _dots(values[name], residual, colour, 4, opacity=0.6, hovertemplate=hover),
+                _dots(x, residual, colour, 4, opacity=0.6, hovertemplate=hover),
                 _line(x_mean, mean, colour, 2.5, hoverinfo='skip'),
             ]
         text = f'ρ {fixed(dependence.correlation, signed=True)}'
         if data.improved and name in later:
             text += f' → {fixed(later[name], signed=True)}'
-        x = _axis(covariate_label(name), nticks=5)
-        y = _axis('residual [µm]', range=[-reach, reach], zeroline=True)
-        charts.append(_chart(f'{text}, {p_words(dependence.p_value)}', traces, x, y, 220))
+        title = f'{text}, {p_words(dependence.p_value)}'
+        y_axis = _axis('residual [µm]', range=[-reach, reach], zeroline=True)
+        x_axis = _axis(covariate_label(name), nticks=5)
+        charts.append(_chart(title, traces, x_axis, y_axis, 220))
     legend = [(name, colour, 'dot') for name, colour in _of_each_model(data)]
     return _figure('covariates', charts, legend)
 
 
-def _means(x: np.ndarray, residuals: list[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-    """Means of the covariate, and of each model's residual, over sixths of the readings."""
-    edges = np.unique(np.quantile(x, np.linspace(0.0, 1.0, 7)))
-    bin_of = np.minimum(np.digitize(x, edges), max(len(edges) - 1, 1))
-    sums = np.array([np.bincount(bin_of, values) for values in (np.ones(len(x)), x, *residuals)])
-    means = sums[1:, sums[0] > 0.0] / sums[0, sums[0] > 0.0]
-    return means[0], means[1:]
-
-
 def learned_figure(data: ReportData) -> dict[str, Any] | None:
-    """Each learned law of the best model over its covariate."""
-    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
-    legend = [('learned', ACCENT, 'bold')]
-    if any(law.sd for law in laws):
-        legend.append(('95 % band', ACCENT, 'band'))
-    return _figure('learned', [_curve_chart(law) for law in laws], legend)
+    """Each learned curve of the best model with its band and its most probable closed form.
 
-
-def _curve_chart(law: LearnedCurve) -> dict[str, Any]:
-    """A curve with its band and its most probable closed form; the readings' range is dotted."""
-    values, factor = np.linspace(law.low, law.high, CURVE_POINTS), law.kind == 'factor'
-    curve = law.factor if factor else law.curve
-    step = (law.high - law.low) / (len(law.learned) - 1)
-    around = np.linspace(law.low - step, law.high + step, CURVE_POINTS)
-    with np.errstate(invalid='ignore', divide='ignore'):  # a distance to an edge has an end
-        around = around[np.isfinite(law.axis(around))]
+    The range of the readings lies between dotted lines.
+    """
+    charts, legend = [], [('learned', ACCENT, 'bold')]
     hover = {'hovertemplate': '%{y:.3g} at %{x:.3g}<extra></extra>'}
-    title, x = capital(effect_name(law.id)), counted_from_1(law, values)
-    traces = [_line(counted_from_1(law, around), curve(around), ACCENT, 2.5, **hover)]
-    if law.sd:
-        half = TWO_SIDED_95 * law.deviation(values)
-        low = np.maximum(curve(values) - half, LEAST_FACTOR if factor else -np.inf)
-        traces.insert(0, _band(x, low, curve(values) + half, PALE_ACCENT))
-    for form in forms_of(law)[:1]:
-        traces.append(_line(x, form(variable_at(law, values)), INK, 1.5, dash='dot', **hover))
-        title += f'; dots: {form.formula} ({percent(form.probability)})'
     end = {'type': 'line', 'yref': 'paper', 'y0': 0, 'y1': 1,
            'line': {'color': MUTED, 'width': 1, 'dash': 'dot'}}  # fmt: skip
-    ends = [end | {'x0': x[k], 'x1': x[k]} for k in (0, -1)]
-    y = _axis('factor' if factor else 'addition [µm]')
-    return _chart(title, traces, _axis(covariate_label(law.covariate)), y, 300, shapes=ends)
+    laws = [effect for effect in data.model.effects if isinstance(effect, LearnedCurve)]
+    for law in laws:
+        values, factor = np.linspace(law.low, law.high, 201), law.kind == 'factor'
+        curve = law.factor if factor else law.curve
+        step = (law.high - law.low) / (len(law.learned) - 1)
+        around = np.linspace(law.low - step, law.high + step, 201)
+        with np.errstate(invalid='ignore', divide='ignore'):  # a distance to an edge has an end
+            around = around[np.isfinite(law.axis(around))]
+        title, x = capital(effect_name(law.id)), counted_from_1(law, values)
+        traces = [_line(counted_from_1(law, around), curve(around), ACCENT, 2.5, **hover)]
+        if law.sd:
+            half = TWO_SIDED_95 * law.deviation(values)
+            low = np.maximum(curve(values) - half, LEAST_FACTOR if factor else -np.inf)
+            traces.insert(0, _band(x, low, curve(values) + half, PALE_ACCENT))
+        for form in forms_of(law)[:1]:
+            traces.append(_line(x, form(variable_at(law, values)), INK, 1.5, dash='dot', **hover))
+            title += f'; dots: {form.formula} ({percent(form.probability)})'
+        ends = [end | {'x0': x[k], 'x1': x[k]} for k in (0, -1)]
+        x_axis = _axis(covariate_label(law.covariate))
+        y_axis = _axis('factor' if factor else 'addition [µm]')
+        charts.append(_chart(title, traces, x_axis, y_axis, 300, shapes=ends))
+    if any(law.sd for law in laws):
+        legend.append(('95 % band', ACCENT, 'band'))
+    return _figure('learned', charts, legend)
 
 
 def map_figure(data: ReportData) -> dict[str, Any] | None:

@@ -1,15 +1,17 @@
-"""Figures and arrays that the report shows, computed once from the inference's results."""
+"""What the report shows, computed once from the results, and the rows of its tables."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
-from itertools import pairwise
-from typing import Any, NamedTuple
+from itertools import pairwise, product
+from typing import Any
 
 import numpy as np
 
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, LearnedMap
 from paint_deposition.film.common_film import sum_um
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import wanted_at
@@ -17,25 +19,24 @@ from paint_deposition.inference.comparison.comparison import Comparison, SideByS
 from paint_deposition.inference.comparison.profiles import Profile, profiles_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
+from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.inference.readings.readings import root_mean_square
-from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS
+from paint_deposition.report import words
+from paint_deposition.report.style import ACCENT, BEFORE, INK, MODELS, TWO_SIDED_95
 
-
-class Change(NamedTuple):
-    """Most negative, most positive (or 0) and RMS difference of two predictions [um]."""
-
-    least_um: float
-    most_um: float
-    rms_um: float
-
-
-class PredictedFilm(NamedTuple):
-    """The layer of a part that was measured, with one model."""
-
-    film_um: np.ndarray  # (V,) on the surface [um]
-    emitted_cm3: float  # solids that a part which catches everything would get [cm3]
+# What a parameter of the pattern is called: symbol, meaning, unit.
+SYMBOLS = {
+    'K1_cm3_per_s': ('K1', 'deposited solids rate', 'cm³/s'),
+    'K2': ('K2', 'weight of the centred Gaussian', ''),
+    'K3': ('K3', 'asymmetry of the ring', ''),
+    'phi_rad': ('φ', 'phase of the asymmetry', 'rad'),
+    'r_m': ('r', 'radius of the ring', 'mm'),
+    'sigma1_m': ('σ1', 'width of the ring', 'mm'),
+    'sigma2_m': ('σ2', 'width of the centred Gaussian', 'mm'),
+}
 
 
 @dataclass(frozen=True)
@@ -85,11 +86,6 @@ class ReportData:
         return bands
 
     @property
-    def notes(self) -> tuple[str, ...]:
-        """Remarks for the user."""
-        return self.diagnosis.notes if self.diagnosis else self.study.notes
-
-    @property
     def models(self) -> tuple[DepositionModel, ...]:
         """Base first, best last."""
         return tuple(comparison.model for comparison in self.comparisons)
@@ -98,12 +94,6 @@ class ReportData:
     def model(self) -> DepositionModel:
         """The best model."""
         return self.models[-1]
-
-    @property
-    def best(self) -> str:
-        """Of models side by side the one with the smallest error."""
-        errors = [comparison.points.rmse_um for comparison in self.comparisons]
-        return self.names[int(np.argmin(errors))]
 
     @property
     def improved(self) -> bool:
@@ -137,26 +127,23 @@ class ReportData:
         """What to measure and what to spray next."""
         return self.diagnosis.proposals if self.diagnosis else ((), ())
 
-    @property
-    def history(self) -> list[dict[str, Any]]:
-        """History of the model, oldest step first, as in its file."""
-        if self.diagnosis is None:
-            return []
-        return history_as_list(self.study, self.diagnosis.history, self.older)
-
     @cached_property
-    def changes(self) -> dict[str, Change]:
+    def changes(self) -> dict[str, dict[str, float]]:
         """What each effect that was added changes in the prediction at the points, by id.
 
-        The model with it and the model without it are each fitted to all readings: what the
-        pattern can imitate counts as no change.
+        It is told by the most negative, the most positive (or 0) and the RMS difference [um]. The
+        model with it and the model without it are each fitted to all readings: what the pattern
+        can imitate counts as no change.
         """
         steps = self.diagnosis.history if self.diagnosis else ()
         off = {s.added: s.fit.predicted_um - b.fit.predicted_um for b, s in pairwise(steps)}
         return {
-            added: Change(min(um.min(), 0.0), max(um.max(), 0.0), root_mean_square(um))
+            added: {
+                'least_um': min(um.min(), 0.0), 'most_um': max(um.max(), 0.0),
+                'rms_um': root_mean_square(um),
+            }
             for added, um in off.items()
-        }
+        }  # fmt: skip
 
     def effect_class(self, effect_id: str) -> type[Effect] | None:
         """An effect that was looked for or is in the models; None if it is neither."""
@@ -173,34 +160,31 @@ class ReportData:
         """Along columns and rows."""
         return profiles_of(self.study, self.models)
 
-    @property
-    def lined(self) -> bool:
-        """Whether the readings lie in columns or rows, along which models can be drawn."""
-        return all(len(profile.line_m) for profile in self.profiles)
-
     def rows_of(self, index: int) -> slice:
         """Points of the study that belong to an experiment."""
         first, stop = np.searchsorted(self.study.campaign.experiment_of, [index, index + 1])
         return slice(int(first), int(stop))
 
     @cached_property
-    def painted(self) -> list[list[PredictedFilm]]:
-        """The surface painted: for each experiment, with each model."""
-        return [[_painted(one, model) for model in self.models] for one in self.experiments]
+    def painted(self) -> list[list[tuple[np.ndarray, float]]]:
+        """The layer that was measured: for each experiment, with each model.
 
-
-def _painted(experiment: Experiment, model: DepositionModel) -> PredictedFilm:
-    surface, acting = experiment.surface, model.without(experiment.switched_off)
-    points = surface.points()
-    films = []
-    for sign, rows in experiment.films:
-        film = FilmIntegrator(points, acting, 'double', surface.occluder)
-        film.add(experiment.path.select(rows))
-        films.append((sign, film))
-    return PredictedFilm(
-        sum_um((sign, film.film_um) for sign, film in films),
-        sum(sign * film.emitted_cm3 for sign, film in films),
-    )
+        It is the film (V,) on the surface [um], and the solids that a part which catches
+        everything would get [cm3].
+        """
+        found = []
+        for one in self.experiments:
+            points, of_part = one.surface.points(), []
+            for model in self.models:
+                acting, films = model.without(one.switched_off), []
+                for sign, rows in one.films:
+                    film = FilmIntegrator(points, acting, 'double', one.surface.occluder)
+                    film.add(one.path.select(rows))
+                    films.append((sign, film))
+                film_um = sum_um((sign, film.film_um) for sign, film in films)
+                of_part.append((film_um, sum(sign * film.emitted_cm3 for sign, film in films)))
+            found.append(of_part)
+        return found
 
 
 def history_as_list(
@@ -234,3 +218,136 @@ def history_as_list(
     else:
         found[0]['added'] = 'refit' if kept or steps[0].model.effects else 'pattern'
     return [*kept, *found]
+
+
+# --- rows of the tables: the sentences around them are the template's
+
+
+def class_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Candidate causes with the effects they are confounded with, and parameters."""
+    rows = []
+    for found in data.diagnosis.classes if data.diagnosis else ():
+        effect = data.effect_class(found.best)
+        like = [member for member in found.members if member != found.best]
+        parameters = [
+            _parameter(effect, name, *astuple(value)) for name, value in found.parameters.items()
+        ]
+        rows.append({
+            'id': found.best, 'found': found, 'name': words.effect_name(found.best),
+            'learned': words.is_learned(found.best),
+            'like': like, 'others': [words.effect_name(member) for member in like],
+            'accepted': data.diagnosis is not None and found.best in data.diagnosis.accepted,
+            'meaning': words.effect_meaning(effect),
+            'signature': effect.signature if effect else '',
+            'parameters': parameters + _learned(data.model.effect(found.best)),
+        })  # fmt: skip
+    return rows
+
+
+def _parameter(effect: type[Effect] | None, name: str, *values: float) -> dict[str, str]:
+    """A parameter in words: its value, and the ends of its 95 % interval if there is one."""
+    unit = effect.parameters()[name]['unit'] if effect else ''
+    # A value below this share of its interval is printed as none.
+    if abs(values[0]) < 1e-4 * np.ptp(values):
+        values = (0.0, *values[1:])
+    printed = zip(('unit', 'value', 'low', 'high'), words.in_unit(unit, *values), strict=False)
+    return {'words': words.parameter_words(name, unit)} | dict(printed)
+
+
+def _learned(effect: Effect | None) -> list[dict[str, str]]:
+    """The curve and the range of a learned law; nothing for other effects."""
+    if not isinstance(effect, LearnedLaw):
+        return []
+    keys = ('words', 'value', 'unit')
+    return [dict(zip(keys, row, strict=True)) for row in words.learned_words(effect)]
+
+
+def law_rows(data: ReportData) -> list[dict[str, str]]:
+    """Learned laws of the best model: where each holds, and how well a curve is known."""
+    rows = []
+    for law in data.model.effects:
+        row = {'name': words.effect_name(law.id), 'best': ''}
+        if isinstance(law, LearnedMap):
+            rows.append(row | {'kind': 'map'})
+        elif isinstance(law, LearnedFootprint):
+            rows.append(row | {'kind': 'footprint', 'ends': words.number(1e3 * law.reach_m)})
+        elif isinstance(law, LearnedCurve):
+            _, ends, unit = words.learned_words(law)[1]
+            row |= {'kind': 'curve', 'ends': ends, 'unit': unit}
+            if law.sd:  # where the band of the curve is narrow, and where it is wide
+                at = np.linspace(law.low, law.high, 101)
+                half, shown = TWO_SIDED_95 * law.deviation(at), words.counted_from_1(law, at)
+                of_half = ' µm' if law.kind == 'addition' else ''
+                best, least = (
+                    f'± {words.number(half[k], 2)}{of_half} at {words.number(shown[k])} '
+                    f'{words.unit_words(law.unit)}'.rstrip()
+                    for k in (half.argmin(), half.argmax())
+                )
+                row |= {'best': best, 'least': least, 'forms': words.form_words(law)}
+            rows.append(row)
+    return rows
+
+
+def pattern_rows(data: ReportData) -> list[dict[str, str]]:
+    """The pattern's parameters; with 95 % intervals where the model was fitted."""
+    fitted = estimates(data.diagnosis.history[-1].fit) if data.diagnosis else ()
+    found = {estimate.name: estimate for estimate in fitted}
+    brushes, rows = data.model.brushes, []
+    of = [f'brush {brush.number}: ' if len(brushes) > 1 else '' for brush in brushes] or ['']
+    for (whose, planar), name in product(zip(of, data.model.patterns, strict=True), PATTERN_NAMES):
+        symbol, meaning, unit = SYMBOLS[name]
+        factor = 1e3 if unit == 'mm' else 1.0
+        value = words.number(factor * getattr(planar, name), 4)
+        row = {'symbol': symbol, 'words': whose + meaning, 'unit': unit, 'value': value}
+        if name in found:
+            ends = (words.number(factor * end) for end in (found[name].low, found[name].high))
+            row['interval'] = ' to '.join(ends)
+        rows.append(row)
+    return rows
+
+
+def effect_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Effects in the best model, what each does to the film, and its parameters."""
+    known = {c.best: c.parameters for c in data.diagnosis.classes} if data.diagnosis else {}
+    rows = []
+    for effect in data.model.effects:
+        found = known.get(effect.id, {})
+        parameters = _learned(effect)
+        for name in effect.parameters():
+            values = astuple(found[name]) if name in found else [getattr(effect, name)]
+            parameters.append(_parameter(type(effect), name, *values))
+        change = data.changes.get(effect.id)
+        rows.append({'id': effect.id, 'change': change, 'parameters': parameters})
+    return rows
+
+
+def blind_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Effects that these readings could not show, and what would have been seen of others."""
+    diagnosis, rows = data.diagnosis, []
+    if diagnosis is None:
+        return []
+    for effect_id in dict.fromkeys((*diagnosis.not_testable, *diagnosis.detectable)):
+        if effect_id in diagnosis.accepted:
+            continue
+        effect, seen = data.effect_class(effect_id), diagnosis.detectable.get(effect_id, {})
+        amplitudes = [
+            {
+                'words': words.parameter_words(name, info['unit']),
+                'least': _size(seen.get(name), info['unit']),
+                'usual': _size(info['typical'], info['unit']),
+            }
+            for name, info in (effect.parameters() if effect else {}).items()
+            if info['role'] == 'amplitude'
+        ]
+        rows.append({
+            'id': effect_id, 'testable': effect_id not in diagnosis.not_testable,
+            'amplitudes': amplitudes, 'meaning': words.effect_meaning(effect),
+        })  # fmt: skip
+    return rows
+
+
+def _size(value: float | None, unit: str) -> str:
+    if value is None or not np.isfinite(value):
+        return ''
+    shown_unit, size = words.in_unit(unit, abs(value))
+    return f'{size} {shown_unit}'.strip()

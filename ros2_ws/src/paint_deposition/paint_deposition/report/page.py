@@ -1,6 +1,7 @@
 """Pages: the report, and that of `paint demo`, each one HTML file that needs no network."""
 
 import json
+import re
 from base64 import b64encode
 from collections.abc import Callable, Mapping
 from datetime import datetime
@@ -18,25 +19,31 @@ from paint_deposition.files.atomic import plain, write_text
 from paint_deposition.files.version import git_version
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
-from paint_deposition.film.statistics import CPK_MEANS
+from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
 from paint_deposition.inference.diagnosis.model_space import SURE
 from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import FilmSummary, Improvement
-from paint_deposition.report import tables, words
-from paint_deposition.report.charts import figures_of
-from paint_deposition.report.data import ReportData
+from paint_deposition.report import charts, words
+from paint_deposition.report.data import (
+    ReportData,
+    blind_rows,
+    class_rows,
+    effect_rows,
+    history_as_list,
+    law_rows,
+    pattern_rows,
+)
 from paint_deposition.report.pictures.film import page_film
 from paint_deposition.report.pictures.part import PartPicture
 from paint_deposition.report.pictures.planning import improved_figures
 from paint_deposition.report.pictures.readings import (
     part_figures,
     profile_figures,
-    profile_legend,
     residual_figures,
 )
-from paint_deposition.report.style import DOTS_PER_INCH
+from paint_deposition.report.style import DOTS_PER_INCH, TWO_SIDED_95
 
 TEMPLATES = Path(__file__).parent / 'templates'
 # A figure of a page: label, before or '', after, unit or remark.
@@ -45,11 +52,12 @@ FILTERS: dict[str, Callable[..., Any]] = {
     'um': words.fixed,
     'signed': lambda value: words.fixed(value, signed=True),
     'whole': lambda value: words.fixed(value, 0),
-    'micrometres': words.micrometres,
+    'micrometres': lambda value, signed=False: f'{words.fixed(value, signed=signed)} µm',
     'p': words.p_words,
     'percent': percent,
     'probability': words.probability_words,
-    'in_print': words.in_print,
+    # Plain text with its units as they are printed.
+    'in_print': lambda text: re.sub(r'(\d)-(\d)', r'\1–\2', text.replace(' um', ' µm')),
     'effect': words.effect_name,
     'capital': words.capital,
     'joined': words.joined,
@@ -61,19 +69,19 @@ FILTERS: dict[str, Callable[..., Any]] = {
 }
 
 
-def write_report(path: Path, data: ReportData) -> Path:
-    """Write the report as one HTML file, whole or not at all."""
-    write_text(path, report_html(data))
-    return path
-
-
 def report_html(data: ReportData) -> str:
-    """The page as text."""
+    """The report as one page."""
     from plotly.offline import get_plotlyjs
 
-    figures = figures_of(data)
+    drawn = [
+        charts.parity_figure(data), charts.covariate_figure(data), charts.learned_figure(data),
+        charts.map_figure(data), charts.profile_figure(data), charts.footprint_figure(data),
+    ]  # fmt: skip
+    figures = [figure for figure in drawn if figure]
     content = json.dumps(plain(figures), separators=(',', ':'), allow_nan=False)
-    films, git = tables.film_rows(data), git_version()
+    films, git, diagnosis = film_rows(data), git_version(), data.diagnosis
+    profiles, profile_legend = profile_figures(data)
+    later = {(m.experiment, m.kind, m.label): m for m in data.comparisons[-1].misfits}
     zone_films = {row['name']: row['film'].zones for row in films}
     return _filled(
         'report.html.j2',
@@ -83,20 +91,26 @@ def report_html(data: ReportData) -> str:
         film=films,
         zones=[(z, zone_films[z.experiment][z.name]) for z in data.comparisons[-1].zones],
         cpk=CPK_MEANS,
-        points=tables.point_rows(data),
-        effects=tables.effect_rows(data),
-        pattern=tables.pattern_rows(data),
-        learned=tables.law_rows(data),
-        blind=tables.blind_rows(data),
-        misfits=tables.misfit_rows(data),
+        points=point_rows(data),
+        effects=effect_rows(data),
+        pattern=pattern_rows(data),
+        learned=law_rows(data),
+        blind=blind_rows(data),
+        misfits=[
+            {'before': m, 'after': later.get((m.experiment, m.kind, m.label), m)}
+            for m in data.comparisons[0].misfits
+        ],
+        history=history_as_list(data.study, diagnosis.history, data.older) if diagnosis else [],
+        notes=(diagnosis or data.study).notes,
+        lined=all(len(profile.line_m) for profile in data.profiles),
         places=data.proposals[0],
         made=datetime.now().astimezone().strftime('%Y-%m-%d %H:%M %Z'),
         version=f'{__version__} ({git})' if git else __version__,
         figures=[figure['name'] for figure in figures],
         content=content.replace('<', '\\u003c'),  # it stands inside a script element
         parts=[[*map(_embedded, part_figures(data, k))] for k in range(len(data.experiments))],
-        profiles=list(map(_embedded, profile_figures(data))),
-        profile_legend=profile_legend(data),
+        profiles=list(map(_embedded, profiles)),
+        profile_legend=profile_legend,
         script=(TEMPLATES / 'report.js').read_text(encoding='utf-8'),
         plotly=get_plotlyjs(),
     )
@@ -140,6 +154,55 @@ def write_story(
     return path
 
 
+def film_rows(data: ReportData) -> list[dict[str, Any]]:
+    """For each part its readings, and its film as the best model predicts it."""
+    rows = []
+    for k, experiment in enumerate(data.experiments):
+        of_part, (film_um, emitted_cm3) = data.rows_of(k), data.painted[k][-1]
+        bands = [band for band in data.bands[of_part] if band]
+        target_um, tolerance_um = data.study.campaign.target_of(experiment)
+        film = film_statistics(
+            film_um, experiment.surface.vertex_areas_m2, emitted_cm3,
+            target_um=target_um, target_tolerance_um=tolerance_um, zones=experiment.zones,
+        )  # fmt: skip
+        rows.append({
+            'name': experiment.name, 'measured': data.study.measured_um[of_part], 'film': film,
+            'areas': {
+                'low': film.below_target, 'in': film.within_target, 'high': film.above_target,
+            },
+            # Shares of the points that are low, in and high; empty without a target.
+            'bands': {b: bands.count(b) / len(bands) for b in ('low', 'in', 'high') if bands},
+        })  # fmt: skip
+    return rows
+
+
+def point_rows(data: ReportData) -> list[dict[str, Any]]:
+    """Each measured point: where, measured, predicted, deviation, and whether that is right.
+
+    The model is right where the deviation is within what gauge and texture scatter by in 95 % of
+    readings; the film is right in the target band.
+    """
+    found = data.comparisons[-1].points
+    scatter_um = TWO_SIDED_95 * found.sigma_um
+    rows: list[dict[str, Any]] = []
+    for k, experiment in enumerate(data.experiments):
+        labels, groups = experiment.readings.point[experiment.means.first], experiment.groups
+        places = 1e3 * experiment.measured_points.positions_m
+        for row, point, group, place in zip(
+            range(*data.rows_of(k).indices(len(data.study))), labels, groups, places, strict=True
+        ):
+            residual = found.residual_um[row]
+            rows.append({
+                'part': experiment.name, 'point': str(point), 'group': str(group),
+                **dict(zip(('x_mm', 'y_mm', 'z_mm'), place, strict=True)),
+                'measured_um': found.measured_um[row], 'predicted_um': found.predicted_um[row],
+                'deviation_um': residual, 'scatter_um': scatter_um[row],
+                'model': 'OK' if abs(residual) <= scatter_um[row] else 'off',
+                'film': data.bands[row],
+            })  # fmt: skip
+    return rows
+
+
 def _filled(name: str, **given: Any) -> str:
     """A page from its template, in the style that all pages share."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -162,7 +225,7 @@ def _embedded(figure: Figure) -> str:
 
 def _verdict(data: ReportData) -> dict[str, Any]:
     """What ``templates/verdict.j2`` puts into words for the engineer who runs the process."""
-    diagnosis, rows = data.diagnosis, tables.class_rows(data)
+    diagnosis, rows = data.diagnosis, class_rows(data)
     added = [row for row in rows if row['accepted']]
     kind = 'side_by_side' if data.names else 'compared'
     if diagnosis:
@@ -175,6 +238,7 @@ def _verdict(data: ReportData) -> dict[str, Any]:
         kind = 'asked_for' if asked else diagnosis.verdict
     points, freedom = data.comparisons[-1].points, min(data.study.noise.degrees_of_freedom, 1e6)
     history = diagnosis.history if diagnosis else (None,)
+    errors = dict(zip(data.names, (c.points.rmse_um for c in data.comparisons), strict=False))
     return {
         'data': data, 'd': diagnosis, 'kind': kind, 'counts': words.count_words(data.study),
         'classes': rows, 'added': added, 'open': [row for row in rows if not row['accepted']],
@@ -182,6 +246,7 @@ def _verdict(data: ReportData) -> dict[str, Any]:
         'laws': [row for row in added if row['learned']],
         'first': history[0], 'last': history[-1], 'steps': list(pairwise(history)),
         'least': min((row['found'].probability for row in added), default=1.0),
+        'best': min(errors, key=lambda name: errors[name], default=''),
         'sprays': data.proposals[1], 'SURE': SURE, 'ALPHA': ALPHA,
         # Deviations so large come from the gauge alone in 1 % of cases.
         'beyond_chance': fdtrc(len(points), freedom, points.chi_square_per_reading) < 0.01,

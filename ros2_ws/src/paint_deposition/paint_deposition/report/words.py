@@ -189,11 +189,6 @@ def fixed(value: float, digits: int = 2, signed: bool = False) -> str:
     return minus(text if float(text) else text.lstrip('+-'))
 
 
-def micrometres(value: float, signed: bool = False) -> str:
-    """'2.31 µm'; with a sign if wanted."""
-    return f'{fixed(value, signed=signed)} µm'
-
-
 def in_unit(unit: str, *values: float) -> tuple[str, ...]:
     """Unit and values as they are printed; m and s as mm and ms if the first value is small."""
     if unit in ('m', 's') and abs(values[0]) < 1.0:
@@ -211,11 +206,6 @@ def unit_words(unit: str) -> str:
 def p_words(p_value: float) -> str:
     """'p < 0.001' or 'p = 0.02'."""
     return 'p < 0.001' if p_value < 1e-3 else f'p = {p_value:.2g}'
-
-
-def in_print(text: str) -> str:
-    """Plain text with its units as they are printed."""
-    return re.sub(r'(\d)-(\d)', r'\1–\2', text.replace(' um', ' µm'))
 
 
 def count_words(study: Study) -> str:

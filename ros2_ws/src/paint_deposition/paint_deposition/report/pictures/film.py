@@ -31,9 +31,6 @@ from paint_deposition.report.style import (
     quiet,
 )
 
-BESIDE_IN, AROUND_IN, LEAST_HEIGHT_IN = 3.1, 1.0, 3.4
-NO_TARGET = GRID
-
 
 def film_picture(
     surface: Surface,
@@ -51,16 +48,30 @@ def film_picture(
     """
     part = PartPicture.of(surface)
     low, high = part.window(spray)
-    # The part's share of the picture, and the column beside it [in].
+    # The part's share of the picture, the column beside it, and the room around both [in].
     width, height = (high - low) * min(7.6 / (high - low))
+    beside, around = 3.1, 1.0
     rows = 2 if statistics.has_target else 1
-    figure = new_figure(
-        width + BESIDE_IN + AROUND_IN, rows * (max(height, LEAST_HEIGHT_IN) + AROUND_IN)
-    )
-    grid = figure.add_gridspec(rows, 2, width_ratios=[width, BESIDE_IN])
+    figure = new_figure(width + beside + around, rows * (max(height, 3.4) + around))
+    grid = figure.add_gridspec(rows, 2, width_ratios=[width, beside])
     axes = [figure.add_subplot(grid[row, 0]) for row in range(rows)]
     scale = draw_film(axes[-1], surface, film_um, spray, statistics.painted_above_um, part)
-    _draw_legend(axes[-1], grid[rows - 1, 1], scale, film_um, statistics)
+    bar = figure.colorbar(colours_of(scale), ax=axes[-1], aspect=25, pad=0.02)
+    bar.set_label('film [µm]', color=MUTED)
+    bar.ax.tick_params(colors=MUTED, labelsize=9)
+    bar.ax.spines['outline'].set_visible(False)
+    s, figures = statistics, figure.add_subplot(grid[rows - 1, 1])
+    figures.set_axis_off()
+    if np.any(film_um <= s.painted_above_um):
+        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
+        _draw_patches(figures, [(colour, f'up to {s.painted_above_um:g} µm')])
+    _write(
+        figures,
+        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
+        f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
+        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
+        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
+    )
     if rows == 2:
         _draw_band(axes[0], part, film_um, spray, statistics, zones)
         _draw_band_legend(figure, grid[0, 1], surface, film_um, statistics, zones)
@@ -132,7 +143,7 @@ def _draw_band(
             if end > ends[-1]:
                 ends.append(end)
                 colours.append(colour)
-        colours.append(HIGH if wanted.target_um else NO_TARGET)
+        colours.append(HIGH if wanted.target_um else GRID)
         part.draw_bands(axes, film_um, ends, colours, shares[number] if below else None)
     part.draw_zones(axes, zones, spray)
     draw_tool_path(axes, spray, part.view, low, high)
@@ -157,7 +168,7 @@ def _draw_band_legend(
         (BELOW, f'{100 * s.below_target:.1f} % low, below {limits[0]}'),
     ] + [(BARE, f'bare, up to {s.painted_above_um:g} µm')] * (s.coverage < 1.0)
     if zones and not s.target_um and (zones.number < 0).any():
-        entries.append((NO_TARGET, 'no target'))
+        entries.append((GRID, 'no target'))
     title = (
         f'target {s.target_um:g} ± {s.target_tolerance_um:g} µm\n'
         f'of the painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²'
@@ -219,28 +230,6 @@ def _draw_histogram(
         axes.axvline(limit, color=MUTED, linewidth=0.9, linestyle='--')
 
 
-def _draw_legend(
-    axes: Axes, place: SubplotSpec, scale: ColourScale, film_um: np.ndarray, s: FilmStatistics
-) -> None:
-    """The bar of the colours, and the figures beside it."""
-    bar = axes.figure.colorbar(colours_of(scale), ax=axes, aspect=25, pad=0.02)
-    bar.set_label('film [µm]', color=MUTED)
-    bar.ax.tick_params(colors=MUTED, labelsize=9)
-    bar.ax.spines['outline'].set_visible(False)
-    beside = axes.figure.add_subplot(place)
-    beside.set_axis_off()
-    if np.any(film_um <= s.painted_above_um):
-        colour = '#{:02x}{:02x}{:02x}'.format(*BARE_RGB)
-        _draw_patches(beside, [(colour, f'up to {s.painted_above_um:g} µm')])
-    _write(
-        beside,
-        f'mean {s.mean_um:.1f} ± {s.std_dev_um:.1f} µm\n'
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm\n'
-        f'painted {100 * s.coverage:.1f} % of {s.area_m2:.2f} m²\n'
-        f'{s.painted_volume_cm3:.1f} of {s.emitted_volume_cm3:.1f} cm³ on the part',
-    )
-
-
 def draw_tool_path(
     axes: Axes, spray: SprayPath, view: View, low: np.ndarray, high: np.ndarray
 ) -> None:
@@ -263,24 +252,20 @@ def draw_tool_path(
         shown = line[np.all((line > low + room) & (line < high - room), axis=1)]
         if len(shown) < 2:
             continue
-        _draw_arrows(axes, shown, (high - low).max() / 3.0)
+        # Arrow heads along the pass, in its direction.
+        along = np.cumsum(np.linalg.norm(np.diff(shown, axis=0), axis=1))
+        count = max(1, round(along[-1] / ((high - low).max() / 3.0)))
+        for middle in along[-1] * (np.arange(count) + 0.5) / count:
+            row = 1 + int(np.searchsorted(along, middle))
+            right, up = shown[row] - shown[row - 1]
+            turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
+            axes.plot(
+                *shown[row], marker=MarkerStyle('^', transform=turn), markersize=9,
+                markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
+            )  # fmt: skip
         if number not in drawn:
             drawn.add(number)
             axes.annotate(
                 str(number), shown[0], fontsize=8.5, color='white', ha='center', va='center',
                 bbox={'boxstyle': 'circle,pad=0.25', 'facecolor': INK, 'edgecolor': 'white'},
             )  # fmt: skip
-
-
-def _draw_arrows(axes: Axes, line: np.ndarray, every_m: float) -> None:
-    """Arrow heads along a line, in its direction."""
-    along = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    count = max(1, round(along[-1] / every_m))
-    for middle in along[-1] * (np.arange(count) + 0.5) / count:
-        row = max(1, int(np.searchsorted(along, middle)))
-        right, up = line[row] - line[row - 1]
-        turn = Affine2D().rotate(float(np.arctan2(up, right)) - 0.5 * np.pi)
-        axes.plot(
-            *line[row], marker=MarkerStyle('^', transform=turn), markersize=9,
-            markerfacecolor='white', markeredgecolor=INK, markeredgewidth=0.9,
-        )  # fmt: skip

@@ -50,7 +50,16 @@ def write_geometry_picture(
         axes.set_title(name, loc='left', fontsize=10, color=MUTED)
     key = figure.add_subplot(grid[1, 1])
     key.set_axis_off()
-    key.legend(handles=_key(), loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
+    lines = [
+        Line2D([], [], color=PASS_COLOURS[0], linewidth=1.8, label='gun on, a colour a pass'),
+        Line2D([], [], color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)), label='gun off'),
+        Line2D(
+            [], [], color=PASS_COLOURS[0], linewidth=0.9, marker='.', markersize=4,
+            markerfacecolor=INK, label='tool z from the TCP (the dot is its tip)',
+        ),
+        Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
+    ]  # fmt: skip
+    key.legend(handles=lines, loc='upper left', frameon=False, fontsize=9, labelcolor=INK)
     text = '\n'.join(fill(f'warning: {line}', 48) for line in geometry.warnings)
     key.text(0.0, 0.0, text, fontsize=9, color='#c0392b', transform=key.transAxes)
     figure.suptitle(f'{title}\n{geometry.sentence}', x=0.02, ha='left', fontsize=11, color=INK)
@@ -121,15 +130,3 @@ def _draw_part(axes: Axes, view: View, surface: Surface, size_m: float) -> None:
             color=INK,
         )  # fmt: skip
     axes.update_datalim(flat)
-
-
-def _key() -> list[Line2D]:
-    return [
-        Line2D([], [], color=PASS_COLOURS[0], linewidth=1.8, label='gun on, a colour a pass'),
-        Line2D([], [], color=MUTED, linewidth=0.8, linestyle=(0, (3, 3)), label='gun off'),
-        Line2D(
-            [], [], color=PASS_COLOURS[0], linewidth=0.9, marker='.', markersize=4,
-            markerfacecolor=INK, label='tool z from the TCP (the dot is its tip)',
-        ),
-        Line2D([], [], color=PART_COLOUR, linewidth=6, label='the part'),
-    ]  # fmt: skip

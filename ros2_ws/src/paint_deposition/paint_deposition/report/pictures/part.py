@@ -21,15 +21,11 @@ from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 from paint_deposition.report.style import INK, MUTED, PAGE_IN, TEXT_PT, new_figure
 
-# A part of more triangles is drawn with vertices this share of its size apart, two pixels.
-MOST_FACES, CELL = 200_000, 1 / 500
 PALE_HALO = [Stroke(linewidth=2.2, foreground='white', alpha=0.7), Normal()]
 # Where a label of a point may stand [pt], the best place first.
 AROUND_POINT = 9.0 * np.array(
     [(1, 1), (1, -1), (-1, 1), (-1, -1), (1.2, 0), (-1.2, 0), (0, 1.2), (0, -1.2)]
 )
-# Rounds of smoothing of a zone's border, over neighbours; a label is so much wider than high.
-SMOOTHINGS, LABEL_SHAPE = 3, np.array([5.0, 1.0])
 HALO = [Stroke(linewidth=3.4, foreground=INK), Normal()]
 # A view this close to an axis of the mesh is along it and has the mesh's coordinates.
 SNAP_COSINE = 0.9
@@ -98,8 +94,9 @@ class PartPicture:
         flat = view.flat(surface.vertices_m)
         front = face_normals(surface.vertices_m, surface.faces) @ view.toward > 0.0
         front = surface.faces[front]
-        if len(front) > MOST_FACES:
-            front = coarse_faces(surface.vertices_m, front, CELL * np.ptp(flat, axis=0).max())
+        # A part of very many triangles is drawn with vertices two pixels apart.
+        if len(front) > 200_000:
+            front = coarse_faces(surface.vertices_m, front, np.ptp(flat, axis=0).max() / 500)
         faces = front[np.argsort((surface.vertices_m @ view.toward)[front].sum(axis=1))]
         # Whether a triangle is hidden is seen from a place so far above it [m].
         above = surface.vertices_m[faces].mean(axis=1) + 1e-3 * view.toward
@@ -178,7 +175,7 @@ class PartPicture:
         shares = {}
         for number in np.unique(zones.number[seen]).tolist():
             share = (zones.number == number).astype(float)
-            for _ in range(SMOOTHINGS):
+            for _ in range(3):  # over neighbours
                 of_face = np.repeat(share[seen].mean(axis=1), 3)
                 total = np.bincount(seen.ravel(), of_face, len(self.flat_m))
                 share = np.divide(total, corners, out=share, where=corners > 0)
@@ -199,7 +196,8 @@ class PartPicture:
             if not own.any():
                 continue
             obstacles = np.concatenate([passes, middles[~own], self.edges_m.mean(axis=1)])
-            away, _ = cKDTree(obstacles / LABEL_SHAPE).query(middles[own] / LABEL_SHAPE)
+            shape = np.array([5.0, 1.0])  # a label is so much wider than high
+            away, _ = cKDTree(obstacles / shape).query(middles[own] / shape)
             zone = zones.zones.zones[number]
             axes.annotate(
                 f'{zone.name}  {zone.target_um:g} ± {zone.tolerance_um:g} µm',

@@ -35,13 +35,9 @@ from paint_deposition.report.style import (
     save_picture,
 )
 
-PERCENT = 100.0
-POINTS = 600
 CHOSEN = '#c0392b'
-# The colours span the films but for this share at either end.
-SHOWN = 0.99
-FILM_IN, CHART_IN, AROUND_IN = (6.2, 6.0), (3.0, 1.9), (1.8, 2.4)
-PART_IN, BARS_IN, ROW_IN = 9.0, 4.3, 0.26
+# The longer side of a part with its points [in].
+PART_IN = 9.0
 
 
 def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
@@ -49,16 +45,34 @@ def write_uniformity(path: str | Path, recommendation: Recommendation) -> Path:
     figure = new_figure(11.0, 4.4)
     left, right = figure.subplots(1, 2, width_ratios=[1.15, 1.0])
     draw_curve(left, recommendation)
-    draw_passes(right, recommendation)
+    index_m, mean_um = recommendation.index_m, recommendation.mean_um
+    quiet(
+        right, 'across the passes [mm]', 'film [µm]',
+        f'Passes at {MM * index_m:.0f} mm and {recommendation.speed_m_per_s:.3g} m/s, eq. (4)',
+    )  # fmt: skip
+    parallel = recommendation.curve.parallel
+    x = np.linspace(-1.5 * index_m, 1.5 * index_m, 600)
+    for number in range(-4, 5):
+        one = parallel.second if number % 2 else parallel.first
+        film = one.thickness_um(x - number * index_m)
+        if film.max() > 1e-3 * mean_um:
+            label = None if number else 'single pass'
+            right.plot(MM * x, film, color=MUTED, linewidth=1.0, alpha=0.8, label=label)
+    total, mean = parallel.thickness_um(index_m, x), f'mean {mean_um:.1f} µm'
+    right.plot(MM * x, total, color=ACCENT, linewidth=1.8, label='sum of passes')
+    right.axhline(mean_um, color=INK, linewidth=0.9, linestyle='--', label=mean)
+    right.set_xlim(MM * x[0], MM * x[-1])
+    right.set_ylim(0.0, 1.25 * float(total.max()))
+    legend(right, loc='upper right', ncols=3)
     return save_picture(figure, path)
 
 
 def draw_curve(axes: Axes, answer: Recommendation) -> None:
     """Draw sigma_n over the index with its minima, the tolerance and the recommended index."""
     quiet(axes, 'index [mm]', r'$\sigma_N$ [%]', 'Evenness over the index, eq. (5)')
-    top = 1.08 * PERCENT * float(answer.curve.sigma_n.max())
+    top = 1.08 * 100.0 * float(answer.curve.sigma_n.max())
     if answer.tolerance is not None:
-        tolerance = PERCENT * answer.tolerance
+        tolerance = 100.0 * answer.tolerance
         if tolerance < top:
             axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
             axes.annotate(
@@ -68,15 +82,13 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
             )  # fmt: skip
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
-    axes.plot(
-        MM * answer.curve.index_m, PERCENT * answer.curve.sigma_n, color=ACCENT, linewidth=1.8
-    )
+    axes.plot(MM * answer.curve.index_m, 100.0 * answer.curve.sigma_n, color=ACCENT, linewidth=1.8)
     for minimum in answer.minima:
         axes.plot(
-            MM * minimum.index_m, PERCENT * minimum.sigma_n, 'o', markersize=5,
+            MM * minimum.index_m, 100.0 * minimum.sigma_n, 'o', markersize=5,
             markerfacecolor='white', markeredgecolor=ACCENT, markeredgewidth=1.5,
         )  # fmt: skip
-    chosen = MM * answer.index_m, PERCENT * answer.sigma_n
+    chosen = MM * answer.index_m, 100.0 * answer.sigma_n
     axes.plot(*chosen, 'o', color=CHOSEN, markersize=7)
     axes.annotate(
         f'{chosen[0]:.0f} mm\n{chosen[1]:.2g} %', chosen, (chosen[0], chosen[1] + 0.2 * top),
@@ -87,33 +99,6 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
     axes.set_ylim(0.0, top)
 
 
-def draw_passes(axes: Axes, answer: Recommendation) -> None:
-    """Draw the film of passes at the recommended index, each alone and all together."""
-    quiet(
-        axes, 'across the passes [mm]', 'film [µm]',
-        f'Passes at {MM * answer.index_m:.0f} mm and {answer.speed_m_per_s:.3g} m/s, eq. (4)',
-    )  # fmt: skip
-    parallel, index = answer.curve.parallel, answer.index_m
-    x = np.linspace(-1.5 * index, 1.5 * index, POINTS)
-    for number in range(-4, 5):
-        one = parallel.second if number % 2 else parallel.first
-        film = one.thickness_um(x - number * index)
-        if film.max() > 1e-3 * answer.mean_um:
-            axes.plot(
-                MM * x, film, color=MUTED, linewidth=1.0, alpha=0.8,
-                label='single pass' if number == 0 else None,
-            )  # fmt: skip
-    total = parallel.thickness_um(index, x)
-    axes.plot(MM * x, total, color=ACCENT, linewidth=1.8, label='sum of passes')
-    axes.axhline(
-        answer.mean_um, color=INK, linewidth=0.9, linestyle='--',
-        label=f'mean {answer.mean_um:.1f} µm',
-    )  # fmt: skip
-    axes.set_xlim(MM * x[0], MM * x[-1])
-    axes.set_ylim(0.0, 1.25 * float(total.max()))
-    legend(axes, loc='upper right', ncols=3)
-
-
 def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     """Draw the film before and after in one scale; below, the speeds along the passes."""
     part = PartPicture.of(result.surface)
@@ -121,9 +106,10 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     passes = result.changes[:12]
     columns = min(len(passes), 4)
     rows = math.ceil(len(passes) / columns)
-    width, height = (high - low) * min(np.array(FILM_IN) / (high - low))
-    above, below = height + AROUND_IN[1], rows * CHART_IN[1]
-    figure = new_figure(max(2.0 * width + AROUND_IN[0], 10.0), above + below)
+    # Of each film, with the room around it, and of the charts below [in].
+    width, height = (high - low) * min(np.array([6.2, 6.0]) / (high - low))
+    above, below = height + 2.4, rows * 1.9
+    figure = new_figure(max(2.0 * width + 1.8, 10.0), above + below)
     top, bottom = figure.subfigures(2, 1, height_ratios=[above, below])
     axes = top.subplots(1, 2, sharex=True, sharey=True)
     scale = _scale(result)
@@ -176,9 +162,9 @@ def _window(part: PartPicture, result: Improvement) -> tuple[np.ndarray, np.ndar
 def _scale(result: Improvement) -> ColourScale:
     """Colours for all but the most extreme film of both, between round figures."""
     films = np.concatenate(
-        [one.film_um[result.target_region] for one in (result.before, result.after)]
+        [one.film_um[result.wanted.region] for one in (result.before, result.after)]
     )
-    return film_scale(np.quantile(films, [1.0 - SHOWN, SHOWN]))
+    return film_scale(np.quantile(films, [0.01, 0.99]))
 
 
 def _title(name: str, laid: FilmSummary) -> str:
@@ -245,11 +231,23 @@ def write_measuring_picture(path: str | Path, chosen: ChosenReadings) -> Path:
     """Draw the part with its numbered points, and how surely each effect would be found."""
     part = PartPicture.of(chosen.surface)
     width, height = PART_IN * (part.high_m - part.low_m) / (part.high_m - part.low_m).max()
-    rows = ROW_IN * len(chosen.power) + 1.2
-    figure = new_figure(width + BARS_IN + 0.8, max(height + 1.2, rows, 4.0))
-    grid = GridSpec(1, 2, figure, width_ratios=[width, BARS_IN])
+    bars = 4.3, 0.26 * len(chosen.power) + 1.2
+    figure = new_figure(width + bars[0] + 0.8, max(height + 1.2, bars[1], 4.0))
+    grid = GridSpec(1, 2, figure, width_ratios=[width, bars[0]])
     draw_points(figure.add_subplot(grid[0]), chosen, part)
-    _draw_power(figure.add_subplot(grid[1]), chosen)
+    # A bar an effect, and what a grid of as many points would give.
+    axes, names = figure.add_subplot(grid[1]), sorted(chosen.power, key=chosen.power.__getitem__)
+    quiet(axes, 'probability of detection at the typical size [%]', '', size=9.0)
+    rows = np.arange(len(names))
+    axes.barh(rows, [100 * chosen.power[n] for n in names], 0.6, color=ACCENT, label='these')
+    axes.plot(
+        [100 * chosen.grid_power[n] for n in names], rows, '|', color=INK, markersize=11,
+        markeredgewidth=2, label=f'{len(chosen)} on a grid',
+    )  # fmt: skip
+    axes.axvline(5.0, color=BEFORE, linewidth=0.9, linestyle='--')
+    axes.set_yticks(rows, names, fontsize=8.5, color=MUTED)
+    axes.set(xlim=(0, 101), ylim=(-0.7, len(names) - 0.3))
+    legend(axes, loc='lower right')
     return save_picture(figure, path)
 
 
@@ -276,19 +274,3 @@ def draw_points(axes: Axes, chosen: ChosenReadings, part: PartPicture | None = N
         color=INK, pad=24,
     )  # fmt: skip
     legend(axes, loc='lower left', bbox_to_anchor=(0.0, 1.0), ncols=2, borderaxespad=0.1)
-
-
-def _draw_power(axes: Axes, chosen: ChosenReadings) -> None:
-    """A bar an effect, and what a grid of as many points would give."""
-    names = sorted(chosen.power, key=lambda name: chosen.power[name])
-    quiet(axes, 'probability of detection at the typical size [%]', '', size=9.0)
-    rows = np.arange(len(names))
-    axes.barh(rows, [100 * chosen.power[n] for n in names], 0.6, color=ACCENT, label='these')
-    axes.plot(
-        [100 * chosen.grid_power[n] for n in names], rows, '|', color=INK, markersize=11,
-        markeredgewidth=2, label=f'{len(chosen)} on a grid',
-    )  # fmt: skip
-    axes.axvline(5.0, color=BEFORE, linewidth=0.9, linestyle='--')
-    axes.set_yticks(rows, names, fontsize=8.5, color=MUTED)
-    axes.set(xlim=(0, 101), ylim=(-0.7, len(names) - 0.3))
-    legend(axes, loc='lower right')

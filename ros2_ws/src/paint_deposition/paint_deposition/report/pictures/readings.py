@@ -33,10 +33,9 @@ from paint_deposition.report.style import (
 )
 
 AnyFigure = TypeVar('AnyFigure', bound=FigureBase)
-# A profile's two charts with the room around them, as shares of it, and that of the legend [in].
-PROFILE_IN, LEGEND_IN = (PAGE_IN, 3.0), 0.4
+# A profile's two charts with the room around them [in].
+PROFILE_IN = PAGE_IN, 3.0
 LINE_POINTS = 600
-PROFILE_ROOM = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
 
 
 def part_figures(data: ReportData, index: int) -> list[Figure]:
@@ -45,7 +44,7 @@ def part_figures(data: ReportData, index: int) -> list[Figure]:
     Readings are dots; the film has the passes and the numbered places to measure next.
     """
     experiment, part = data.experiments[index], PartPicture.of(data.experiments[index].surface)
-    film_um = data.painted[index][-1].film_um
+    film_um, _ = data.painted[index][-1]
     title = f'film predicted, {data.model_names[-1]}'
     film, axes = page_film(part, film_um, experiment.path, title, film_scale(film_um))
     places = {
@@ -95,7 +94,7 @@ def comparison_figure(data: ReportData) -> Figure:
     if count < 5:
         columns = count if count < 4 else 2
     rows = -(-count // columns)
-    heights_in = (LEGEND_IN, rows * PROFILE_IN[1])
+    heights_in = (0.4, rows * PROFILE_IN[1])
     figure = _free_figure(columns * PROFILE_IN[0], sum(heights_in))
     above, below = figure.subfigures(2, 1, height_ratios=heights_in)
     places = below.subfigures(rows, columns, squeeze=False).ravel()
@@ -106,9 +105,13 @@ def comparison_figure(data: ReportData) -> Figure:
     return figure
 
 
-def profile_figures(data: ReportData) -> list[Figure]:
-    """A picture of each column or row, without a legend."""
-    return [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+def profile_figures(data: ReportData) -> tuple[list[Figure], list[tuple[str, str, str]]]:
+    """A picture of each column or row; and words, colour and kind of mark of their legend."""
+    drawn = [_draw_profile(_free_figure(*PROFILE_IN), data, one) for one in data.profiles]
+    kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
+    models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
+    measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
+    return drawn, [measured, *models, ('each pass alone', BEFORE, 'dots')]
 
 
 def _free_figure(width_in: float, height_in: float) -> Figure:
@@ -118,22 +121,22 @@ def _free_figure(width_in: float, height_in: float) -> Figure:
     return figure
 
 
-def profile_legend(data: ReportData) -> list[tuple[str, str, str]]:
-    """Words, colour and kind of mark of what the profiles show."""
-    kinds = ('bold' if line['width'] > 2.0 else 'line' for line in data.lines)
-    models = zip(data.model_names, (line['color'] for line in data.lines), kinds, strict=True)
-    measured = ('measured, bars: 95 % gauge and texture', INK, 'dot')
-    return [measured, *models, ('each pass alone', BEFORE, 'dots')]
-
-
 def _draw_profile(place: AnyFigure, data: ReportData, profile: Profile) -> AnyFigure:
     """Draw a column or row on the scale of all."""
-    film, residual = place.subplots(
-        2, 1, sharex=True, height_ratios=(3, 1), gridspec_kw=PROFILE_ROOM
-    )
+    room = {'left': 0.15, 'right': 0.98, 'bottom': 0.15, 'top': 0.92, 'hspace': 0.1}
+    film, residual = place.subplots(2, 1, sharex=True, height_ratios=(3, 1), gridspec_kw=room)
     _draw_film(film, data, profile)
-    _draw_residual(residual, data, profile)
-    bars_um = TWO_SIDED_95 * data.study.sigma_um
+    # Measured minus predicted, of the last model with the gauge's noise.
+    quiet(residual, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
+    at_mm, bars_um = MM * profile.position_m, TWO_SIDED_95 * data.study.sigma_um
+    for k, colour in enumerate(data.colours):
+        last = k == len(data.models) - 1
+        residual.errorbar(
+            at_mm, data.residuals_um[k][profile.rows],
+            bars_um[profile.rows] if last else np.zeros(len(at_mm)),
+            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=colour,
+        )  # fmt: skip
+    residual.axhline(0.0, color=MUTED, lw=0.8)
     tops_um = [(data.study.measured_um + bars_um).max()]
     tops_um += [np.nanmax(one.lines_um) for one in data.profiles if one.lines_um.size]
     film.set(xlabel='', ylim=(0.0, 1.05 * max(tops_um)))
@@ -169,20 +172,6 @@ def _draw_film(axes: Axes, data: ReportData, profile: Profile) -> None:
     for number, single in enumerate(profile.passes_um):
         label = '' if number else 'each pass alone'
         axes.plot(line_mm, single, ':', color=BEFORE, lw=1.0, label=label)
-
-
-def _draw_residual(axes: Axes, data: ReportData, profile: Profile) -> None:
-    """Draw measured minus predicted, of the last model with the gauge's noise."""
-    quiet(axes, f'{profile.axis} [mm]', 'residual [µm]', size=TEXT_PT)
-    at_mm, last = MM * profile.position_m, len(data.models) - 1
-    bars_um = TWO_SIDED_95 * data.study.sigma_um[profile.rows]
-    for k, colour in enumerate(data.colours):
-        axes.errorbar(
-            at_mm, data.residuals_um[k][profile.rows],
-            bars_um if k == last else np.zeros(len(at_mm)),
-            fmt='o-', ms=2.5, lw=0.8, elinewidth=0.7, color=colour,
-        )  # fmt: skip
-    axes.axhline(0.0, color=MUTED, lw=0.8)
 
 
 def write_calibration_pictures(

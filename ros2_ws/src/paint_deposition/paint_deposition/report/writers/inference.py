@@ -1,7 +1,7 @@
 """What readings say of a model on disk: figures, residuals, models, effect files, the report."""
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,7 @@ from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.report.data import ReportData, history_as_list
-from paint_deposition.report.page import write_report
+from paint_deposition.report.page import report_html
 from paint_deposition.report.pictures.readings import (
     comparison_figure,
     write_calibration_pictures,
@@ -58,7 +58,6 @@ VARIABLES = {
 }
 # An amplitude may become so many times as far from neutral, a shape so many times as long.
 ROOM = 10.0
-TEMPLATE = Path(__file__).parent / 'templates' / 'effect.py.j2'
 
 
 @written.register
@@ -120,25 +119,20 @@ def _write_results(
     residuals = residuals or {'residuals.csv': data.comparisons[-1]}
     write_json(folder / name, figures | _provenance(data.study, models or data.model))
     for file, comparison in residuals.items():
-        write_table(folder / file, _residual_rows(comparison))
-    return [
-        *(folder / file for file in (name, *residuals)),
-        save_picture(comparison_figure(data), folder / f'comparison.{pictures}'),
-        write_report(folder / 'report.html', data),
-    ]
-
-
-def _residual_rows(comparison: Comparison) -> Iterator[Sequence[str]]:
-    """A heading and a row a reading; those that were left out are without a prediction."""
-    columns = comparison.columns()
-    yield [*columns]
-    for row in zip(*columns.values(), strict=True):
-        told = dict(zip(columns, row, strict=True))
-        for name in ('x_m', 'y_m', 'z_m'):
-            told[name] = f'{told[name]:.5f}'
-        for name in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
-            told[name] = '' if np.isnan(told[name]) else f'{told[name]:.3f}'
-        yield [*map(str, (told | {'used': int(told['used'])}).values())]
+        columns = comparison.columns()
+        rows = [[*columns]]
+        # A row a reading; those that were left out are without a prediction.
+        for row in zip(*columns.values(), strict=True):
+            told = dict(zip(columns, row, strict=True))
+            for column in ('x_m', 'y_m', 'z_m'):
+                told[column] = f'{told[column]:.5f}'
+            for column in ('thickness_um', 'predicted_um', 'residual_um', 'sigma_um'):
+                told[column] = '' if np.isnan(told[column]) else f'{told[column]:.3f}'
+            rows.append([*map(str, (told | {'used': int(told['used'])}).values())])
+        write_table(folder / file, rows)
+    picture = save_picture(comparison_figure(data), folder / f'comparison.{pictures}')
+    write_text(folder / 'report.html', report_html(data))
+    return [*(folder / file for file in (name, *residuals)), picture, folder / 'report.html']
 
 
 def file_name(name: str) -> str:
@@ -168,7 +162,14 @@ def write_fitted(
     start = start or ModelFile(steps[0].model)
     fit = steps[-1].fit
     history = history_as_list(study, steps, start.history)
-    uncertainty = _uncertainty(fit, start.uncertainty)
+    # Standard deviations, in the sections of the model.
+    uncertainty = {
+        key: dict(value) for key, value in start.uncertainty.items() if isinstance(value, Mapping)
+    }
+    for value in estimates(fit):
+        section, _, name = value.name.rpartition('.')
+        section = 'planar' if value.name in PATTERN_NAMES else section
+        uncertainty.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     fitted = _rounded(fit, steps[0].model.effects)
     found = posterior_of(fit, study.campaign)
     few = {'mean': _short(found.mean), 'covariance': _short(found.covariance)}
@@ -215,17 +216,6 @@ def _short(value: Any) -> Any:
     return type(value)(map(_short, value))
 
 
-def _uncertainty(fit: Fit, older: Mapping[str, Any]) -> dict[str, Any]:
-    """Standard deviations in the sections of the model."""
-    sections = {key: dict(value) for key, value in older.items() if isinstance(value, Mapping)}
-    for value in estimates(fit):
-        section, _, name = value.name.rpartition('.')
-        if value.name in PATTERN_NAMES:
-            section = 'planar'
-        sections.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
-    return sections
-
-
 def effect_entry(form: ClosedForm, file: str | Path) -> str:
     """What stands in a model file for the effect of a form: its file and its values."""
     return f'file: {file}, ' + ', '.join(f'{n}: {p.value:.6g}' for n, p in form.parameters.items())
@@ -245,8 +235,9 @@ def write_effect_file(path: Path, law: LearnedCurve, form: ClosedForm) -> Path:
         effect_id = f'learned_{effect_id}'
     acts_on = 'path' if type(law).on_path is not LearnedCurve.on_path else 'film'
     (name, unit), knots = variable(type(law)), at_knots(law)
+    template = Path(__file__).parent / 'templates' / 'effect.py.j2'
     text = filled(
-        TEMPLATE, law=law, form=form, id=effect_id, family=family, value=value, file=path.name,
+        template, law=law, form=form, id=effect_id, family=family, value=value, file=path.name,
         entry=effect_entry(form, path.name).partition(', ')[2],
         acts_on='ray' if law.flux_factor is not None else acts_on,
         functions=', '.join(one for one in ('exp', 'log') if f'{one}(' in form.code),

@@ -49,14 +49,6 @@ from paint_deposition.report.style import save_picture
 from paint_deposition.report.writers.write import input_files, with_provenance, write_film, written
 
 BAG, TABLE, PROGRAM, JOINTS = 'trajectory', 'passes.csv', 'passes.mod', 'joints.csv'
-COLUMNS = (
-    'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
-    'brush',
-)  # fmt: skip
-POINT_COLUMNS = (
-    'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm', 'height_mm',
-    'expected_um', 'speaks_for',
-)  # fmt: skip
 
 
 def write_passes(
@@ -108,9 +100,20 @@ def write_passes(
 
 
 def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
-    """A line a move of the TCP: where it ends, how fast, and what the gun does."""
-    yield COLUMNS
-    for number, move in zip(pass_numbers(moves), moves, strict=True):
+    """A line a move of the TCP: where it ends, how fast, and what the gun does.
+
+    Its pass is that on which it ends, numbered from 1 as a simulation does.
+    """
+    path, _ = spray_path(timed(moves, gun_known=True))
+    steps_m = np.linalg.norm(np.diff([move.position_m for move in moves], axis=0), axis=1)
+    middle_m = np.cumsum(steps_m) - 0.5 * steps_m
+    row = np.searchsorted(np.cumsum(path.dwell_s * path.speed_m_per_s), middle_m)
+    numbers = 1 + np.maximum(path.spray_pass[np.minimum(row, len(path) - 1)], 0)
+    yield (
+        'pass', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw', 'speed_m_per_s', 'spraying', 'flow',
+        'brush',
+    )  # fmt: skip
+    for number, move in zip([1, *numbers.tolist()], moves, strict=True):
         yield [
             number,
             *(f'{value:.6f}' for value in move.position_m),
@@ -120,16 +123,6 @@ def _table(moves: Sequence[Move]) -> Iterator[Sequence[object]]:
             f'{move.flow:.6g}' if move.spraying else 0,
             move.brush,
         ]
-
-
-def pass_numbers(moves: Sequence[Move]) -> list[int]:
-    """Number of the pass on which each move (M,) ends, from 1, as a simulation counts them."""
-    path, _ = spray_path(timed(moves, gun_known=True))
-    steps_m = np.linalg.norm(np.diff([move.position_m for move in moves], axis=0), axis=1)
-    middle_m = np.cumsum(steps_m) - 0.5 * steps_m
-    row = np.searchsorted(np.cumsum(path.dwell_s * path.speed_m_per_s), middle_m)
-    number = path.spray_pass[np.minimum(row, len(path) - 1)]
-    return [1, *np.maximum(number + 1, 1).tolist()]
 
 
 def _write_bag(
@@ -196,8 +189,9 @@ def _passes(
     about = with_provenance(part_facts | dict(made_from or {}), result.model)
     write_json(files[0], {**result.to_dict(), DIGEST: model_digest(result.model), **about})
     zones = result.wanted.zones
+    laid = result.after if isinstance(result, Improvement) else result
     files += write_film(
-        folder, surface, result.film_um, result.whole_part, zones=zones, overwrite=True,
+        folder, surface, laid.film_um, laid.whole_part, zones=zones, overwrite=True,
         details={'region': 'the painted area of the whole part'},
     )  # fmt: skip
     if isinstance(result, Improvement):
@@ -254,33 +248,29 @@ def _chosen_readings(
     part = None if part_pose is None else Rigid.of(part_pose)
     files = [folder / n for n in ('measure.json', 'points.csv', 'poses.csv')]
     poses: list[Sequence[object]] = [('point', 'x_m', 'y_m', 'z_m', 'qx', 'qy', 'qz', 'qw')]
-    at_points = zip(result.names, result.positions_m, _gauge_quaternions(result), strict=True)
-    for name, *pose in at_points:
+    # The gauge's z axis looks into the surface, its x axis level to the right.
+    into = -result.normals
+    right = across_axis(result.surface.outward, result.surface.down)
+    across = right - (into @ right)[:, np.newaxis] * into
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.stack([across, np.cross(into, across), into], axis=2)
+    turns = Rotation.from_matrix(axes).as_quat()
+    for name, *pose in zip(result.names, result.positions_m, turns, strict=True):
         position, quaternion = part.applied(*pose) if part else pose
         poses.append([name, *(f'{v:.6f}' for v in position), *(f'{v:.8f}' for v in quaternion)])
     write_json(files[0], result.to_dict() | about)
-    write_table(files[1], _points(result))
+    # A line a reading: all points once, then those that are read twice.
+    points: list[Sequence[object]] = [(
+        'point', 'x_m', 'y_m', 'z_m', 'nx', 'ny', 'nz', 'thickness_um', 'from_left_mm',
+        'height_mm', 'expected_um', 'speaks_for',
+    )]  # fmt: skip
+    for k in [*range(len(result)), *result.read_twice]:
+        place = (*result.positions_m[k], *result.normals[k])
+        points.append([
+            result.names[k], *(f'{value:.4f}' for value in place), '',
+            *(f'{1e3 * value:.0f}' for value in result.from_edges_m[k]),
+            f'{result.expected_um[k]:.1f}', ' '.join(result.speaks_for[k]),
+        ])  # fmt: skip
+    write_table(files[1], points)
     write_table(files[2], poses)
     return [*files, write_measuring_picture(folder / f'points.{pictures}', result)]
-
-
-def _gauge_quaternions(chosen: ChosenReadings) -> np.ndarray:
-    """(P, 4) x, y, z, w: the gauge's z axis into the surface, its x axis level to the right."""
-    into = -chosen.normals
-    right = across_axis(chosen.surface.outward, chosen.surface.down)
-    across = right - (into @ right)[:, np.newaxis] * into
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    return Rotation.from_matrix(np.stack([across, np.cross(into, across), into], 2)).as_quat()
-
-
-def _points(chosen: ChosenReadings) -> Iterator[Sequence[object]]:
-    """A line a reading: all points once, then those that are read twice."""
-    yield POINT_COLUMNS
-    face_mm = 1e3 * chosen.from_edges_m
-    for k in [*range(len(chosen)), *chosen.read_twice]:
-        place = (*chosen.positions_m[k], *chosen.normals[k])
-        yield [
-            chosen.names[k], *(f'{value:.4f}' for value in place), '',
-            *(f'{value:.0f}' for value in face_mm[k]), f'{chosen.expected_um[k]:.1f}',
-            ' '.join(chosen.speaks_for[k]),
-        ]  # fmt: skip
