@@ -45,7 +45,7 @@ COMMANDS = {
         '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map'),
     'locate': ('place', 'Find the pose of the part from touched points.',
         '--touched my_touched.csv --points my_points.csv'),
-    'watch': ('runs', 'Show a run, results or a live cell on a page in 3D.',
+    'watch': ('runs', 'Show a run or a live cell on a page in 3D.',
         'door_horizontal --mesh door.stl --trigger /atomizer/state'),
     'view': ('runs', 'Open a recorded run in Rerun, where that is installed.',
         'door_horizontal'),

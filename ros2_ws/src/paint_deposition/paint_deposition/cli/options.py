@@ -231,7 +231,7 @@ BRUSH = click.option(
 )  # fmt: skip
 ALLOW_EFFECTS = click.option(
     '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
-    help='Run the Python code of effect files that recordings, results or campaigns name, too.',
+    help='Run the Python code of effect files that recordings or campaigns name, too.',
 )  # fmt: skip
 PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
 MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')

@@ -1,4 +1,4 @@
-"""Commands on recorded runs: `watch` also results and the live cell, `view`, `recover`."""
+"""Commands on recorded runs: `watch` also the live cell, `view`, `recover`."""
 
 from __future__ import annotations
 
@@ -62,10 +62,10 @@ def watch_command(
     token: str,
     **pace: float,
 ) -> None:
-    """Show RUN on a page in a browser: the part in 3D, gun, film, figures, readings.
+    """Show RUN on a page in a browser: the part in 3D, gun, film, figures.
 
     RUN is a recorded motion, which is painted again as it went (with the --mesh, unless the run
-    names it), or a folder of results of simulate, plan, improve, compare, diagnose or refit.
+    names it).
     """
     if live == (run is not None):
         raise click.UsageError('give RUN, or --live for what a simulator paints now')
@@ -78,23 +78,14 @@ def watch_command(
             'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
         }, token)  # fmt: skip
         return
-    replay: Replay | None = None
     with Progress('watch') as show:
-        show('loading')
-        from paint_deposition.api.shown_results import is_results, results_scenes
-
-        if is_results(run):
-            show('painting the parts')
-            scenes, warnings = results_scenes(run)
-        else:
-            replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
-            scenes, warnings = [replay.scene], [*replay.warnings]
-        page = Page(scenes, host, port, token, replay.command if replay else None)
-    print_all('warning', warnings)
+        replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
+        page = Page([replay.scene], host, port, token, replay.command)
+    print_all('warning', replay.warnings)
     click.echo(f'{page.url}  (Ctrl-C ends it)')
     stop = Event()
     try:
-        replay.run(stop) if replay else stop.wait()
+        replay.run(stop)
     except KeyboardInterrupt:
         stop.set()
     finally:
@@ -105,6 +96,7 @@ def _replay(
     show: Progress, run: Path, part: options.Part, model_file: Path | None,
     motion: dict[str, Any], given: dict[str, float],
 ) -> Replay:  # fmt: skip
+    show('loading')
     from paint_deposition.api.replaying import Replay
     from paint_deposition.files.motion_files import read_gun_motions
     from paint_deposition.files.motion_source import MotionSource
@@ -114,7 +106,7 @@ def _replay(
 
     show('reading')
     if not run.exists():
-        raise click.UsageError(f'{run} is not there; give a recorded run or a folder of results')
+        raise click.UsageError(f'{run} is not there; give a recorded run')
     recorded = custom_data(run)
     if recorded and not motion['state_topic']:
         with open_bag(run) as bag:
