@@ -9,7 +9,6 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import trimesh
 from mcap.writer import CompressionType, Writer
 

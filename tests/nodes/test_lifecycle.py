@@ -3,7 +3,6 @@
 import os
 import threading
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -183,8 +182,9 @@ def test_what_it_reads_can_be_changed_while_it_is_not_configured(
 class Faulty(ManagedNode):
     """Its work fails in a way that nobody foresaw."""
 
-    def _configure(self) -> None:
+    def _configure(self):
         self.create_publisher(PoseStamped, 'poses', 10)
+        return {}
 
     def _activate(self) -> None:
         raise ZeroDivisionError('by nothing')
@@ -193,7 +193,7 @@ class Faulty(ManagedNode):
 def test_an_unexpected_error_leads_to_unconfigured(
     start, ros_context, manager, viewer, wait_until
 ):
-    node = start(partial(Faulty, 'faulty'), autostart=False)
+    node = start(Faulty, autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
     assert managed.configure() == (True, 'inactive')
@@ -201,7 +201,7 @@ def test_an_unexpected_error_leads_to_unconfigured(
     assert len(list(node.publishers)) == publishers
     wait_until(lambda: viewer.reports('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
     with pytest.raises(ZeroDivisionError):
-        Faulty('faulty', context=ros_context)
+        Faulty(context=ros_context)
 
 
 def test_a_recorder_writes_one_whole_run_for_each_activation(
@@ -234,7 +234,7 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(
 
 def test_a_node_that_is_destroyed_has_no_services(ros_context, viewer, wait_until):
     """Whoever holds on to it."""
-    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
+    node = Faulty(context=ros_context, parameter_overrides=parameters(autostart=False))
     service = '/faulty/change_state'
     wait_until(lambda: viewer.count_services(service) == 1, what='the service')
     node.destroy_node()

@@ -21,7 +21,7 @@ from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header, header_stamp_ns
+from paint_deposition.nodes.runtime.topics import header, header_stamp_ns
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 

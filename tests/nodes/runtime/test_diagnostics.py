@@ -4,7 +4,7 @@ from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 
 
 def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until):
-    node = PaintNode('painter', context=ros_context, namespace='cell1')
+    node = PaintNode(context=ros_context, namespace='cell1')
     calls = []
 
     def gun() -> Status:

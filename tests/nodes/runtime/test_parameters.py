@@ -40,7 +40,7 @@ def declared(ros_context, executor):
         PARAMETERS = TABLE
 
     def declared(**overrides):
-        node = Tester('tester', context=ros_context, parameter_overrides=parameters(**overrides))
+        node = Tester(context=ros_context, parameter_overrides=parameters(**overrides))
         executor.add_node(node)
         return node, dict(node.values)
 

@@ -15,8 +15,7 @@ import os, signal, sys, time
 from pathlib import Path
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.node import PaintNode, run_node
 
 
 class Worker(PaintNode):
@@ -25,7 +24,7 @@ class Worker(PaintNode):
     }
 
     def __init__(self, **kwargs):
-        super().__init__('worker', **kwargs)
+        super().__init__(**kwargs)
         self.ready = False
         if self.values['does'] == 'begin':
             os.kill(os.getpid(), signal.SIGINT)

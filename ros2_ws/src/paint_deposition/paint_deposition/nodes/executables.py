@@ -33,8 +33,8 @@ def _run(name: str, place: str, node_class: str) -> int:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
     module = importlib.import_module(f'paint_deposition.nodes.{place}')
-    process = importlib.import_module('paint_deposition.nodes.runtime.process')
-    return process.run_node(getattr(module, node_class), signals)
+    base = importlib.import_module('paint_deposition.nodes.runtime.node')
+    return base.run_node(getattr(module, node_class), signals)
 
 
 atomizer_source = partial(_run, 'atomizer_source', 'robot.atomizer_source', 'AtomizerSource')

@@ -24,7 +24,6 @@ from paint_deposition.nodes.painting.painting_parameters import (
     model_parameters,
 )
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
@@ -33,6 +32,7 @@ from paint_deposition.nodes.runtime.parameters import (
     mesh_parameters,
     requested,
 )
+from paint_deposition.nodes.runtime.topics import header, pose_message
 from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
 from paint_deposition.planning.requests import (
@@ -81,7 +81,7 @@ class IndexPlanner(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('index_planner', **kwargs)
+        super().__init__(**kwargs)
         self._requests = 0
         self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)

@@ -48,9 +48,6 @@ from paint_deposition.part.facing import turned
 from paint_deposition.report.live.scene import Scene
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
-# The simulator speaks twice a second [s].
-SILENT_S = 2.0
-
 
 class WebView(PaintNode):
     """Serves the live page with what the simulator publishes; it computes no film itself.
@@ -78,7 +75,7 @@ class WebView(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('web_view', **kwargs)
+        super().__init__(**kwargs)
         results = topics.RESULTS
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
@@ -196,7 +193,8 @@ class WebView(PaintNode):
 
     def _show_trust(self) -> None:
         silent_s = time.monotonic() - self._trusted_s
-        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > SILENT_S else ''
+        # The simulator speaks twice a second.
+        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > 2.0 else ''
         self.scene.tell('trust', doubts=silent or self._doubts)
 
     def _say(self, problem: str) -> None:
@@ -214,8 +212,14 @@ class WebView(PaintNode):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
             for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
-                if not isinstance(placed, NoTransform):
-                    self._move_gun(gun, pose, *placed)
+                if isinstance(placed, NoTransform):
+                    continue
+                position_m, quaternion = placed
+                stamps = np.array([stamp_ns(pose.header)])
+                batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
+                for position, z_axis in zip(*batch.finite_axes(), strict=True):
+                    # Without any state the gun is taken to spray, as the simulator does.
+                    self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
@@ -227,15 +231,6 @@ class WebView(PaintNode):
 
     def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
         self._waiting[gun].append((time.monotonic(), message))
-
-    def _move_gun(
-        self, gun: str, message: PoseStamped, position_m: np.ndarray, quaternion: np.ndarray
-    ) -> None:
-        stamps = np.array([stamp_ns(message.header)])
-        batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
-        for position, z_axis in zip(*batch.finite_axes(), strict=True):
-            # Without any state the gun is taken to spray, as the simulator does.
-            self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def status(self) -> Status:
         sent, now_s = self.page.bytes_sent, time.monotonic()

@@ -37,14 +37,12 @@ from paint_deposition.files.recordings.pose_topics import (
     read_frames,
 )
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
-from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header, header_stamp_ns, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-
-LOG_TIME = attrgetter('log_time_ns')
+from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, pose_message
 
 
 class BagPlayer(PaintNode):
@@ -102,7 +100,7 @@ class BagPlayer(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('bag_player', **kwargs)
+        super().__init__(**kwargs)
         # Reliable, so that subscribers acknowledge.
         profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
@@ -234,7 +232,12 @@ class BagPlayer(PaintNode):
                     self._flow_control.wait_for_subscribers(self._subscribers_to_await)
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
-                self._wait_until_due(message.log_time_ns)
+                # For the end of a pause, the time of the message, and the flow control.
+                while not self.stopped.is_set():
+                    if self._time.wait_for(message.log_time_ns, timeout_s=0.05):
+                        break
+                if self.values['rate'] == 0.0:
+                    self._flow_control.wait_for_room()
                 if self.stopped.is_set():
                     return
                 self._time.jump_to(message.log_time_ns)
@@ -246,53 +249,42 @@ class BagPlayer(PaintNode):
         """Poses, states and transforms by log time; at equal times, poses last."""
         named = [self._pose_topic, self._state_topic.name if self._state_topic else '']
         read = [*filter(None, named), *self._transform_topics]
-        poses: Iterable[RawMessage] = computed_poses(*self._motion) if self._motion else ()
-        messages = merge(bag.messages(read) if read else (), poses, key=LOG_TIME)
-        for _, simultaneous in groupby(messages, key=LOG_TIME):
+        poses: Iterable[RawMessage] = ()
+        if self._motion:
+            motion, log_times_ns = self._motion
+            frame_id, stamps_ns = motion.frame_id, motion.stamps_ns.tolist()
+            # Log times never go back.
+            logged_ns = np.maximum.accumulate(log_times_ns).tolist()
+            places = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
+            poses = (
+                RawMessage('', '', at_ns, serialize_message(pose_message(frame_id, stamp, place)))
+                for stamp, at_ns, place in zip(stamps_ns, logged_ns, places, strict=True)
+            )
+        log_time = attrgetter('log_time_ns')
+        messages = merge(bag.messages(read) if read else (), poses, key=log_time)
+        for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
-
-    def _wait_until_due(self, log_time_ns: int) -> None:
-        """Wait for the end of a pause, the time of a message, and the flow control."""
-        while not self.stopped.is_set():
-            if self._time.wait_for(log_time_ns, timeout_s=0.05):
-                break
-        if self.values['rate'] == 0.0:
-            self._flow_control.wait_for_room()
 
     def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
         if message.topic == self._pose_topic:
             self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
+        elif message.type == PART_POSE_TYPE:  # it becomes a static transform
+            publisher = self._transform_publishers[True]
+            placed = deserialize_message(message.cdr, TransformStamped)
+            publisher.publish(serialize_message(publisher.msg_type(transforms=[placed])))
         elif message.topic in self._transform_topics:
-            self._publish_transform(message)
+            self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
             self._state_publisher.publish(as_state(message))
             self.states_published += 1
-
-    def _publish_transform(self, message: RawMessage) -> None:
-        """A recorded `part_pose` becomes a static transform."""
-        cdr, is_place = message.cdr, message.type == PART_POSE_TYPE
-        publisher = self._transform_publishers[is_place or message.topic.endswith(STATIC)]
-        if is_place:
-            placed = deserialize_message(cdr, TransformStamped)
-            cdr = serialize_message(publisher.msg_type(transforms=[placed]))
-        publisher.publish(cdr)
 
     def _publish_clock(self) -> None:
         with self._clock_order:
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def computed_poses(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawMessage]:
-    """Serialised poses of a motion that is no topic of its own; log times (N,) never go back."""
-    logged_ns = np.maximum.accumulate(log_times_ns).tolist()
-    poses = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
-    for stamp, at_ns, values in zip(motion.stamps_ns.tolist(), logged_ns, poses, strict=True):
-        pose = serialize_message(pose_message(motion.frame_id, stamp, values))
-        yield RawMessage('', '', at_ns, pose)
 
 
 def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:

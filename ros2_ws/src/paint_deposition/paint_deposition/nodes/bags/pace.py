@@ -170,23 +170,21 @@ class FlowControl:
         with self._lock:
             waited_for = {}
             for name, subscriber in self.subscribers.items():
-                if subscriber.taken < self._sent:
-                    self._time_out(subscriber, now_s)
+                if subscriber.taken == self._sent:
+                    continue
+                quiet_since_s = max(self._sent_s, subscriber.advanced_s)
+                if subscriber.reported_s is None:
+                    subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
+                elif (
+                    now_s - quiet_since_s > LOST_TIMEOUT_S
+                    # Without reports in this time it may be busy.
+                    and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
+                ):
+                    subscriber.lost += self._sent - subscriber.taken
+                    subscriber.taken = self._sent
                 if subscriber.taken < self._sent and not subscriber.never_reported:
                     waited_for[name] = self._sent - subscriber.taken
             return waited_for
-
-    def _time_out(self, subscriber: Subscriber, now_s: float) -> None:
-        quiet_since_s = max(self._sent_s, subscriber.advanced_s)
-        if subscriber.reported_s is None:
-            subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
-        elif (
-            now_s - quiet_since_s > LOST_TIMEOUT_S
-            # Without reports in this time it may be busy.
-            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
-        ):
-            subscriber.lost += self._sent - subscriber.taken
-            subscriber.taken = self._sent
 
     def _take_report(self, progress: PoseProgress) -> None:
         stamp = stamp_ns(progress.header)
@@ -249,22 +247,19 @@ class FlowControl:
             behind = self.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            self._warn_of_mute_subscribers()
+            mute = {name for name, s in self.subscribers.items() if s.never_reported}
+            for name in mute - self._mute:
+                self._node.get_logger().warning(
+                    f'{name} has never reported its progress: it is no longer waited for, and '
+                    'may lose poses when its queue overflows'
+                )
+            self._mute = mute
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
                 self._log_status(f'waiting for {late}')
             self._stopped.wait(0.001)
         self.status = 'playing'
-
-    def _warn_of_mute_subscribers(self) -> None:
-        mute = {name for name, s in self.subscribers.items() if s.never_reported}
-        for name in mute - self._mute:
-            self._node.get_logger().warning(
-                f'{name} has never reported its progress: it is no longer waited for, and may '
-                'lose poses when its queue overflows'
-            )
-        self._mute = mute
 
     def _log_status(self, status: str) -> None:
         self.status = status

@@ -28,8 +28,6 @@ from paint_deposition.nodes.runtime.parameters import (
     require_display,
     require_file_name,
 )
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.write import write_film
 
 
@@ -65,10 +63,7 @@ class DepositionSimulator(PaintingNode):
         ),
     }
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('deposition_simulator', **kwargs)
-
-    def _configure(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         super()._configure()
         # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
@@ -78,14 +73,12 @@ class DepositionSimulator(PaintingNode):
         self.parts = PartChange(self, self._mesh_version, self._saving, saving)
         self.publish()
         self.trust = FilmTrust(self)
+        return painting_tasks(self, self.display.diagnostic_values) | {'part': self._part_status}
 
     def _cleanup(self) -> None:
         super()._cleanup()
         self.parts.close()
         self._saving.shutdown()
-
-    def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return painting_tasks(self, self.display.diagnostic_values) | {'part': self._part_status}
 
     def _part_status(self) -> Status:
         """The status of the part, and whether any of the paint lands on it."""
@@ -99,11 +92,9 @@ class DepositionSimulator(PaintingNode):
         )
         return Status(WARN, beside, status.values)
 
-    def _read_part(self) -> None:
-        self._mesh_version = mesh_version(self.mesh_file)
-
-    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
-        return surface, surface.points()
+    def _load_files(self) -> None:
+        self._mesh_version = mesh_version(self.values['mesh_file'])
+        super()._load_files()
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)

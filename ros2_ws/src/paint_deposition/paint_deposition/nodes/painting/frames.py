@@ -14,9 +14,8 @@ from paint_deposition.files.recordings.headers import pose_of, stamp_ns, transfo
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, header
 
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.

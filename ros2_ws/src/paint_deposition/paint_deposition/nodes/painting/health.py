@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from paint_msgs.msg import PoseProgress
 
@@ -137,7 +138,10 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """The status of part, model and computing time."""
-    guns, factor = node.film.guns, node.real_time_factor
+    guns = node.film.guns
+    # Computing time over duration of the motion; above 1 the node falls behind.
+    sums = [np.sum(source.times_s, axis=0) for source in node.inputs if source.times_s]
+    factor = float(sum(spent_s / duration_s for spent_s, duration_s in sums))
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {

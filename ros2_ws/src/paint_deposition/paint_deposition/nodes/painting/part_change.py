@@ -20,9 +20,9 @@ from rclpy.parameter import Parameter
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
+from paint_deposition.nodes.runtime.topics import header
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
@@ -79,7 +79,9 @@ class PartChange:
         # Films of former parts that are not on disk yet, four at most, and why.
         self._unsaved: list[Callable[[], list[Path]]] = []
         self._save_error = ''
-        node.create_steady_timer(10.0, self._save_again)
+        node.create_steady_timer(
+            10.0, lambda: self._save_error and self._saving.submit(self._save_films)
+        )
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
@@ -118,20 +120,20 @@ class PartChange:
         self, request: ChangePart.Request, response: ChangePart.Response
     ) -> ChangePart.Response:
         try:
-            wrong = await (self._prefetch if request.prepare else self._change)(request, response)
-            response.success = not wrong
+            if not request.prepare:
+                response.success = not await self._change(request, response)
+            elif request.mesh_file:
+                mesh_file = os.path.expanduser(request.mesh_file)
+                part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
+                response.message = f'{mesh_file} is prepared: {part.surface!r}'
+                response.success = True
+            else:
+                raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
         except (PaintError, MemoryError) as error:
             response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
         return response
-
-    async def _prefetch(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
-        if not request.mesh_file:
-            raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
-        mesh_file = os.path.expanduser(request.mesh_file)
-        part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
-        response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> str:
         """Change the part; what of it failed after the part had changed, if anything."""
@@ -336,10 +338,6 @@ class PartChange:
             self._save_error = f'{films}: {str(error) or "not enough memory"}'
             self._node.get_logger().error(self._save_error)
         return paths
-
-    def _save_again(self) -> None:
-        if self._save_error:
-            self._saving.submit(self._save_films)
 
     def _publish(self, since_ns: int, part_pose: Sequence[float]) -> None:
         part, node = self.part, self._node

@@ -25,10 +25,15 @@ from paint_deposition.nodes.robot.robot_poses import (
     JointPoses,
     TfPoses,
 )
-from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
+from paint_deposition.nodes.runtime.topics import (
+    POSE_DEPTH,
+    AdaptiveSubscription,
+    header,
+    message_class,
+    pose_message,
+)
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -106,7 +111,7 @@ class AtomizerSource(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('atomizer_source', **kwargs)
+        super().__init__(**kwargs)
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
@@ -119,7 +124,20 @@ class AtomizerSource(PaintNode):
         self.poses_published = 0
         # Of the robot's poses: their frame, when the last came, and how late they are sent.
         self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
-        self._motion = self._create_motion()
+        # What computes the poses; None beside a robot that publishes them itself.
+        self._motion: JointPoses | TfPoses | None = None
+        base, joints = self.values['base_link'], self.values['joint_topic']
+        if self._robot is not None:
+            self._motion = JointPoses(self._robot, joints, self._publish_pose)
+            self._missing[joints] = self._motion.take
+        elif base:
+            tip = self.values['tip_link'] or DEFAULT_TIP
+            self._motion = TfPoses(self, base, tip, self._publish_pose)
+        if self._motion is None:
+            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+        else:
+            self._base, depth = self._motion.base, QoSProfile(depth=POSE_DEPTH)
+            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
         self.create_steady_timer(0.1, self._discover_topics)
@@ -153,25 +171,6 @@ class AtomizerSource(PaintNode):
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
-
-    def _create_motion(self) -> JointPoses | TfPoses | None:
-        """What computes the poses; None beside a robot that publishes them itself."""
-        values = self.values
-        if self._robot is None and not values['base_link']:
-            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
-            return None
-        depth = QoSProfile(depth=POSE_DEPTH)
-        self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
-        if self._robot is None:
-            tip = values['tip_link'] or DEFAULT_TIP
-            motion: JointPoses | TfPoses = TfPoses(
-                self, values['base_link'], tip, self._publish_pose
-            )
-        else:
-            motion = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
-            self._missing[values['joint_topic']] = motion.take
-        self._base = motion.base
-        return motion
 
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import timezone
 from types import SimpleNamespace
@@ -21,9 +21,9 @@ from paint_msgs.msg import AtomizerState
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.topics import header
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2
@@ -61,8 +61,8 @@ class SignalSource(PaintNode):
 
     PASSWORD: str  # the variable of the environment
 
-    def __init__(self, name: str, **kwargs: Any):
-        super().__init__(name, **kwargs)
+    def __init__(self, **kwargs: Any):
+        super().__init__(**kwargs)
         self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
         named = ('trigger', *FIELDS)
         self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
@@ -180,9 +180,6 @@ class RwsSource(SignalSource):
     )
     PASSWORD = 'RWS_PASSWORD'
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('rws_source', **kwargs)
-
     def follow(self) -> None:
         """Subscribe to all signals in one group, and take its events."""
         try:
@@ -221,24 +218,18 @@ class RwsSource(SignalSource):
                 opener.open(f'{url}/logout', None, TIMEOUT_S).close()
 
     def _take_all(self, event: str | bytes) -> None:
-        for path, value in signal_values(event):
+        """Take the value of each signal in an event, which is XHTML."""
+        for item in ElementTree.fromstring(event).iter():
+            if not item.get('class', '').startswith('ios-signalstate'):
+                continue
+            link, value = '', None
+            for inner in item.iter():
+                link = inner.get('href', '') or link
+                value = inner.text if inner.get('class') == 'lvalue' else value
+            path = link.partition(PATH)[2].partition(';')[0]
             for signal in self.signals:
-                if path == signal or path.endswith(f'/{signal}'):
-                    self.take(signal, value)
-
-
-def signal_values(event: str | bytes) -> Iterator[tuple[str, float]]:
-    """The path and the value of each signal in an event of RWS, which is XHTML."""
-    for item in ElementTree.fromstring(event).iter():
-        if not item.get('class', '').startswith('ios-signalstate'):
-            continue
-        link, value = '', None
-        for inner in item.iter():
-            link = inner.get('href', '') or link
-            value = inner.text if inner.get('class') == 'lvalue' else value
-        path = link.partition(PATH)[2].partition(';')[0]
-        if path and value is not None:
-            yield path, float(value)
+                if value is not None and f'/{path}'.endswith(f'/{signal}'):
+                    self.take(signal, float(value))
 
 
 class OpcuaSource(SignalSource):
@@ -270,9 +261,6 @@ class OpcuaSource(SignalSource):
         **SIGNALS,
     )
     PASSWORD = 'OPCUA_PASSWORD'
-
-    def __init__(self, **kwargs: Any):
-        super().__init__('opcua_source', **kwargs)
 
     def _validate(self, values: Mapping[str, Any]) -> None:
         super()._validate(values)

@@ -12,10 +12,9 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
 # 3HAC073319 (EGM, sensor protocol); others are passed over.
@@ -208,7 +207,7 @@ class EgmSource(PaintNode):
     )  # fmt: skip
 
     def __init__(self, **kwargs: Any):
-        super().__init__('egm_source', **kwargs)
+        super().__init__(**kwargs)
         profile = QoSProfile(depth=POSE_DEPTH)
         self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)

@@ -6,7 +6,6 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, Field, TypeAdapter, ValidationError
@@ -94,9 +93,13 @@ class NodeParameter:
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         return descriptor
 
-    @cached_property
-    def _adapter(self) -> TypeAdapter[Any]:
-        """What checks a value: the same as checks the requests of commands."""
+    def checked(self, name: str, value: Any) -> Any:
+        """A value for the parameter of this name, in its type, as requests are checked.
+
+        YAML may have 2 for 2.0, and ROS None for []. Raises PaintError.
+        """
+        if self.element and not isinstance(value, (str, int, float)):
+            value = list(value or [])
         kind: Any = self.element or type(self.default)
         limits: dict[str, Any] = {'strict': True}
         if kind is float:
@@ -108,17 +111,8 @@ class NodeParameter:
         if self.is_path:
             # No shell expands a leading ~ in parameter files or after :=.
             kind = Annotated[kind, AfterValidator(os.path.expanduser)]
-        return TypeAdapter(list[kind] if self.element else kind)
-
-    def checked(self, name: str, value: Any) -> Any:
-        """A value for the parameter of this name, in its type.
-
-        YAML may have 2 for 2.0, and ROS None for []. Raises PaintError.
-        """
-        if self.element and not isinstance(value, (str, int, float)):
-            value = list(value or [])
         try:
-            value = self._adapter.validate_python(value)
+            value = TypeAdapter(list[kind] if self.element else kind).validate_python(value)
         except ValidationError as error:
             first = error.errors()[0]
             value, remedy = first['input'], first['msg'].removeprefix('Input should be ')

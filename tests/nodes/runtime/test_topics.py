@@ -8,7 +8,7 @@ from std_msgs.msg import ColorRGBA
 from visualization_msgs.msg import Marker
 
 from paint_deposition.film.colour_scales import FILM_PALETTE
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
+from paint_deposition.nodes.runtime.topics import ColouredMesh, header, white_marker
 
 STAMPS_NS = 0, 1_758_000_123_456_789_012
 
