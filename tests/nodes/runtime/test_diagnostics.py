@@ -17,10 +17,10 @@ def test_every_task_reports_each_period(ros_context, spin, onlooker, wait_until)
     wait_until(lambda: len(viewer.heard['/diagnostics']) >= 3, what='diagnostics')
     first, later = (viewer.decoded('/diagnostics', row) for row in (0, 2))
     (gun_status, mesh_status), later_status = first.status, later.status[0]
-    assert gun_status.name == 'cell1/painter: gun'
-    assert mesh_status.name == 'cell1/painter: mesh'
+    assert gun_status.name == 'cell1/paint_node: gun'
+    assert mesh_status.name == 'cell1/paint_node: mesh'
     assert (gun_status.level, mesh_status.level) == (b'\x01', b'\x00')
-    assert gun_status.hardware_id == '/cell1/painter'
+    assert gun_status.hardware_id == '/cell1/paint_node'
     assert [(v.key, v.value) for v in gun_status.values] == [('poses', '3'), ('gap s', '0.5')]
     assert first.header.stamp.sec > 0
     assert later_status.message != gun_status.message

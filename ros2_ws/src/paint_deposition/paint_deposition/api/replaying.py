@@ -23,9 +23,8 @@ from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajector
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.live.scene import Scene
 
-# The film is shown so often, and a motion without pauses is painted in steps so long [s].
+# The film is shown so often [s].
 PERIOD_S = 0.2
-STEP_S = 1.0
 
 
 class Replay:
@@ -113,10 +112,17 @@ class Replay:
                 stop.wait(PERIOD_S)
                 elapsed_s = (time.monotonic() - began_s) * self._rate
             else:
-                elapsed_s = (now_ns - self._start_ns) * 1e-9 + STEP_S
+                elapsed_s = (now_ns - self._start_ns) * 1e-9 + 1.0
             now_ns = min(self._start_ns + round(elapsed_s * 1e9), self._end_ns)
             for number, film in enumerate(films.guns):
-                self._feed(number, film, shown_ns, now_ns)
+                motion, times_ns = self._motions[number].trajectory, self._times_ns[number]
+                first, end = np.searchsorted(times_ns, [shown_ns, now_ns], side='right').tolist()
+                film.replay(events_of(motion, first, end))
+                batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
+                for row in range(first, end):
+                    for place, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
+                        name, flow = self._motions[number].name, self._flows[number][row]
+                        self.scene.move_gun(name, place, z_axis, flow)
             shown_ns = now_ns
             self._show(films, (now_ns - self._start_ns) * 1e-9)
 
@@ -127,17 +133,6 @@ class Replay:
         )
         film.replay(events_of(motion.trajectory, until=0))
         return film
-
-    def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
-        """Pass on the poses of a gun in this time."""
-        motion, flow = self._motions[number].trajectory, self._flows[number]
-        first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
-        rows = slice(int(first), int(end))
-        batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
-        film.replay(events_of(motion, int(first), int(end)))
-        for row in range(*rows.indices(len(motion))):
-            for position, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
-                self.scene.move_gun(self._motions[number].name, position, z_axis, flow[row])
 
     def _show(self, films: LiveFilms, time_s: float) -> None:
         film, (target_um, tolerance_um) = films.snapshot(), self._target

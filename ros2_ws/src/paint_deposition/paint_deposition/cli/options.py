@@ -23,7 +23,6 @@ from paint_deposition.request import (
     FilmBand,
     MotionOptions,
     OnePart,
-    PartMesh,
     Request,
 )
 
@@ -283,7 +282,7 @@ def part_options(
     options: list[Decorator] = [
         click.option('--mesh', required=required, type=FILE,
                      help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'),
-        *(option_of(PartMesh, name) for name in PartMesh.model_fields),
+        *(option_of(OnePart, name) for name in ('mesh_scale', 'body', 'down')),
         click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
             help='Longest edge of the refined mesh: larger triangles are split.',

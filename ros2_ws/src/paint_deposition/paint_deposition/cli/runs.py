@@ -23,9 +23,6 @@ if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
     from paint_deposition.request import FilmBand
 
-NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
-RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
-
 
 @click.command('watch')
 @click.argument('run', type=options.FILE, required=False)
@@ -72,12 +69,17 @@ def watch_command(
     if live and not part.mesh:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
     if run is None:
-        _become_node({
+        values = {
             'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
             'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
             'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
-        }, token)  # fmt: skip
-        return
+        }  # fmt: skip
+        # This process becomes the node, which says what it needs; others can read its words.
+        os.environ[TOKEN] = token
+        given = (f'{name}:={value}' for name, value in values.items() if value not in ('', None))
+        node = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
+        command = python(node, '--ros-args', *(word for value in given for word in ('-p', value)))
+        os.execv(command[0], command)
     with Progress('watch') as show:
         replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
         page = Page([replay.scene], host, port, token, replay.command)
@@ -125,15 +127,6 @@ def _replay(
     return replay
 
 
-def _become_node(parameters: dict[str, object], token: str) -> None:
-    """Become the node `web_view`, which says what it needs; others can read its words."""
-    os.environ[TOKEN] = token
-    words = [w for name, value in parameters.items() if value not in ('', None)
-             for w in ('-p', f'{name}:={value}')]  # fmt: skip
-    command = python(NODE, '--ros-args', *words)
-    os.execv(command[0], command)
-
-
 @click.command('view')
 @click.argument('run', type=options.FILE)
 def view_command(run: Path) -> None:
@@ -147,7 +140,8 @@ def view_command(run: Path) -> None:
         raise PaintError(f'{run}: no .mcap file; give a run that run_recorder recorded')
     if find_spec('rerun') is None:
         raise PaintError('Rerun is not installed; run: pip install rerun-sdk')
-    sys.exit(subprocess.run(python(RERUN, *map(str, files))).returncode)
+    rerun = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
+    sys.exit(subprocess.run(python(rerun, *map(str, files))).returncode)
 
 
 @click.command('recover')

@@ -41,9 +41,6 @@ from paint_deposition.planning.requests import (
     PlanRequest,
 )
 
-SPACING_M = 0.02
-
-
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]
 
@@ -259,9 +256,9 @@ def _fill_response(
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
-    """Poses about SPACING_M apart, both ends included, with stamps from ``start_ns`` on."""
+    """Poses about 20 mm apart, both ends included, with stamps from ``start_ns`` on."""
     step = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
-    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
+    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / 0.02)
     kept = np.append(True, np.diff(travelled) > 0.0)
     kept[-1] = True
     stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]

@@ -15,7 +15,6 @@ from rclpy.publisher import Publisher
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
-GRAPH_PERIOD_S = 0.1
 LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 # If a subscriber reports the same pose for so long while none is sent, later poses are lost to it.
@@ -218,7 +217,7 @@ class FlowControl:
                 logged_s = now_s
                 topic = self._publisher.topic_name
                 self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
-            self._stopped.wait(GRAPH_PERIOD_S)
+            self._stopped.wait(0.1)
         self._discover()
 
     def wait_for_room(self) -> None:
@@ -242,7 +241,7 @@ class FlowControl:
         logged_s = time.monotonic()
         while not self._stopped.is_set():
             now_s = time.monotonic()
-            if now_s - self._discovered_s > GRAPH_PERIOD_S:
+            if now_s - self._discovered_s > 0.1:
                 self._discover()
             behind = self.lag(now_s)
             if max(behind.values(), default=0) < limit:

@@ -33,20 +33,6 @@ from paint_deposition.nodes.runtime.topics import (
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
-# Without the mesh markers: cloud and field hold the same in a fortieth of their size.
-CELL_TOPICS = (
-    'thickness/cloud',
-    'thickness/field',
-    'thickness/stats',
-    'comparison/stats',
-    'planned_path',
-    # The pose of the part, for poses of the TCP in other frames.
-    PART_POSE,
-    '/tf',
-    STATIC_TF,
-    '/diagnostics',
-    PARAMETER_EVENTS,
-)
 
 RECORDER = dict(
     **MANAGED,
@@ -80,23 +66,29 @@ RECORDER = dict(
         model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
     ),
 )
-# (topic, serialised message, log time [ns], time sent [ns])
-TakeMessage = Callable[[str, bytes, int, int], None]
 MISSED_BEFORE_DISCOVERY = 'sent before the recorder heard their publisher'
 
 
 def default_topics(guns: Sequence[str]) -> list[str]:
-    """Motion, film, plan, diagnostics, parameter changes; of several guns the film of each."""
+    """Motion, film, plan, diagnostics, parameter changes; of several guns the film of each.
+
+    Without the mesh markers: cloud and field hold the same in a fortieth of their size.
+    """
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
-    return [*motion, *shares, *CELL_TOPICS]
+    return [
+        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats',
+        'comparison/stats', 'planned_path', PART_POSE, '/tf', STATIC_TF, '/diagnostics',
+        PARAMETER_EVENTS,
+    ]  # fmt: skip
 
 
 class RecordedTopic(AdaptiveSubscription):
     """A subscription to the serialised messages of a topic, which counts what a run lacks.
 
-    `max_gap_ns` is the longest interval between header stamps that is no gap; None: gaps are not
-    counted. `begun_ns` is when the run began.
+    `take` is called with topic, message, log time and time sent [ns]. `max_gap_ns` is the longest
+    interval between header stamps that is no gap; None: gaps are not counted. `begun_ns` is when
+    the run began.
 
     Attributes:
         run_topic: the topic as the run stores it; name: of the topic.
@@ -110,7 +102,7 @@ class RecordedTopic(AdaptiveSubscription):
         self,
         node: Node,
         run_topic: RunTopic,
-        take: TakeMessage,
+        take: Callable[[str, bytes, int, int], None],
         max_gap_ns: int | None,
         begun_ns: int,
         depth: int,

@@ -1,6 +1,7 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
 import itertools
+import os
 import shutil
 import time
 from collections import Counter
@@ -214,7 +215,7 @@ class RunRecorder(ManagedNode):
             return  # a reset from before this recorder
         try:
             # The mesh file of a simulator on another machine may not exist here.
-            mesh_file = part.mesh_file if Path(part.mesh_file).is_file() else ''
+            mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
             data = provenance(mesh_file, self.values['model_file'])
             data |= {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
             if part.part_pose:

@@ -29,8 +29,6 @@ from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 
-# The share of a core that building and publishing a large message may take.
-MAX_CORE_SHARE = 0.2
 # A subscriber that acknowledges nothing for so long does not delay the others.
 ACKNOWLEDGE_TIMEOUT_S = 5.0
 STATS_FIELDS = (
@@ -93,7 +91,7 @@ class LargeTopic:
 
     The next message waits until all reliable subscribers have acknowledged the last one, so that
     a slow link gets fewer messages instead of a queue. It also waits as long as needed to keep
-    the work within ``MAX_CORE_SHARE`` of a core.
+    the work within a fifth of a core.
     """
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
@@ -118,7 +116,7 @@ class LargeTopic:
             return
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
-        self._next_allowed_s = began_s + (self._sent_s - began_s) / MAX_CORE_SHARE
+        self._next_allowed_s = began_s + 5.0 * (self._sent_s - began_s)
 
     def _count_subscribers(self, event: Any) -> None:
         self._subscribers = event.current_count

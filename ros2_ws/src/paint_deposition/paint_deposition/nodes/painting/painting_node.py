@@ -30,8 +30,6 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
-# Of each gun, to find the outward side of the part.
-POSES_CONSIDERED = 2000
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -265,15 +263,16 @@ class PaintingNode(ManagedNode, ABC):
         An earlier gun may still overrule a later one, as long as its own poses have not decided:
         the side does not depend on whose poses arrive first.
         """
+        most = 2000
         for number in tuple(self._guns_to_orient):
-            poses = self.film.guns[number].log.first_poses(POSES_CONSIDERED)
+            poses = self.film.guns[number].log.first_poses(most)
             if poses is None:
                 continue
             positions, axes = poses.finite_axes()
             front, back, _ = facing(self.surface, positions, axes)
             pointing = front + back
             # So many that point at the part, or so many in all, have decided.
-            decided = pointing >= 50 or len(poses) >= POSES_CONSIDERED
+            decided = pointing >= 50 or len(poses) >= most
             if decided:
                 self._guns_to_orient.remove(number)
             if pointing:

@@ -27,8 +27,6 @@ from paint_deposition.nodes.runtime.topics import header
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
-# A change that takes longer delays the first poses on the part, and is reported.
-LATE_S = 0.05
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
 Version = tuple[str, int | None, int | None]
 
@@ -109,7 +107,8 @@ class PartChange:
         }
         if self._save_error:
             return Status(ERROR, self._save_error, values)
-        if self._gap_s > LATE_S:
+        # A change that takes longer delays the first poses on the part.
+        if self._gap_s > 0.05:
             late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
             return Status(WARN, f'{late}: prepare it before the part comes', values)
         return Status(OK, part.run or 'the part has no serial number', values)

@@ -44,8 +44,6 @@ USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
     'trigger': (math.isfinite, 'a number or Bool'),
     'brush': (lambda value: value.is_integer() and 0 <= value <= MOST, f'0 to {MOST}'),
 }
-# (topic, message, message info of the middleware)
-TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
 

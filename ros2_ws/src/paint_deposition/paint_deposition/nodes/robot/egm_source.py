@@ -31,10 +31,6 @@ MESSAGES = {
     },
     'Robot': {'header': (1, 'Header'), 'feedBack': (2, 'FeedBack')},
 }  # fmt: skip
-# The clock of the controller drifts: only so many packets say what the fastest way takes.
-REMEMBERED = 2500
-SILENT_S = 2.0
-POLL_S = 0.2
 
 
 @cache
@@ -95,7 +91,8 @@ class EgmStream:
         self.sender = self.other = ''
         self.other_ns = self._heard_ns = self._sent_ns = 0
         self._newest: int | None = None
-        self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
+        # The clock of the controller drifts: only so many packets say what the fastest way takes.
+        self._ways_ns: deque[int] = deque(maxlen=2500)
 
     def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> Position | None:
         """The position in a packet; None for one that is not the robot's, invalid, repeated or
@@ -235,7 +232,7 @@ class EgmSource(PaintNode):
                 f'cannot listen on {address[0]}, UDP port {address[1]}: {error.strerror}; end '
                 'what else listens there, or give another port'
             ) from None
-        self._socket.settimeout(POLL_S)
+        self._socket.settimeout(0.2)
 
     def close(self) -> None:
         super().close()
@@ -289,7 +286,7 @@ class EgmSource(PaintNode):
         if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
             return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
-        if time.monotonic() - self._heard_s > SILENT_S:
+        if time.monotonic() - self._heard_s > 2.0:
             return Status(
                 WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '
                 'address of this machine in UDPUC', figures,

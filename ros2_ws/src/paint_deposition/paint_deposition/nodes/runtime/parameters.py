@@ -20,17 +20,8 @@ from rclpy.parameter import Parameter
 from paint_deposition.errors import PaintError, did_you_mean, quoted
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 
-# How bounds are said.
-BOUNDS = {
-    'greater than or equal to': 'at least',
-    'less than or equal to': 'at most',
-    'greater than': 'a number above',
-    'less than': 'a number below',
-}
 # By the endings of names.
 UNITS = {'_m_per_s': 'm/s', '_m_per_s2': 'm/s2', '_um': 'µm', '_rad': 'rad', '_m': 'm'}
-GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
-LONGEST_SHOWN = 40  # letters of a name that is refused
 RUNS = 'runs'  # `fixed_while`: in every state
 # Room is left for what is appended: a date, the number of a coat, the ending of a file.
 FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9._-]{0,199}')
@@ -116,7 +107,10 @@ class NodeParameter:
         except ValidationError as error:
             first = error.errors()[0]
             value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
-            for long, short in BOUNDS.items():
+            for long, short in (
+                ('greater than or equal to', 'at least'), ('greater than', 'a number above'),
+                ('less than or equal to', 'at most'), ('less than', 'a number below'),
+            ):  # fmt: skip
                 remedy = remedy.replace(long, short)
             shown = f'{value:g}' if isinstance(value, float) else quoted(value)
             raise PaintError(f'{name} is {shown}; give {remedy}') from None
@@ -199,13 +193,14 @@ def direction_parameter(description: str) -> NodeParameter:
 
 def atomizers_parameter(what_they_do: str) -> NodeParameter:
     """A row for the names of several guns; empty: the cell has one gun."""
+    name = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
     return NodeParameter(
         [],
         f'Names of the guns {what_they_do}, which precede their topics, as in '
         'robot_1/atomizer/pose; empty: one gun on atomizer/pose [names]',
         constraints='different names of letters, digits, _ and /, such as robot_1',
         allows=lambda names: (
-            not names or (len(set(names)) == len(names) and all(map(GUN_NAME.fullmatch, names)))
+            not names or (len(set(names)) == len(names) and all(map(name.fullmatch, names)))
         ),
         element=str,
     )
@@ -297,5 +292,4 @@ def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
 def require_file_name(what: str, name: str) -> None:
     """Raise PaintError for a name that is empty or could lead to another folder."""
     if not FILE_NAME.fullmatch(name):
-        shown = name if len(name) <= LONGEST_SHOWN else f'{name[:LONGEST_SHOWN]}...'
-        raise PaintError(f"{what} '{shown}': use {FILE_NAME_RULE}")
+        raise PaintError(f'{what} {quoted(name)}: use {FILE_NAME_RULE}')

@@ -35,19 +35,12 @@ LATCHED = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 RESULTS = QoSProfile(depth=10)
 PROGRESS = QoSProfile(depth=100)
 CLOCK = QoSProfile(depth=1, reliability=ReliabilityPolicy.BEST_EFFORT)
-# More than a publisher keeps for late subscribers, or sends while a subscription is new.
-REMEMBERED_MESSAGES = 2000
 # Of one topic, those that have left included.
 MOST_PUBLISHERS = 1000
 # Both ends of a new subscription know of each other after less; meanwhile others count, too.
 OVERLAP_S = 1.0
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
-# Three points and colours whose bytes occur nowhere else in a Marker.
-SAMPLE_POINTS = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
-SAMPLE_COLOURS = np.array(
-    [[0.31, 0.41, 0.59, 0.26], [0.53, 0.58, 0.97, 0.93], [0.23, 0.84, 0.62, 0.64]], np.float32
-)
 Quality = tuple[ReliabilityPolicy, DurabilityPolicy]
 USUAL = ReliabilityPolicy.RELIABLE, DurabilityPolicy.VOLATILE
 
@@ -194,7 +187,8 @@ class AdaptiveSubscription:
             return
         if identity[0]:
             self._taken[identity] = None
-            if len(self._taken) > REMEMBERED_MESSAGES:
+            # More than a publisher keeps for late subscribers, or sends to a new subscription.
+            if len(self._taken) > 2000:
                 del self._taken[next(iter(self._taken))]
         self._take(message, info)
 
@@ -253,15 +247,17 @@ class ColouredMesh:
     ) -> None:
         self._corners = faces.ravel()
         # The bytes before the count of the points and behind the colours are those of a small
-        # marker that the middleware has serialised. Alignment behind the arrays stays the same,
-        # since a corner takes 40 bytes.
+        # marker that the middleware has serialised, whose points and colours occur nowhere else in
+        # it. Alignment behind the arrays stays the same, since a corner takes 40 bytes.
+        places = np.array([[3.1e1, 4.1e2, 5.9e3], [2.6e4, 5.3e5, 5.8e6], [9.7e7, 9.3e8, 2.3e9]])
+        shades = np.arange(0.07, 0.9, 0.07, np.float32).reshape(3, 4)
         marker = white_marker(Marker.TRIANGLE_LIST, namespace, 0, frame_id)
-        marker.points = [Point(x=x, y=y, z=z) for x, y, z in SAMPLE_POINTS.tolist()]
-        marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in SAMPLE_COLOURS.tolist()]
+        marker.points = [Point(x=x, y=y, z=z) for x, y, z in places.tolist()]
+        marker.colors = [ColorRGBA(r=r, g=g, b=b, a=a) for r, g, b, a in shades.tolist()]
         sample = serialize_message(marker)
-        count = struct.pack('=I', len(SAMPLE_POINTS))
-        head = sample[: sample.rindex(count, 0, sample.index(SAMPLE_POINTS.tobytes()))]
-        tail = sample[sample.index(SAMPLE_COLOURS.tobytes()) + SAMPLE_COLOURS.nbytes :]
+        count = struct.pack('=I', len(places))
+        head = sample[: sample.rindex(count, 0, sample.index(places.tobytes()))]
+        tail = sample[sample.index(shades.tobytes()) + shades.nbytes :]
         points = vertices_m[self._corners].astype(np.float64).tobytes()
         count = struct.pack('=I', len(self._corners))
         gap = b'\0' * (-(len(head) + len(count) - STAMP_OFFSET) % 8)
