@@ -102,33 +102,10 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
 def test_a_better_model_set_at_run_time_lowers_the_error(
     comparison, robot, viewer, call, wait_until, tmp_path
 ):
-    """Predictions are those of an offline run in double precision, and a service says it."""
-    node = comparison()
-    robot(node).send(MOTION)
-    wait_until(lambda: node.film.counts.received == len(MOTION))
-    node.publish()
-    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
-    without = viewer.newest('comparison/stats')
-    assert without.model == 'default model'
-    assert without.rmse_um > 3 * SIGMA_UM
-    offline = offline_um(node, MOTION, precision='double')
-    found = node.residuals()
-    assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
-    readings_um = node.readings.thickness_um
-    assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
-    answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
-    assert answer.success
-    assert '\n' not in answer.message
-    assert f'rms {found.rmse_um:.2f} µm' in answer.message
-    assert '40 readings, 40 where' in answer.message
-    node.set_parameters(parameters(model_file=_true_model(tmp_path)))
-    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
-    assert viewer.newest('comparison/stats').model == 'truth.yaml'
+    """Predictions are those of an offline run in double precision, and a service says it.
 
-
-def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
-    comparison, robot, viewer, wait_until
-):
+    The surface is coloured around readings and grey elsewhere.
+    """
     node = comparison(color_max_um=5.0)
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
@@ -147,6 +124,23 @@ def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
     assert not grey[distance < radius_m - 1e-4].any()
     texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
     assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
+    without = viewer.newest('comparison/stats')
+    assert without.model == 'default model'
+    assert without.rmse_um > 3 * SIGMA_UM
+    offline = offline_um(node, MOTION, precision='double')
+    found = node.residuals()
+    assert np.array_equal(found.predicted_um, np.repeat(offline[:20], 2))
+    readings_um = node.readings.thickness_um
+    assert np.allclose(found.predicted_um + found.residual_um, readings_um, rtol=1e-14)
+    answer = call(viewer, Trigger, '/model_comparison/compare', Trigger.Request())
+    assert answer.success
+    assert '\n' not in answer.message
+    assert f'rms {found.rmse_um:.2f} µm' in answer.message
+    assert '40 readings, 40 where' in answer.message
+    node.set_parameters(parameters(model_file=_true_model(tmp_path)))
+    wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.rmse_um < 1.5 * SIGMA_UM))
+    assert viewer.newest('comparison/stats').model == 'truth.yaml'
 
 
 def test_a_zero_is_warned_of_once_film_is_expected_there(

@@ -30,7 +30,7 @@ class Worker(PaintNode):
             os.kill(os.getpid(), signal.SIGINT)
         self.create_timer(0.02, self.work)
 
-    def _validate(self, values):
+    def _validate(self, values, changed):
         if values['does'] == 'load at once':
             os.kill(os.getpid(), signal.SIGINT)
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
@@ -93,24 +93,19 @@ def options_of(
         own = {name: value for name, value in values.items() if value is not None}
         return kind(**{n: math.radians(v) if _is_angle(n) else v for n, v in own.items()})
 
-    def naming_options(command: Callable) -> Callable:
-        @wraps(command)
-        def with_names(**values: Any) -> Any:
-            try:
-                return command(**values)
-            except PaintError as error:
-                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
-                raise type(error)(said) from None
-
-        return with_names
-
-    return lambda command: naming_options(option_group(options, into, made)(command))
+    return option_group(options, into, made, called)
 
 
 def option_group(
-    options: Sequence[Decorator], into: str, kind: Callable[..., Any] = dict
+    options: Sequence[Decorator],
+    into: str,
+    kind: Callable[..., Any] = dict,
+    called: Mapping[str, str] = MappingProxyType({}),
 ) -> Decorator:
-    """Give a command these options; it takes what was given as one argument, of a kind."""
+    """Give a command these options; it takes what was given as one argument, of a kind.
+
+    In what the command then raises, words that are ``called`` otherwise as options are renamed.
+    """
 
     def with_options(function: Callable) -> Callable:
         return reduce(lambda taken, option: option(taken), reversed(options), function)
@@ -118,7 +113,11 @@ def option_group(
     def with_group(command: Callable) -> Callable:
         @wraps(command)
         def with_one(**given: Any) -> Any:
-            return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+            try:
+                return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+            except PaintError as error:
+                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
+                raise type(error)(said) from None
 
         return with_options(with_one)
 

@@ -28,7 +28,7 @@ from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     direction_parameter,
-    fixed_while_running,
+    fixed,
     mesh_parameters,
     requested,
 )
@@ -62,7 +62,7 @@ class IndexPlanner(PaintNode):
         standoff_m=requested(PlanRequest, 'standoff_m'),
         travel_rad=requested(PlanRequest, 'travel_rad'),
         gun_turns=requested(IndexRequest, 'gun_turns', False),
-        **fixed_while_running(
+        **fixed(
             'passes are planned once, when the node starts; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.02),
             direction=requested(PlanRequest, 'direction', 'horizontal'),
@@ -214,8 +214,8 @@ class IndexPlanner(PaintNode):
 
     # --- parameters and diagnostics
 
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'model_file' in names:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        if 'model_file' in changed:
             self._next_model = model_from_parameters(values)
 
     def _on_change(self, names: set[str]) -> None:

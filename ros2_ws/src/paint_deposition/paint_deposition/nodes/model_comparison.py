@@ -25,9 +25,9 @@ from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import (
+    CONFIGURED,
     NodeParameter,
-    fixed_while_configured,
-    thickness_parameter,
+    fixed,
 )
 from paint_deposition.nodes.runtime.topics import ColouredMesh, header
 from paint_deposition.part.facing import turned
@@ -44,16 +44,19 @@ class ModelComparison(PaintingNode):
     """
 
     PARAMETERS = PAINTING | dict(
-        **fixed_while_configured(
+        **fixed(
             'the film is painted where they were taken; clean the node up or restart it',
+            CONFIGURED,
             measurements_file=NodeParameter(
                 '',
                 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh '
                 '[path]',
             ),
         ),
-        color_max_um=thickness_parameter(
-            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+        color_max_um=NodeParameter(
+            0.0,
+            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]',
+            (0.0, 10_000.0),
         ),
     )
     PRECISION = 'double'

@@ -39,7 +39,7 @@ from paint_deposition.nodes.runtime.parameters import (
     atomizers_parameter,
     direction_parameter,
     display_parameters,
-    fixed_while_running,
+    fixed,
     mesh_parameters,
     require_display,
 )
@@ -56,7 +56,7 @@ class WebView(PaintNode):
     """
 
     PARAMETERS = display_parameters() | dict(
-        fixed_while_running(
+        fixed(
             'the page is served with it; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.01),
             down=direction_parameter('As for deposition_simulator [-]'),
@@ -128,7 +128,7 @@ class WebView(PaintNode):
     def close(self) -> None:
         self.page.close()
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         require_display(values)
 
     def _on_change(self, names: set[str]) -> None:

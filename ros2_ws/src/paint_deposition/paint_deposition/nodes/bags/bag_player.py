@@ -41,7 +41,7 @@ from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, pose_message
 
 
@@ -57,7 +57,7 @@ class BagPlayer(PaintNode):
     same time while the replay is paused.
     """
 
-    PARAMETERS = fixed_while_running(
+    PARAMETERS = fixed(
         'the replay has begun with it; start another player',
         bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
         pose_topic=NodeParameter(

@@ -17,11 +17,12 @@ from rosbags.interfaces import (
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
+    CONFIGURED,
     FILE_NAME,
     FILE_NAME_RULE,
     NodeParameter,
     atomizers_parameter,
-    fixed_while_configured,
+    fixed,
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
@@ -41,8 +42,9 @@ RECORDER = dict(
         'Folder in which the run is created [path]',
         fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
-    **fixed_while_configured(
+    **fixed(
         'the run is made with it; clean the node up, or call ~/stop and start another recorder',
+        CONFIGURED,
         topics=NodeParameter(
             [],
             'Topics to record; empty: motion, film, plan, diagnostics and parameter changes '

@@ -156,11 +156,11 @@ class AtomizerInput:
                 self._held.append(message)
             else:
                 self.anomalies['messages dropped, since too many waited for the part'] += 1
-        elif isinstance(message, AtomizerState):
-            self._switch(message)
-        else:
+        elif isinstance(message, PoseStamped):
             self.tf_queue.append((time.monotonic(), message))
             self._place()
+        else:
+            self._switch(message)
 
     # --- batches
 

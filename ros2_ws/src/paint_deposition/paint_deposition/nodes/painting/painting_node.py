@@ -1,7 +1,9 @@
 """The base class of the nodes that paint: the part, the incoming motion, the models."""
 
+import threading
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
 from dataclasses import replace
 from typing import Any
 
@@ -22,7 +24,6 @@ from paint_deposition.nodes.painting.painting_parameters import (
     models_from_parameters,
     read_part,
 )
-from paint_deposition.nodes.painting.repainting import Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.part.facing import facing, toward_the_gun
@@ -30,6 +31,69 @@ from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
+
+
+class Repainting:
+    """Compiles models in a thread, and repaints the motion so far with them.
+
+    Args:
+        current: the films to replace, one for each gun; painting goes on in them meanwhile.
+        make: creates the new, unpainted films; called in the thread.
+        from_start: whether to repaint the motion so far.
+
+    Attributes:
+        prepared: the films, or an error, once the thread has ended.
+        aborted: set it to stop as soon as possible, but after a compilation under way.
+    """
+
+    def __init__(
+        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool
+    ) -> None:
+        self._logs = [gun.log for gun in current.guns]
+        self._make, self._from_start = make, from_start
+        self.aborted = threading.Event()
+        self.prepared: Future[LiveFilms] = Future()
+        threading.Thread(target=self._run, name='repainting', daemon=True).start()
+
+    def _run(self) -> None:
+        try:
+            films = self._make()
+            films.warm_up()
+            repainted = zip(films.guns, self._logs, strict=True) if self._from_start else ()
+            for film, log in repainted:
+                # The rest is for the thread of the executor, which must not be blocked.
+                while log.poses - film.log.poses > 250 and log.complete:
+                    for event in log.events(film.log.poses, film.log.changes):
+                        if self.aborted.is_set():
+                            return
+                        film.replay([event])
+            self.prepared.set_result(films)
+        except BaseException as error:  # raised again by `result`
+            self.prepared.set_exception(error)
+
+    def result(self, current: LiveFilms) -> LiveFilms | None:
+        """The films to continue with, up to date; call it once they are ``prepared``.
+
+        Returns:
+            The new films, or ``current`` with the new models if the motion so far is not
+            repainted. None if the motion was restarted meanwhile: repaint again.
+
+        Raises:
+            Exception: whatever was raised in the thread.
+        """
+        films = self.prepared.result()
+        if not self._from_start or not all(log.complete for log in self._logs):
+            for gun, prepared in zip(current.guns, films.guns, strict=True):
+                gun.switch_model(prepared.model)
+            return current
+        if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
+            return None
+        for film, gun in zip(films.guns, current.guns, strict=True):
+            if gun.log.poses or gun.log.changes:
+                film.replay(gun.log.events(film.log.poses, film.log.changes))
+            else:  # after a reset the gun stays on or off
+                film.reset_keeping_trigger_of(gun)
+        return films
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -189,12 +253,10 @@ class PaintingNode(ManagedNode, ABC):
 
     # --- the part and the model
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
-
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if names & MODEL_PARAMETERS:
+        if changed & MODEL_PARAMETERS:
             # Effect files are tested in the thread that repaints, so that poses do not wait.
             self._next_models = models_from_parameters(values, read_effect_file)
 
@@ -230,12 +292,12 @@ class PaintingNode(ManagedNode, ABC):
 
     def _abort_repainting(self) -> None:
         if self.repainting is not None:
-            self.repainting.abort()
+            self.repainting.aborted.set()
             self.repainting = None
 
     def _update(self) -> None:
         """Adopt a repainted film, and turn the part inside out if the guns point at its back."""
-        if self.repainting is not None and self.repainting.done:
+        if self.repainting is not None and self.repainting.prepared.done():
             self._adopt(self.repainting)
         oriented = self._toward_the_guns()
         if oriented is self.surface:

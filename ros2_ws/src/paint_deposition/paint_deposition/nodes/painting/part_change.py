@@ -18,6 +18,7 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
@@ -93,8 +94,8 @@ class PartChange:
             raise PaintError(self._save_error)
 
     def status(self) -> Status:
-        """The status of the part and of its last change."""
-        part = self.part
+        """The status of the part and of its last change, and whether paint lands on it."""
+        part, film = self.part, self._node.film.snapshot()
         ready = [v[0] for v, kept in self._parts.items() if v != self._version and kept.done()]
         values = {
             'type': part.type or 'unknown',
@@ -111,6 +112,13 @@ class PartChange:
         if self._gap_s > 0.05:
             late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
             return Status(WARN, f'{late}: prepare it before the part comes', values)
+        # Less paint may fly past before the part.
+        if film.emitted_cm3 >= 5.0 and film.raw_um.max() <= NO_PAINT_UM:
+            beside = (
+                f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
+                'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
+            )
+            return Status(WARN, beside, values)
         return Status(OK, part.run or 'the part has no serial number', values)
 
     # --- the change
@@ -144,7 +152,8 @@ class PartChange:
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
-        began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
+        began_s = time.monotonic()
+        following.last_sent_ns = max(source.sent_ns for source in node.inputs)
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
         self.waiting = True
@@ -275,18 +284,13 @@ class PartChange:
         self._resets += 1
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
-        self.part.last_sent_ns = self._last_sent_ns
+        self.part.last_sent_ns = max(source.sent_ns for source in self._node.inputs)
         self._is_heard(within_s=1.0)
         self._publish(self._newest_ns(), ())
 
     def _is_heard(self, within_s: float = 0.0) -> bool:
         """Whether all subscribers have the newest message of the part."""
         return self._publisher.wait_for_all_acked(Duration(seconds=within_s))
-
-    @property
-    def _last_sent_ns(self) -> int:
-        """When the newest pose of any gun was sent, 0 before the first."""
-        return max(source.sent_ns for source in self._node.inputs)
 
     def _newest_ns(self) -> int:
         """Stamp of the newest pose of the part in the cell; without any the time now."""

@@ -26,7 +26,7 @@ from paint_deposition.nodes.robot.robot_poses import (
     TfPoses,
 )
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import (
     POSE_DEPTH,
     AdaptiveSubscription,
@@ -55,7 +55,7 @@ class AtomizerSource(PaintNode):
     message, or at the time it was sent if there is none.
     """
 
-    PARAMETERS = fixed_while_running(
+    PARAMETERS = fixed(
         'the subscriptions are made with it when the node starts; restart the node',
         urdf_file=NodeParameter(
             '',
@@ -141,7 +141,7 @@ class AtomizerSource(PaintNode):
         self.create_steady_timer(0.1, self._discover_topics)
         self.report({'robot': self._robot_status, 'signals': self._signals_status})
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
             raise PaintError(
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
@@ -207,7 +207,9 @@ class AtomizerSource(PaintNode):
             subscription.match_qos()
 
     def _on_signal_message(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
-        """Take trigger, flow, brush and speed, which may be fields of one message."""
+        """Take trigger, flow, brush and speed, which may be fields of one message, and publish
+        the state if it has changed.
+        """
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         problem = ''
         for name, signal in self._signals.items():
@@ -227,13 +229,8 @@ class AtomizerSource(PaintNode):
             else:
                 self._values[name] = value
         self._problems[topic] = problem
-        if not problem:
-            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
-            self._publish_state(stamp or now_ns)
-
-    def _publish_state(self, stamp: int) -> None:
-        """Publish the state if all signals are known and it has changed."""
-        if self._signals.keys() - self._values.keys():
+        # All signals must be known.
+        if problem or self._signals.keys() - self._values.keys():
             return
         full = self.values['calibrated_flow']
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
@@ -245,7 +242,8 @@ class AtomizerSource(PaintNode):
         )
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
-            state.header = header(self._base, stamp)
+            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
+            state.header = header(self._base, stamp or now_ns)
             self._state_publisher.publish(state)
 
     # --- diagnostics

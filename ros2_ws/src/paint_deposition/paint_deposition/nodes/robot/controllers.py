@@ -22,7 +22,7 @@ from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import header
 
 TIMEOUT_S = 5.0
@@ -78,7 +78,7 @@ class SignalSource(PaintNode):
         self.report({'signals': self.status})
         self.start_thread(self._keep_following)
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if urlsplit(values['url']).username is not None:
             raise PaintError(
                 f'{self.get_name()}: url holds a login, which all nodes of the cell could read; '
@@ -170,7 +170,7 @@ class RwsSource(SignalSource):
     Events have no time of their own: `delay_s` is taken from their arrival.
     """
 
-    PARAMETERS = fixed_while_running(
+    PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
         user=NodeParameter(
@@ -239,7 +239,7 @@ class OpcuaSource(SignalSource):
     that sends none.
     """
 
-    PARAMETERS = fixed_while_running(
+    PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
         period_s=NodeParameter(
@@ -262,8 +262,8 @@ class OpcuaSource(SignalSource):
     )
     PASSWORD = 'OPCUA_PASSWORD'
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
-        super()._validate(values)
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        super()._validate(values, changed)
         keys = [values['certificate_file'], values['private_key_file']]
         if (values['security_policy'] != 'None') != all(keys) or any(keys) != all(keys):
             raise PaintError(

@@ -13,7 +13,7 @@ from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import POSE_DEPTH, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
@@ -173,7 +173,7 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
-    PARAMETERS = fixed_while_running(
+    PARAMETERS = fixed(
         'the stream is read with it; restart the node',
         address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
         robot_address=NodeParameter(
@@ -213,7 +213,7 @@ class EgmSource(PaintNode):
         self.report({'robot': self.status})
         self.start_thread(self._listen)
 
-    def _validate(self, values: Any) -> None:
+    def _validate(self, values: Any, changed: set[str]) -> None:
         egm_message()
         if len(values['external_joints']) != len(values['external_scales']):
             raise PaintError(

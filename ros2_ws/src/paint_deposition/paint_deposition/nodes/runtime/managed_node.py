@@ -10,10 +10,10 @@ from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Ta
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     ParameterTable,
-    fixed_while_running,
+    fixed,
 )
 
-MANAGED = fixed_while_running(
+MANAGED = fixed(
     'it is read when the node starts',
     autostart=NodeParameter(
         True,

@@ -81,7 +81,7 @@ class PaintNode(Node):
             named = {name: v for name, v in self.values.items() if name != 'output_directory'}
             files = [Path(file).resolve() for file in self._files_of(named)]
             self._input_folders = [file if file.is_dir() else file.parent for file in files]
-            self._validate(self.values)
+            self._validate(self.values, set())
             self._start()
         except PaintError:
             # The subclass is not constructed yet: it has nothing of its own to destroy.
@@ -113,14 +113,14 @@ class PaintNode(Node):
 
     # --- for the subclass
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
-        """Raise PaintError if these values contradict each other."""
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        """Raise PaintError if these values contradict each other, or cannot be had now.
+
+        ``changed`` has the names of those that change in a node whose files have been read.
+        """
 
     def _load_files(self) -> None:
         """Read the files named in ``self.values``; a PaintError ends the node."""
-
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        """Raise PaintError if these parameters cannot be changed to the new values now."""
 
     def _on_change(self, names: set[str]) -> None:
         """Apply the changes of these parameters; ``self.values`` has the new values."""
@@ -257,9 +257,7 @@ class PaintNode(Node):
                 self.PARAMETERS[name].checked(name, new[name])
             for file in self._files_of(new):
                 self.require_named_folder(file)
-            self._validate(self.values | new)
-            if self.configured:
-                self._validate_change(self.values | new, set(new))
+            self._validate(self.values | new, set(new) if self.configured else set())
         except (PaintError, MemoryError) as error:
             reason = str(error) or 'not enough memory'
             return SetParametersResult(successful=False, reason=reason)

@@ -22,7 +22,7 @@ from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_b
 
 # By the endings of names.
 UNITS = {'_m_per_s': 'm/s', '_m_per_s2': 'm/s2', '_um': 'µm', '_rad': 'rad', '_m': 'm'}
-RUNS = 'runs'  # `fixed_while`: in every state
+RUNS, CONFIGURED = 'runs', 'is configured'  # `fixed_while`; a node that runs is in any state
 # Room is left for what is appended: a date, the number of a coat, the ending of a file.
 FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9._-]{0,199}')
 FILE_NAME_RULE = (
@@ -148,25 +148,19 @@ def requested(
     return NodeParameter(default, f'{text} [{unit}]', bounds)
 
 
-def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter:
-    """A row for a film or a difference of films [um]."""
-    return NodeParameter(default, description, (0.0, 10_000.0))
-
-
 def display_parameters() -> dict[str, NodeParameter]:
     """The rows that say how a film is shown, and what film is wanted."""
+    described = {
+        'color_min_um': 'Film at the lower end of the colours; both ends 0: automatic',
+        'color_max_um': 'Film at the upper end of the colours; both ends 0: automatic',
+        'painted_above_um': 'Thinner film counts, and is shown, as bare metal',
+        'target_um': 'Film wanted; 0: none',
+        'target_tolerance_um': 'Allowed difference from the target',
+    }
+    defaults = {'painted_above_um': DEFAULT_PAINTED_ABOVE_UM}
     return {
-        'color_min_um': thickness_parameter(
-            'Film at the lower end of the colours; both ends 0: automatic [µm]'
-        ),
-        'color_max_um': thickness_parameter(
-            'Film at the upper end of the colours; both ends 0: automatic [µm]'
-        ),
-        'painted_above_um': thickness_parameter(
-            'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-        ),
-        'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
-        'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
+        name: NodeParameter(defaults.get(name, 0.0), f'{text} [µm]', (0.0, 10_000.0))
+        for name, text in described.items()
     }
 
 
@@ -233,19 +227,12 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
     }
 
 
-def fixed_while_running(
-    because: str, fixed_while: str = RUNS, /, **rows: NodeParameter
-) -> ParameterTable:
-    """The rows, fixed for this reason while the node runs."""
+def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> ParameterTable:
+    """The rows, fixed for this reason while the node runs, or `CONFIGURED`."""
     return {
         name: replace(row, fixed_because=because, fixed_while=fixed_while)
         for name, row in rows.items()
     }
-
-
-def fixed_while_configured(because: str, **rows: NodeParameter) -> ParameterTable:
-    """The rows, fixed for this reason while a managed node is configured."""
-    return fixed_while_running(because, 'is configured', **rows)
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
