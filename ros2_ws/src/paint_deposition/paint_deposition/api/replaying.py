@@ -99,7 +99,15 @@ class Replay:
     def paint(self, stop: Event) -> None:
         """Paint once, until the end or until that is no longer wanted."""
         self.scene.begin_again()
-        films = LiveFilms(tuple(map(self._unpainted, self._motions, self._models)))
+        unpainted = []
+        for gun, model in zip(self._motions, self._models, strict=True):
+            film = LiveFilm(
+                self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
+            )
+            # It knows when the gun will be switched, as it does offline.
+            film.replay(events_of(gun.trajectory, until=0))
+            unpainted.append(film)
+        films = LiveFilms(tuple(unpainted))
         self._show(films, 0.0)
         shown_ns = now_ns = self._start_ns - 1
         began_s = time.monotonic()
@@ -125,14 +133,6 @@ class Replay:
                         self.scene.move_gun(name, place, z_axis, flow)
             shown_ns = now_ns
             self._show(films, (now_ns - self._start_ns) * 1e-9)
-
-    def _unpainted(self, motion: GunMotion, model: DepositionModel) -> LiveFilm:
-        """A film that knows when the gun will be switched, as it is offline."""
-        film = LiveFilm(
-            self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
-        )
-        film.replay(events_of(motion.trajectory, until=0))
-        return film
 
     def _show(self, films: LiveFilms, time_s: float) -> None:
         film, (target_um, tolerance_um) = films.snapshot(), self._target

@@ -145,20 +145,8 @@ class ModelComparison(PaintingNode):
         self._shown = film
         residuals = self.residuals()
         stamp_ns = self.film.newest_ns or 0
-        self._stats_publisher.publish(self._stats(residuals, stamp_ns))
-        means = self._experiment.means
-        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
-        scale = self._scale
-        rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
-
-    def _publish_legend(self) -> None:
-        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
-        self._legend_publisher.publish(bar)
-
-    def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self.readings.positions_m[residuals.worst].tolist()
-        return ComparisonStats(
+        stats = ComparisonStats(
             header=header(self.frame.frame_id, stamp_ns),
             model=self._model_name,
             readings=len(residuals),
@@ -171,6 +159,16 @@ class ModelComparison(PaintingNode):
             worst_position=Point(x=x, y=y, z=z),
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
+        self._stats_publisher.publish(stats)
+        means = self._experiment.means
+        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
+        scale = self._scale
+        rows = scale.rows(self._spreading @ at_points, self._coloured)
+        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
+
+    def _publish_legend(self) -> None:
+        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
+        self._legend_publisher.publish(bar)
 
     def _compare(self) -> tuple[bool, str]:
         """The comparison in one line."""

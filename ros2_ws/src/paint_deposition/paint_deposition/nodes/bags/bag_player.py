@@ -41,8 +41,9 @@ from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, pose_message
+from paint_deposition.request import MotionOptions
 
 
 class BagPlayer(PaintNode):
@@ -60,11 +61,7 @@ class BagPlayer(PaintNode):
     PARAMETERS = fixed(
         'the replay has begun with it; start another player',
         bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
-        pose_topic=NodeParameter(
-            '',
-            "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only "
-            'one [topic]',
-        ),
+        pose_topic=requested(MotionOptions, 'pose_topic', ''),
         tf=NodeParameter(
             [],
             'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
@@ -76,10 +73,8 @@ class BagPlayer(PaintNode):
         urdf=NodeParameter(
             '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
         ),
-        tip_link=NodeParameter(
-            '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
-        ),
-        base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
+        tip_link=requested(MotionOptions, 'tip_link', ''),
+        base_link=requested(MotionOptions, 'base_link', ''),
         state_topic=NodeParameter(
             '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
         ),
@@ -199,11 +194,12 @@ class BagPlayer(PaintNode):
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
         status = self._flow_control.status if self._time.running else 'paused'
+        ahead = self._flow_control.lag(time.monotonic())
         values = {
             'bag': self.values['bag'],
             'poses published': self.poses_published,
             'states published': self.states_published,
-            'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
+            'poses ahead of the slowest subscriber': max(ahead.values(), default=0),
         }
         return Status(WARN if status.startswith('waiting') else OK, status, values)
 

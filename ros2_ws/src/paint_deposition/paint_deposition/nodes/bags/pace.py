@@ -128,14 +128,15 @@ class FlowControl:
         self._discovered_s = -math.inf
         self._mute: set[str] = set()
         self.status = 'starting'
-        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
+        node.create_subscription(
+            PoseProgress, PROGRESS_TOPIC,
+            lambda said: self.report(
+                said.reporter or None, stamp_ns(said.header), time.monotonic()
+            ),
+            PROGRESS,
+        )  # fmt: skip
 
     # --- who has taken what
-
-    @property
-    def poses_ahead(self) -> int:
-        """Poses that the slowest reporting subscriber has not taken yet."""
-        return max(self.lag(time.monotonic()).values(), default=0)
 
     def add_sent(self, stamp_ns: int, now_s: float) -> None:
         """Add a pose that is about to be published, by its stamp."""
@@ -184,10 +185,6 @@ class FlowControl:
                 if subscriber.taken < self._sent and not subscriber.never_reported:
                     waited_for[name] = self._sent - subscriber.taken
             return waited_for
-
-    def _take_report(self, progress: PoseProgress) -> None:
-        stamp = stamp_ns(progress.header)
-        self.report(progress.reporter or None, stamp, time.monotonic())
 
     def _discover(self) -> frozenset[str]:
         """Full names of the subscribers that also publish progress."""

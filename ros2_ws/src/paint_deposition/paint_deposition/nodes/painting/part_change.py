@@ -160,7 +160,13 @@ class PartChange:
         try:
             notes += await self._receive_all(following.last_sent_ns)
             await self._begin(following, request)
-            unplaced = self._place(request.part_pose)
+            # After the part: a recorder then knows whose pose it is.
+            unplaced = ''
+            if len(request.part_pose):
+                kind, values = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
+                placed = node.set_parameters_atomically([Parameter('part_pose', kind, values)])
+                if not placed.successful:
+                    unplaced = f'it stands where the part before did: {placed.reason}'
         finally:
             self.waiting = False
             node.release()
@@ -195,20 +201,6 @@ class PartChange:
         self.part, self._since = following, datetime.now(timezone.utc)
         self._run, self._resets = following.run, 0
         self._publish(since_ns, request.part_pose)
-
-    def _place(self, part_pose: Sequence[float]) -> str:
-        """Say where the part stands, after the part: a recorder then knows whose pose it is.
-
-        Returns:
-            Why it stands where the part before did, if it does.
-        """
-        if not len(part_pose):
-            return ''
-        pose = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, list(part_pose))
-        placed = self._node.set_parameters_atomically([pose])
-        return '' if placed.successful else (
-            f'it stands where the part before did: {placed.reason}'
-        )  # fmt: skip
 
     async def _receive_all(self, last_sent_ns: int) -> list[str]:
         """Paint what was sent until then, and keep what was sent later.

@@ -26,7 +26,7 @@ from paint_deposition.nodes.robot.robot_poses import (
     TfPoses,
 )
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
 from paint_deposition.nodes.runtime.topics import (
     POSE_DEPTH,
     AdaptiveSubscription,
@@ -34,6 +34,7 @@ from paint_deposition.nodes.runtime.topics import (
     message_class,
     pose_message,
 )
+from paint_deposition.request import MotionOptions
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -69,11 +70,7 @@ class AtomizerSource(PaintNode):
             '', 'Link or frame of the poses; empty: the root of urdf_file [name]'
         ),
         joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
-        joint_prefix=NodeParameter(
-            '',
-            "What the joints' names have before those of urdf_file, or lack; empty: nothing "
-            '[name]',
-        ),
+        joint_prefix=requested(MotionOptions, 'joint_prefix', ''),
         angle_unit=NodeParameter(
             '',
             'Unit of joints that turn; empty: rad, unless they turn too far [name]',

@@ -124,25 +124,24 @@ class SignalSource(PaintNode):
                 at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
             self._newest_ns = max(self._newest_ns, at_ns)
             self._received[kind] = value
-            if not {*self.signals.values()} - self._received.keys():
-                self._publish(self._newest_ns)
+            if {*self.signals.values()} - self._received.keys():
+                return
+            values, known = self.values, self._received
+            full, flow = values['calibrated_flow'], known.get('flow', math.nan)
+            state = AtomizerState(
+                spraying=known['trigger'] > values['trigger_level'],
+                flow=flow / full if full > 0.0 and 'flow' in known else 1.0,
+                **{field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()},
+            )
+            if str(state) != self._published:  # NaN does not equal itself
+                self._published = str(state)
+                state.header = header('', self._newest_ns)
+                self._publisher.publish(state)
 
     def refuse(self, signal: str, reason: str) -> None:
         """Say why what came of a signal is no value."""
         with self._lock:
             self._problems[signal] = f'{signal} {reason}; the gun stays as it was'
-
-    def _publish(self, at_ns: int) -> None:
-        values, known = self.values, self._received
-        spraying = known['trigger'] > values['trigger_level']
-        full, flow = values['calibrated_flow'], known.get('flow', math.nan)
-        relative = flow / full if full > 0.0 and 'flow' in known else 1.0
-        points = {field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()}
-        state = AtomizerState(spraying=spraying, flow=relative, **points)
-        if str(state) != self._published:  # NaN does not equal itself
-            self._published = str(state)
-            state.header = header('', at_ns)
-            self._publisher.publish(state)
 
     def status(self) -> Status:
         with self._lock:

@@ -246,6 +246,8 @@ class EgmSource(PaintNode):
         self._socket.close()
 
     def _listen(self) -> None:
+        frame_id, names = self.values['frame_id'], self.values['joint_names']
+        external = self.values['external_joints']
         while not self.stopped.is_set():
             try:
                 packet, (sender, _) = self._socket.recvfrom(65_536)
@@ -256,21 +258,15 @@ class EgmSource(PaintNode):
                 self.stream.invalid += 1
             elif position := self.stream.take(packet, arrived_ns, sender):
                 self._heard_s = time.monotonic()
-                self._publish(*position)
-
-    def _publish(
-        self, stamp: int, pose: tuple[float, ...] | None, joints: np.ndarray, axes: np.ndarray
-    ) -> None:
-        frame_id = self.values['frame_id']
-        if pose is not None:
-            self._poses.publish(pose_message(frame_id, stamp, pose))
-        names, external = self.values['joint_names'], self.values['external_joints']
-        if len(joints) >= len(names) and len(axes) >= len(external):
-            scaled = axes[: len(external)] * self.values['external_scales']
-            positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
-            at = header(frame_id, stamp)
-            message = JointState(header=at, name=[*names, *external], position=positions)
-            self._joints.publish(message)
+                stamp, pose, joints, axes = position
+                if pose is not None:
+                    self._poses.publish(pose_message(frame_id, stamp, pose))
+                if len(joints) >= len(names) and len(axes) >= len(external):
+                    scaled = axes[: len(external)] * self.values['external_scales']
+                    positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
+                    at = header(frame_id, stamp)
+                    message = JointState(header=at, name=[*names, *external], position=positions)
+                    self._joints.publish(message)
 
     def status(self) -> Status:
         stream, values = self.stream, self.values

@@ -6,7 +6,7 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, Field, TypeAdapter, ValidationError
 from rcl_interfaces.msg import (
@@ -135,7 +135,10 @@ def requested(
     if isinstance(default, bool):
         return NodeParameter(default, f'{text.replace("default:", "false:")} [true/false]')
     if isinstance(default, str):
-        return NodeParameter(default, f'{text} [name]', choices=get_args(field.annotation))
+        choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+        return NodeParameter(
+            default, f'{text.replace("default:", "empty:")} [name]', None, choices
+        )
     unit = next(unit for ending, unit in UNITS.items() if name.endswith(ending))
     text = text.replace(f' [{unit}]', '').replace('default:', '0:')
     low, high = -math.inf, math.inf
