@@ -55,10 +55,7 @@ def test_the_film_is_that_of_the_written_files(improved):
 @pytest.mark.parametrize(
     ('more', 'words'),
     [
-        (
-            ('--speed-min', 0.5, '--speed-max', 0.2),
-            ('--speed-min is 0.5, above --speed-max',),
-        ),
+        (('--speed-min', 0.5, '--speed-max', 0.2), ('--speed-min is 0.5, above --speed-max',)),
         (('--flow', 0, 1), ('--flow', '0.0')),
         (('--acceleration', 'fast'), ('fast',)),
         (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),

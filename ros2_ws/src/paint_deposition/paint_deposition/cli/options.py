@@ -18,13 +18,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import (
-    DrivingRobot,
-    FilmBand,
-    MotionOptions,
-    OnePart,
-    Request,
-)
+from paint_deposition.request import DrivingRobot, FilmBand, MotionOptions, OnePart, Request
 
 Decorator = Callable[[Callable], Callable]
 

@@ -35,11 +35,7 @@ from paint_deposition.nodes.runtime.parameters import (
 from paint_deposition.nodes.runtime.topics import header, pose_message
 from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.requests import (
-    GunEnvelope,
-    IndexRequest,
-    PlanRequest,
-)
+from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
 
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]

@@ -24,11 +24,7 @@ from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
-from paint_deposition.nodes.runtime.parameters import (
-    CONFIGURED,
-    NodeParameter,
-    fixed,
-)
+from paint_deposition.nodes.runtime.parameters import CONFIGURED, NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import ColouredMesh, header
 from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints

@@ -234,9 +234,9 @@ class BagPlayer(PaintNode):
                         break
                 if self.values['rate'] == 0.0:
                     self._flow_control.wait_for_room()
+                    self._time.change(time_ns=message.log_time_ns)
                 if self.stopped.is_set():
                     return
-                self._time.jump_to(message.log_time_ns)
                 self._publish(message, as_state)
         self._time.change(started=False)
         self._publish_clock()

@@ -27,7 +27,7 @@ class ReplayClock:
     """Bag time as a function of the steady clock; thread-safe.
 
     It does not advance before it is started and while it is paused. `rate` is bag seconds per
-    second; at 0, time jumps from message to message. `running` is False while paused.
+    second; at 0, time is changed from message to message. `running` is False while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -59,12 +59,6 @@ class ReplayClock:
             goes = self._started and self.running and self._rate
             self._since_s = time.monotonic() if goes else None
             self._changed.notify_all()
-
-    def jump_to(self, time_ns: int) -> None:
-        """At rate 0: jump to the time of a message."""
-        with self._changed:
-            if self._rate == 0.0:
-                self._time_ns = time_ns
 
     def wait_for(self, time_ns: int, timeout_s: float) -> bool:
         """Wait for that time, at rate 0 only for the end of a pause.

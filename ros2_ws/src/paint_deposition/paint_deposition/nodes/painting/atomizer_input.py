@@ -233,9 +233,8 @@ class AtomizerInput:
         self._newest, self.sent_ns = message, sent_ns
         if self._state_ahead and sent_ns > self._state_ahead[1]:
             if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
-                self.anomalies[
-                    'states stamped over 1 s ahead of the poses sent after them: set the clocks'
-                ] += 1
+                ahead = 'states stamped over 1 s ahead of the poses sent after them'
+                self.anomalies[f'{ahead}: set the clocks'] += 1
             self._state_ahead = None
         self.pose_s = time.monotonic()
         self._process(message, sent_ns)

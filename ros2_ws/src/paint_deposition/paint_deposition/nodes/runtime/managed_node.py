@@ -7,11 +7,7 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Task
-from paint_deposition.nodes.runtime.parameters import (
-    NodeParameter,
-    ParameterTable,
-    fixed,
-)
+from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
 
 MANAGED = fixed(
     'it is read when the node starts',
