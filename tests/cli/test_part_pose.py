@@ -1,14 +1,12 @@
 """Where the part stands before the robot: from every source that says so, and `paint locate`."""
 
-import json
-
 import numpy as np
 import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from cli.command import COARSE, assert_refused, film_in, level_pass, paint
+from cli.command import COARSE, assert_refused, figures_of, film_in, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -51,8 +49,7 @@ def test_the_pose_of_the_part_brings_poses_to_it(panel, tmp_path):
         (bag, '--part-pose', ' '.join(map(str, PART_POSE))),
     ):
         out = tmp_path / f'out{len(films)}'
-        done = paint('simulate', '--mesh', panel, '--trajectory', run, *COARSE, *more, '-o', out)
-        assert done.returncode == 0, done.stderr
+        done = ran('simulate', '--mesh', panel, '--trajectory', run, *COARSE, *more, '-o', out)
         films.append(film_in(out))
     assert films[0].max() > 5.0
     assert np.allclose(films[1], films[0], atol=2e-3)
@@ -191,15 +188,14 @@ def tables(tmp_path):
 
 
 def test_touched_points_give_the_pose_in_three_forms(tables):
-    done = paint('locate', *tables)
-    assert done.returncode == 0, done.stderr
+    done = ran('locate', *tables)
     option, yaml, residual, *each = done.stdout.splitlines()
     values = [float(word) for word in option.removeprefix('--part-pose ').split()]
     assert np.allclose(values, TOUCHED_POSE.values, atol=2e-4)
     assert yaml == f'part_pose: [{", ".join(option.split()[1:])}]'
     assert residual.endswith(' mm RMS')
     assert [line.split(':')[0].strip() for line in each] == list(POINTS)
-    figures = json.loads(paint('locate', *tables, '--json').stdout)
+    figures = figures_of('locate', *tables, '--json')
     assert np.allclose(figures['part_pose'], TOUCHED_POSE.values, atol=2e-4)
     assert figures['rms_m'] < 2e-4
     assert set(figures['residuals_m']) == set(POINTS)

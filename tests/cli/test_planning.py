@@ -8,7 +8,7 @@ import trimesh
 from PIL import Image
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, paint, ran
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
@@ -47,8 +47,7 @@ def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(mode
         '--tolerance', 0.2, '--width', 1.2, '--length', 2.0, '--one-way', '--standoff', 0.3,
         '--travel-deg', 90, '--gun-turns',
     )  # fmt: skip
-    done = paint('recommend', *options, '--json', cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran('recommend', *options, '--json', cwd=tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == [MARKER, 'recommendation.json', 'uniformity.png']
     assert is_picture(tmp_path / 'uniformity.png')
@@ -105,8 +104,7 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20, '--speed-max', 0.1)
-    done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
-    assert done.returncode == 0, done.stderr
+    done = ran('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
     content = json.loads(done.stdout)
     assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
     (warning,) = content['warnings']
@@ -157,8 +155,7 @@ def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp
     options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
     plans = []
     for more in (('--keep-off-m', 0.4), ('--optimise',)):
-        done = paint('plan', '--mesh', folded, *options, *more, '-o', tmp_path / 'plan')
-        assert done.returncode == 0, done.stderr
+        done = ran('plan', '--mesh', folded, *options, *more, '-o', tmp_path / 'plan')
         plans.append(json.loads(done.stdout))
         near = 'warning: the part is too near before the gun at (' in done.stderr
         assert near == ('--keep-off-m' in more)
