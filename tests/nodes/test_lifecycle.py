@@ -182,6 +182,8 @@ def test_what_it_reads_can_be_changed_while_it_is_not_configured(
 class Faulty(ManagedNode):
     """Its work fails in a way that nobody foresaw."""
 
+    NAME = 'faulty'
+
     def _configure(self):
         self.create_publisher(PoseStamped, 'poses', 10)
         return {}

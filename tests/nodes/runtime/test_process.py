@@ -19,6 +19,7 @@ from paint_deposition.nodes.runtime.node import PaintNode, run_node
 
 
 class Worker(PaintNode):
+    NAME = 'worker'
     PARAMETERS = {
         'does': NodeParameter('run', 'What it does [word]'),
     }

@@ -47,6 +47,7 @@ class IndexPlanner(PaintNode):
     The planned motion is published on `planned_path`, latched, in the frame of the mesh.
     """
 
+    NAME = 'index_planner'
     PARAMETERS = model_parameters('') | dict(
         brush=NodeParameter(
             0,

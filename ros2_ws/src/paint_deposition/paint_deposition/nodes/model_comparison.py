@@ -39,6 +39,7 @@ class ModelComparison(PaintingNode):
     them are for display only.
     """
 
+    NAME = 'model_comparison'
     PARAMETERS = PAINTING | dict(
         **fixed(
             'the film is painted where they were taken; clean the node up or restart it',

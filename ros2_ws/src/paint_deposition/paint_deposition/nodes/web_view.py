@@ -47,6 +47,7 @@ class WebView(PaintNode):
     The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
     """
 
+    NAME = 'web_view'
     PARAMETERS = display_parameters() | dict(
         fixed(
             'the page is served with it; restart the node with the new value',

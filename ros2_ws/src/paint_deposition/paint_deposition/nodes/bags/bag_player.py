@@ -58,6 +58,7 @@ class BagPlayer(PaintNode):
     same time while the replay is paused.
     """
 
+    NAME = 'bag_player'
     PARAMETERS = fixed(
         'the replay has begun with it; start another player',
         bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),

@@ -52,6 +52,7 @@ class RunRecorder(ManagedNode):
     `paint recover` reads the incomplete run.
     """
 
+    NAME = 'run_recorder'
     PARAMETERS = RECORDER
     run: RunWriter
     runs = 0

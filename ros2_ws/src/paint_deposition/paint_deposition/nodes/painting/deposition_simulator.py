@@ -42,6 +42,7 @@ class DepositionSimulator(PaintingNode):
         parts: the part in the cell, and its change.
     """
 
+    NAME = 'deposition_simulator'
     PARAMETERS = PAINTING | {
         'publish_rate_hz': NodeParameter(
             5.0,

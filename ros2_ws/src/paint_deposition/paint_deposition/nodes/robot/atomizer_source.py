@@ -51,6 +51,7 @@ class AtomizerSource(PaintNode):
     message, or at the time it was sent if there is none.
     """
 
+    NAME = 'atomizer_source'
     PARAMETERS = fixed(
         'the subscriptions are made with it when the node starts; restart the node',
         urdf_file=NodeParameter(

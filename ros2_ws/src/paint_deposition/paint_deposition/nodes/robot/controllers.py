@@ -169,6 +169,7 @@ class RwsSource(SignalSource):
     Events have no time of their own: `delay_s` is taken from their arrival.
     """
 
+    NAME = 'rws_source'
     PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
@@ -238,6 +239,7 @@ class OpcuaSource(SignalSource):
     that sends none.
     """
 
+    NAME = 'opcua_source'
     PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),

@@ -173,6 +173,7 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
+    NAME = 'egm_source'
     PARAMETERS = fixed(
         'the stream is read with it; restart the node',
         address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import concurrent.futures
 import os
-import re
 import signal
 import sys
 import threading
@@ -51,7 +50,7 @@ Task = Callable[[], Status]
 
 
 class PaintNode(Node):
-    """A node with a table of parameters, which can end its process; its class gives its name.
+    """A node with a name and a table of parameters, which can end its process.
 
     Keyword arguments are those of rclpy's Node (context, namespace, parameter_overrides, ...).
 
@@ -65,14 +64,14 @@ class PaintNode(Node):
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
+    NAME = 'paint_node'
     PARAMETERS: ParameterTable = MappingProxyType({})
     loading = stopping = False
     configured = True
     _thread: threading.Thread | None = None
 
     def __init__(self, **kwargs: Any):
-        name = re.sub(r'(?<!^)(?=[A-Z])', '_', type(self).__name__).lower()
-        super().__init__(name, **kwargs)
+        super().__init__(self.NAME, **kwargs)
         self.finished: Future = Future()
         self.stopped = threading.Event()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
