@@ -229,7 +229,7 @@ class BagPlayer(PaintNode):
                     self._flow_control.wait_for_subscribers(self._subscribers_to_await)
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
-                # Wait for the end of a pause and the time of the message, then for the flow control.
+                # Wait for the end of a pause, the time of the message, and the flow control.
                 while not self.stopped.is_set():
                     if self._time.wait_for(message.log_time_ns, timeout_s=0.05):
                         break
