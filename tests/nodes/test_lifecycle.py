@@ -202,6 +202,11 @@ def test_an_unexpected_error_leads_to_unconfigured(
     assert managed.activate() == (False, 'unconfigured')
     assert len(list(node.publishers)) == publishers
     wait_until(lambda: viewer.reports('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
+    # One that is destroyed has no services, whoever holds on to it.
+    service = '/faulty/change_state'
+    assert viewer.count_services(service) == 1
+    node.destroy_node()
+    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
     with pytest.raises(ZeroDivisionError):
         Faulty(context=ros_context)
 
@@ -232,15 +237,6 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
     assert managed.shutdown() == (True, 'finalized')
-
-
-def test_a_node_that_is_destroyed_has_no_services(ros_context, viewer, wait_until):
-    """Whoever holds on to it."""
-    node = Faulty(context=ros_context, parameter_overrides=parameters(autostart=False))
-    service = '/faulty/change_state'
-    wait_until(lambda: viewer.count_services(service) == 1, what='the service')
-    node.destroy_node()
-    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
 
 
 def of_this_process() -> tuple[int, int]:

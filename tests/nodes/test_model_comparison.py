@@ -143,9 +143,7 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     assert viewer.newest('comparison/stats').model == 'truth.yaml'
 
 
-def test_a_zero_is_warned_of_once_film_is_expected_there(
-    comparison, robot, readings, wait_until, tmp_path
-):
+def test_a_zero_is_warned_of_once_film_is_expected_there(comparison, robot, readings, wait_until):
     table = readings.read_text().splitlines()
     x, y, z, _, *rest = table[1].split(',')
     readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))
