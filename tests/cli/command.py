@@ -4,9 +4,11 @@ Figures that a command prints as JSON are held against `cli/outputs.py` every ti
 """
 
 import io
+import json
 import subprocess
 from contextlib import redirect_stderr, redirect_stdout
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -38,6 +40,18 @@ def paint(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedPr
         code = run(words)
     done = subprocess.CompletedProcess(words, code, output.getvalue(), errors.getvalue())
     return checked(done, words)
+
+
+def ran(*arguments: object, cwd: Path | None = None) -> subprocess.CompletedProcess:
+    """Run `paint`, which must succeed."""
+    done = paint(*arguments, cwd=cwd)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def figures_of(*arguments: object, cwd: Path | None = None) -> Any:
+    """The figures that `paint` prints as JSON."""
+    return json.loads(ran(*arguments, cwd=cwd).stdout)
 
 
 def assert_refused(done: subprocess.CompletedProcess, *words: str) -> None:

@@ -1,6 +1,5 @@
 """Code of effect files runs only where the user named them, or allowed it."""
 
-import json
 import shutil
 
 import pytest
@@ -45,20 +44,6 @@ def recording(folder):
     return ('watch', folder / 'run')
 
 
-def comparison(folder):
-    models = {'mine': {'effects': [{'file': str(folder / 'mine.py')}], 'sha256': DIGEST}}
-    figures = {'provenance': {'models': models, 'campaign': 'c.yaml', 'files': []}}
-    (folder / 'comparison.json').write_text(json.dumps(figures))
-    return ('watch', folder)
-
-
-def diagnosis(folder):
-    figures = {'accepted': [], 'provenance': {'campaign': 'c.yaml', 'files': []}}
-    (folder / 'diagnosis.json').write_text(json.dumps(figures))
-    (folder / 'model_before.yaml').write_text('effects: []\n')
-    return ('watch', folder)
-
-
 def campaign(folder):
     entry = {
         'name': 'panel', 'mesh': str(PANEL), 'trajectory': str(SAMPLES / 'panel_577'),
@@ -77,7 +62,7 @@ def sweep(folder):
     return ('sweep', folder / 'sweep.yaml')
 
 
-@pytest.mark.parametrize('data', [module, recording, comparison, diagnosis, campaign, sweep])
+@pytest.mark.parametrize('data', [module, recording, campaign, sweep])
 def test_code_that_only_data_name_runs_when_it_is_allowed(tmp_path, ran, data):
     words = data(tmp_path)
     more = () if words[0] == 'watch' else ('-o', tmp_path / 'out')

@@ -5,7 +5,7 @@ import json
 import pytest
 
 from brushes import switched
-from cli.command import assert_refused, level_pass, paint
+from cli.command import assert_refused, figures_of, level_pass, paint, ran
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from scenes import stamps_ns
@@ -45,8 +45,7 @@ def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
     )  # fmt: skip
     refusal = 'brush 9 is not in the model; its brushes: 1, 2, 3'
     assert_refused(paint(*given, '--strict'), refusal)
-    done = paint(*given)
-    assert done.returncode == 0, done.stderr
+    done = ran(*given)
     assert f'1 states left out: {refusal}' in done.stderr
     told = json.loads(done.stdout)
     assert told['emitted_volume_cm3'] == pytest.approx(0.7 + 1.4, rel=1e-6)
@@ -63,19 +62,16 @@ def test_a_recording_of_two_brushes_tells_its_paint(model, panel, tmp_path):
 @pytest.mark.slow
 def test_a_plan_sprays_with_the_brush_that_is_chosen(model, panel, tmp_path):
     given = ('--mesh', panel, '--model', model, '--speed', 0.4, '--max-edge-length-m', 0.05)
-    done = paint('plan', *given, '--brush', 3, '--json', '-o', tmp_path / 'plan')
-    assert done.returncode == 0, done.stderr
-    planned = json.loads(done.stdout)
+    planned = figures_of('plan', *given, '--brush', 3, '--json', '-o', tmp_path / 'plan')
     assert set(planned['paint']['spraying_time_s_by_brush']) == {'3'}
     (written,) = read_model(tmp_path / 'plan/model.yaml').brushes
     assert written == read_model(model).brushes[2]
     films = []
     for motion, *chosen in (('trajectory',), ('passes.mod', '--model', model)):
-        done = paint(
+        done = ran(
             'simulate', '--mesh', panel, '--trajectory', tmp_path / 'plan' / motion, '--json',
             '--max-edge-length-m', 0.05, *chosen, '-o', tmp_path / 'film',
         )  # fmt: skip
-        assert done.returncode == 0, done.stderr
         assert 'planned with another model' not in done.stderr
         films.append(json.loads(done.stdout)['mean_um'])
     assert films[1] == pytest.approx(films[0], rel=2e-3)

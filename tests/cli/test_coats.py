@@ -10,7 +10,7 @@ import yaml
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from brushes import NARROW, WIDE
-from cli.command import paint
+from cli.command import paint, ran
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
@@ -180,8 +180,7 @@ def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):
         assert one.sigma_um == pytest.approx(other.sigma_um, rel=1e-9)
         assert (one.rmse_um > 1.0) == off
     write_model(tmp_path / 'hidden.yaml', hidden)
-    done = paint('compare', campaign(folder), '--model', tmp_path / 'hidden.yaml', '-o', tmp_path)
-    assert done.returncode == 0, done.stderr
+    ran('compare', campaign(folder), '--model', tmp_path / 'hidden.yaml', '-o', tmp_path)
     header, *rows = (tmp_path / 'residuals.csv').read_text().splitlines()
     assert header.endswith(',layer')
     assert {(row.split(',')[0], row.split(',')[-1]) for row in rows} == {

@@ -8,7 +8,7 @@ import pytest
 import rclpy
 
 from cli.command import paint
-from paint_deposition.cli import doctor, results
+from paint_deposition.cli import results, samples
 
 
 def findings(code: int) -> dict[str, dict]:
@@ -32,7 +32,7 @@ def test_a_complete_installation_is_well():
 
 @pytest.mark.slow
 def test_a_film_that_is_not_the_known_one_is_an_error(monkeypatch):
-    monkeypatch.setattr(doctor, 'KNOWN_FILM_UM', doctor.KNOWN_FILM_UM * (1 + 2 * doctor.ROUNDING))
+    monkeypatch.setattr(samples, 'KNOWN_FILM_UM', samples.KNOWN_FILM_UM * (1 + 2e-4))
     found = findings(1)
     assert [one['name'] for one in found.values() if one['ok'] is False] == ['known film']
     assert found['known film']['remedy']
@@ -41,7 +41,7 @@ def test_a_film_that_is_not_the_known_one_is_an_error(monkeypatch):
 def test_a_library_that_is_missing_or_too_old_is_an_error_unless_an_extra_wants_it(monkeypatch):
     wanted = ['click>=99', 'nowhere>=3', 'numpy', 'elsewhere>=2; extra == "many"']
     monkeypatch.setattr(metadata, 'requires', lambda package: wanted)
-    monkeypatch.setattr(doctor, '_known_film', lambda: iter(()))
+    monkeypatch.setattr(samples, '_known_film', lambda: iter(()))
     found = findings(1)
     assert found['libraries']['remedy'] == "pip install 'click>=99' 'nowhere>=3'"
     assert found['extra many'] == {
@@ -54,7 +54,7 @@ def test_what_cannot_be_looked_at_is_an_error_with_a_remedy(monkeypatch):
     def broken():
         raise RuntimeError("cannot cache function '_fill': no locator available")
 
-    monkeypatch.setattr(doctor, '_known_film', broken)
+    monkeypatch.setattr(samples, '_known_film', broken)
     done = paint('doctor')
     assert done.returncode == 1
     assert 'BAD broken' in done.stdout
@@ -67,7 +67,7 @@ def test_no_other_python_takes_a_module_from_the_current_folder(tmp_path, monkey
     for name in ('numpy', 'rclpy', 'mine'):
         (tmp_path / f'{name}.py').write_text('open("ran", "w")')
     monkeypatch.chdir(tmp_path)
-    found = {one.name: one for one in doctor._ros()}
+    found = {one.name: one for one in samples._ros()}
     assert rclpy.get_rmw_implementation_identifier() in found['ROS 2'].found
     command = results.python('import numpy; print(numpy.array(sys.argv[1:]))\nimport mine', 'a')
     done = subprocess.run(command, capture_output=True, text=True)

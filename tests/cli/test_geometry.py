@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES, serpentine
-from cli.command import COARSE, TRIGGER, assert_refused, paint, sheet
+from cli.command import COARSE, TRIGGER, assert_refused, figures_of, paint, ran, sheet
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.trajectory import Trajectory
@@ -171,7 +171,7 @@ def test_inspect_says_and_draws_how_the_gun_ran_over_the_door(tmp_path):
         colours = {colour for _, colour in image.convert('RGB').getcolors(1 << 24)}
     for wanted in ('#00708c', '#d1701f', '#7a5195'):
         assert tuple(bytes.fromhex(wanted[1:])) in colours
-    figures = json.loads(paint('inspect', run, '--mesh', door, *TRIGGER, '--json').stdout)
+    figures = figures_of('inspect', run, '--mesh', door, *TRIGGER, '--json')
     assert figures['geometry']['sentence'] == done.stdout.splitlines()[0]
     assert (figures['mesh_file'], figures['picture']) == (str(door), None)
 
@@ -227,8 +227,7 @@ def test_a_campaign_without_paint_is_refused_by_its_experiment(campaign, tmp_pat
 
 @pytest.mark.slow
 def test_a_campaign_says_how_each_part_was_painted_and_warns_of_odd_geometry(campaign, tmp_path):
-    done = paint('compare', *campaign(shifted(0.3, 0.0, 0.0)), '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
+    done = ran('compare', *campaign(shifted(0.3, 0.0, 0.0)), '-o', tmp_path / 'out')
     figures = json.loads((tmp_path / 'out/comparison.json').read_text())['geometry']['test panel']
     assert f'\ntest panel: {figures["sentence"]}' in done.stdout
     assert figures['sentence'].startswith('3 passes, 0.40 m/s, TCP 0.2')

@@ -8,7 +8,7 @@ from PIL import Image
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, film_in, paint, sheet
+from cli.command import assert_refused, figures_of, film_in, paint, ran, sheet
 
 DOOR, BAG = SAMPLES / 'door.stl', SAMPLES / 'door_horizontal'
 COARSE = ('--max-edge-length-m', 0.06)
@@ -19,8 +19,7 @@ GIVEN = ('--mesh', DOOR, '--trajectory', BAG, '--state-topic', '/atomizer/state'
 def improved(tmp_path_factory):
     """The recorded door improved, with what was printed."""
     folder = tmp_path_factory.mktemp('improved') / 'out'
-    done = paint('improve', *GIVEN, '--json', '-o', folder)
-    assert done.returncode == 0, done.stderr
+    done = ran('improve', *GIVEN, '--json', '-o', folder)
     return folder, json.loads(done.stdout)
 
 
@@ -55,10 +54,7 @@ def test_the_film_is_that_of_the_written_files(improved):
 @pytest.mark.parametrize(
     ('more', 'words'),
     [
-        (
-            ('--speed-min', 0.5, '--speed-max', 0.2),
-            ('--speed-min is 0.5, above --speed-max',),
-        ),
+        (('--speed-min', 0.5, '--speed-max', 0.2), ('--speed-min is 0.5, above --speed-max',)),
         (('--flow', 0, 1), ('--flow', '0.0')),
         (('--acceleration', 'fast'), ('fast',)),
         (('--gun-signal', 'doGun'), ('--gun-signal is for RAPID modules',)),
@@ -74,9 +70,7 @@ def test_optimised_plans_waste_less_for_the_same_film(tmp_path):
     x, z = np.meshgrid(np.linspace(-0.3, 0.3, 13), np.linspace(-0.35, 0.35, 15), indexing='ij')
     fender = sheet(x, 0.5 * x**2 + 0.35 * z**2, z, tmp_path / 'fender.stl')
     options = ('--target-um', 20, '--optimise', '--max-edge-length-m', 0.06, '--json')
-    done = paint('plan', '--mesh', fender, *options, '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
+    told = figures_of('plan', '--mesh', fender, *options, '-o', tmp_path / 'out')
     plain, film = told['plain'], told['film']
     assert told['passes'] <= plain['passes']
     assert film['emitted_volume_cm3'] < 0.92 * plain['paint_cm3']

@@ -13,7 +13,7 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, figures_of, paint, ran
 from paint_deposition.cli.results import MARKER
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.inference.diagnosis.model_space import SURE
@@ -133,8 +133,7 @@ def test_the_guide_comes_to_a_painted_door(repository, tmp_path, demo, undrawn):
     blocks = re.findall(r'```bash\n(.*?)```', page, re.DOTALL)
     for line in ''.join(block for block in blocks if ' &\n' not in block).splitlines():
         if line.startswith('paint ') and line != DIAGNOSE:
-            done = paint(*shlex.split(line)[1:], cwd=folder)
-            assert done.returncode == 0, done.stderr
+            done = ran(*shlex.split(line)[1:], cwd=folder)
             everything += done.stdout
     assert f'\n{DIAGNOSE}\n' in page
     for printed, written in {
@@ -169,8 +168,7 @@ def test_a_diagnosis_writes_all_that_it_says(demo):
 
 @pytest.mark.slow
 def test_compare_says_where_the_model_is_off(door_alone, tmp_path):
-    done = paint('compare', door_alone, '-o', tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran('compare', door_alone, '-o', tmp_path)
     content = json.loads((tmp_path / 'comparison.json').read_text())
     assert set(content) == {
         'geometry', 'readings', 'noise', 'left_out', 'misfits', 'regions', 'dependences',
@@ -209,8 +207,7 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
     (tmp_path / 'campaign.yaml').write_text(yaml.safe_dump(content))
     for command in (['compare'], ['refit', '--add', 'none']):
         output = tmp_path / command[0]
-        done = paint(*command, tmp_path / 'campaign.yaml', '-o', output)
-        assert done.returncode == 0, done.stderr
+        done = ran(*command, tmp_path / 'campaign.yaml', '-o', output)
         lines = (done.stdout + done.stderr).splitlines()
         (told,) = (line for line in lines if 'left out of the fit' in line)
         note = told.partition(': ')[2]
@@ -226,9 +223,7 @@ def test_a_slip_among_repeats_is_left_out_and_named(door_alone, tmp_path):
 
 @pytest.mark.slow
 def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, tmp_path):
-    done = paint('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
-    assert done.returncode == 0, done.stderr
-    content = json.loads(done.stdout)
+    content = figures_of('refit', door_alone, '--add', HIDDEN, '-o', tmp_path, '--json')
     assert content['accepted'] == [HIDDEN]
     assert content['classes'][0]['parameters']['attraction']['value'] > 0.5
     model = read_model_file(tmp_path / 'model.yaml')
@@ -259,8 +254,7 @@ def test_refit_adds_an_effect_by_its_id_and_carries_the_history_on(door_alone, t
 @pytest.mark.slow
 def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
     own = shutil.copy(SAMPLES / 'my_effect.py', tmp_path)
-    done = paint('refit', door_alone, '--add', own, '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
+    done = ran('refit', door_alone, '--add', own, '-o', tmp_path / 'out')
     assert 'added wake_loss' in done.stdout
     entry = yaml.safe_load((tmp_path / 'out/model.yaml').read_text())['effects'][0]
     assert entry['file'].endswith('my_effect.py')
@@ -272,9 +266,8 @@ def test_refit_adds_an_effect_of_ones_own(door_alone, tmp_path):
 def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alone, tmp_path):
     """It is put into the model in place of the law, and compared."""
     file, output = tmp_path / 'my_incidence.py', tmp_path / 'out'
-    done = paint('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
-                 '-o', output)  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = ran('refit', door_alone, '--add', 'learned:incidence_deg', '--as-effect', file,
+               '-o', output)  # fmt: skip
     content = json.loads((output / 'diagnosis.json').read_text())
     best, *_ = content['classes'][0]['forms']
     assert best['formula'] in done.stdout
@@ -283,9 +276,8 @@ def test_refit_writes_a_learned_law_as_an_effect_that_predicts_as_well(door_alon
     own = {key: model[key] for key in ('planar', 'projection')}
     own['effects'] = [{'file': str(file), **values}]
     (tmp_path / 'own.yaml').write_text(yaml.safe_dump(own))
-    done = paint('compare', door_alone, '--model', output / 'model.yaml', '--model',
-                 tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = ran('compare', door_alone, '--model', output / 'model.yaml', '--model',
+               tmp_path / 'own.yaml', '-o', tmp_path / 'both')  # fmt: skip
     learned, own = (
         [float(r['residual_um']) for r in table(tmp_path / f'both/residuals_{name}.csv')]
         for name in ('model', 'own')

@@ -10,7 +10,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, figures_of, paint, ran
 from paint_deposition.errors import ReadingsError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -23,8 +23,7 @@ PAINTED = (*DOOR, '--trajectory', SAMPLES / 'door_horizontal')
 @pytest.fixture(scope='module')
 def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp('measured')
-    done = paint('measure', *PAINTED, '--points', 30, '-o', folder)
-    assert done.returncode == 0, done.stderr
+    done = ran('measure', *PAINTED, '--points', 30, '-o', folder)
     return folder, done
 
 
@@ -72,12 +71,10 @@ def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
     pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
     # The same motion, given in the robot's frame: the part is turned by half a turn there.
     motion = moved(read_recording(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
-    done = paint(
+    figures = figures_of(
         'measure', *DOOR, '--trajectory', write_pose_bag(tmp_path / 'run', motion), '--part-pose',
         *pose, '--points', 12, '--repeats', 0, '--json', '-o', tmp_path / 'out',
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
     first = rows_of(tmp_path / 'out/poses.csv')[0]
     assert float(first['x_m']) == pytest.approx(1.0 - figures['points'][0]['x_m'], abs=1e-5)
     assert figures['read_twice'] == []
@@ -85,8 +82,7 @@ def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
 
 @pytest.mark.slow
 def test_without_a_trajectory_passes_are_planned(tmp_path):
-    done = paint('measure', *DOOR, '--target-um', 25, '--points', 16, '--json', '-o', tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran('measure', *DOOR, '--target-um', 25, '--points', 16, '--json', '-o', tmp_path)
     films = [point['expected_um'] for point in json.loads(done.stdout)['points']]
     assert np.mean(films) == pytest.approx(25.0, rel=0.2)
 

@@ -10,14 +10,7 @@ from click.testing import CliRunner
 from paint_deposition.cli.main import paint
 from paint_deposition.cli.options import options_of
 from paint_deposition.errors import PlanError
-from paint_deposition.request import (
-    FilmBand,
-    MotionOptions,
-    OnePart,
-    Request,
-    given,
-    takes,
-)
+from paint_deposition.request import FilmBand, MotionOptions, OnePart, Request, given, takes
 
 
 class Coat(Request):

@@ -1,18 +1,16 @@
 """What commands print as JSON; `cli.command` holds every output against `cli/outputs.py`."""
 
-import json
-
 import pytest
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, figures_of, paint
 from paint_deposition.files.provenance import sha256
 
 BAG = SAMPLES / 'door_horizontal'
 
 
 def test_provenance_names_each_file_with_its_digest():
-    told = json.loads(paint('inspect', BAG, '--json').stdout)
+    told = figures_of('inspect', BAG, '--json')
     (file,) = told['provenance']['files']
     assert file == {'what': 'recording', 'file': str(BAG), 'sha256': sha256(BAG)}
 
@@ -30,12 +28,10 @@ def test_a_digest_changes_with_content_and_with_names(tmp_path):
 def test_models_side_by_side_each_given_once(tmp_path, repository):
     start, other = repository / 'config/model.yaml', tmp_path / 'other.yaml'
     other.write_text(start.read_text().replace('K1_cm3_per_s: 1.9', 'K1_cm3_per_s: 2.4'))
-    done = paint(
+    told = figures_of(
         'compare', SAMPLES / 'measured_door/unseen.yaml', '--model', start, '--model', other,
         '--json', '-o', tmp_path / 'out',
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout)
     errors = {one['name']: one['rmse_um'] for one in told['models']}
     assert list(errors) == ['model', 'other']
     assert told['best'] == min(errors, key=errors.get)

@@ -1,4 +1,4 @@
-"""Poses in the robot's frame: where the part stands in it, from every source that says so."""
+"""Where the part stands before the robot: from every source that says so, and `paint locate`."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import yaml
 from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
-from cli.command import COARSE, film_in, level_pass, paint
+from cli.command import COARSE, assert_refused, figures_of, film_in, level_pass, paint, ran
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -15,6 +15,8 @@ from paint_deposition.motion.trajectory import Trajectory
 
 # The part stands two metres before the robot, turned and leaning.
 PART_POSE = [2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat().tolist()]
+TOUCHED_POSE = Rigid.of([2.0, 0.5, 0.7, 0.0, 0.0, 0.6, 0.8])
+POINTS = {'A': [0, 0, 0], 'B': [900, 0, 10], 'C': [850, 40, 600], 'D': [30, 0, 550]}
 
 
 def seen_from_the_robot(frame_id: str = 'base_link') -> Trajectory:
@@ -47,8 +49,7 @@ def test_the_pose_of_the_part_brings_poses_to_it(panel, tmp_path):
         (bag, '--part-pose', ' '.join(map(str, PART_POSE))),
     ):
         out = tmp_path / f'out{len(films)}'
-        done = paint('simulate', '--mesh', panel, '--trajectory', run, *COARSE, *more, '-o', out)
-        assert done.returncode == 0, done.stderr
+        done = ran('simulate', '--mesh', panel, '--trajectory', run, *COARSE, *more, '-o', out)
         films.append(film_in(out))
     assert films[0].max() > 5.0
     assert np.allclose(films[1], films[0], atol=2e-3)
@@ -169,3 +170,46 @@ def test_campaigns_place_each_part(panel, tmp_path):
     placed = positions({'trajectory': str(bag), 'part_pose': PART_POSE})
     assert np.allclose(placed, expected, atol=1e-6)
     assert np.array_equal(positions({'trajectory': str(bag)}, PART_POSE), placed)
+
+
+@pytest.fixture
+def tables(tmp_path):
+    """Touched points in metres with a decimal comma, the same in the part's frame in mm."""
+    listed = np.array(list(POINTS.values())) * 1e-3
+    touched, _ = TOUCHED_POSE.applied(listed, np.tile([0.0, 0, 0, 1], (len(listed), 1)))
+    rows = [
+        ';'.join([name, *(f'{value:.4f}'.replace('.', ',') for value in at)])
+        for name, at in zip(POINTS, touched, strict=True)
+    ]
+    (tmp_path / 'touched.csv').write_text('\n'.join(['Point;X [m];Y [m];Z [m]', *rows]))
+    rows = [f'{name},{x},{y},{z}' for name, (x, y, z) in POINTS.items()]
+    (tmp_path / 'points.csv').write_text('\n'.join(['point,x_mm,y_mm,z_mm', *rows]))
+    return ('--touched', tmp_path / 'touched.csv', '--points', tmp_path / 'points.csv')
+
+
+def test_touched_points_give_the_pose_in_three_forms(tables):
+    done = ran('locate', *tables)
+    option, yaml, residual, *each = done.stdout.splitlines()
+    values = [float(word) for word in option.removeprefix('--part-pose ').split()]
+    assert np.allclose(values, TOUCHED_POSE.values, atol=2e-4)
+    assert yaml == f'part_pose: [{", ".join(option.split()[1:])}]'
+    assert residual.endswith(' mm RMS')
+    assert [line.split(':')[0].strip() for line in each] == list(POINTS)
+    figures = figures_of('locate', *tables, '--json')
+    assert np.allclose(figures['part_pose'], TOUCHED_POSE.values, atol=2e-4)
+    assert figures['rms_m'] < 2e-4
+    assert set(figures['residuals_m']) == set(POINTS)
+
+
+def test_bad_points_are_refused_with_their_files(tables, tmp_path):
+    text = (tmp_path / 'points.csv').read_text()
+    (tmp_path / 'points.csv').write_text(text.replace('B,', 'A,', 1))
+    assert_refused(paint('locate', *tables), 'points.csv', "point 'A' is elsewhere in line 2")
+    (tmp_path / 'points.csv').write_text(text.replace('B,', 'E,').replace('C,', 'F,'))
+    assert_refused(paint('locate', *tables), 'touched.csv', '2 points in common (A D)')
+    (tmp_path / 'points.csv').write_text(text.replace('point,', 'weight,'))
+    assert_refused(paint('locate', *tables), 'points.csv', 'give a column point')
+
+
+def test_both_lists_must_be_given(tables):
+    assert_refused(paint('locate', *tables[:2]), "Missing option '--points'")

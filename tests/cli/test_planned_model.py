@@ -9,7 +9,7 @@ from rosbags.highlevel import AnyReader
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import paint
+from cli.command import ran
 from paint_deposition.files.model_file import read_model
 from paint_deposition.files.provenance import model_digest, model_of_plan, origin, planned_model
 from paint_deposition.motion.programmed import PROGRAMMED
@@ -43,11 +43,10 @@ def placed(model_file, tmp_path_factory):
 
 
 def planned(folder, model_file, *more):
-    done = paint(
+    done = ran(
         'plan', '--mesh', PANEL, '--model', model_file, '--target-um', 20, '--index', 0.15,
         '--max-edge-length-m', 0.05, *more, '-o', folder,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
     first = done.stdout.splitlines()[0]
     assert first.startswith(f'model: {model_file} (')
     assert first.endswith('effects: tcp_standoff')
@@ -55,11 +54,10 @@ def planned(folder, model_file, *more):
 
 
 def simulated(motion, out, *more):
-    done = paint(
+    done = ran(
         'simulate', '--mesh', PANEL, '--trajectory', motion, '--max-edge-length-m', 0.05, *more,
         '-o', out,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
     return json.loads((out / 'stats.json').read_text()), done
 
 

@@ -4,10 +4,12 @@ import json
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from booth import SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, paint, ran
+from folded_parts import hood
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.model_file import read_model, write_model
@@ -39,36 +41,27 @@ def is_picture(path) -> bool:
         return image.width > 600 and len(np.unique(np.asarray(image.convert('L')))) > 20
 
 
-@pytest.mark.slow
-def test_recommendation_is_printed_and_written(model_file, tmp_path):
-    arguments = ('--model', model_file, '--speed', 0.2, '--tolerance', 0.1, '--width', 1.5)
-    done = paint('recommend', *arguments, '-o', tmp_path)
-    assert done.returncode == 0, done.stderr
-    expected = recommend(MODEL, IndexRequest(speed_m_per_s=0.2, tolerance=0.1, width_m=1.5))
-    written = json.loads((tmp_path / 'recommendation.json').read_text())
-    assert written.pop('provenance')['models']['model']['planar']
-    assert written == json.loads(json.dumps(expected.to_dict()))
-    assert expected.sentence in done.stdout
-    assert 'keeps its orientation' in done.stdout
-    assert is_picture(tmp_path / 'uniformity.png')
-
-
 def test_every_option_of_a_recommendation_which_lands_here_without_a_folder(model_file, tmp_path):
-    done = paint(
-        'recommend', '--model', model_file, '--target-um', 20, '--index-min', 0.4,
-        '--index-max', 0.7, '--tolerance', 0.2, '--width', 1.2, '--length', 2.0, '--one-way',
-        '--standoff', 0.3, '--travel-deg', 90, '--gun-turns', '--json', cwd=tmp_path,
+    options = (
+        '--model', model_file, '--target-um', 20, '--index-min', 0.4, '--index-max', 0.7,
+        '--tolerance', 0.2, '--width', 1.2, '--length', 2.0, '--one-way', '--standoff', 0.3,
+        '--travel-deg', 90, '--gun-turns',
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = ran('recommend', *options, '--json', cwd=tmp_path)
     names = sorted(path.name for path in tmp_path.iterdir())
     assert names == [MARKER, 'recommendation.json', 'uniformity.png']
+    assert is_picture(tmp_path / 'uniformity.png')
     content = json.loads(done.stdout)
     assert content == json.loads((tmp_path / 'recommendation.json').read_text())
-    assert content['index_range_m'] == [0.4, 0.7]
-    assert 0.4 < content['index_m'] < 0.7
-    assert content['mean_um'] == pytest.approx(20.0)
-    assert (content['travel'], content['standoff_m']) == ('one_way', 0.3)
-    assert (content['length_m'], content['gun_turns']) == (2.0, True)
+    request = IndexRequest(
+        target_um=20.0, index_min_m=0.4, index_max_m=0.7, tolerance=0.2, width_m=1.2,
+        length_m=2.0, one_way=True, standoff_m=0.3, travel_rad=np.pi / 2, gun_turns=True,
+    )  # fmt: skip
+    expected = recommend(MODEL, request)
+    assert content.pop('provenance')['models']['model']['planar']
+    assert content == json.loads(json.dumps(expected.to_dict()))
+    done = paint('recommend', *options, cwd=tmp_path)
+    assert expected.sentence in done.stdout
 
 
 @pytest.mark.parametrize(
@@ -111,8 +104,7 @@ def test_calibration_writes_model_figures_and_pictures(calibrated):
 def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     door = SAMPLES / 'door.stl'
     arguments = ('--mesh', door, '--model', model_file, '--target-um', 20, '--speed-max', 0.1)
-    done = paint('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
-    assert done.returncode == 0, done.stderr
+    done = ran('plan', *arguments, '-o', tmp_path / 'plan', '--json', '--paint-moves')
     content = json.loads(done.stdout)
     assert content == json.loads((tmp_path / 'plan' / 'plan.json').read_text())
     (warning,) = content['warnings']
@@ -147,3 +139,35 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
 def test_impossible_plans_are_refused(arguments, words, tmp_path):
     assert_refused(paint('plan', *arguments, '-o', tmp_path / 'plan'), words)
     assert not (tmp_path / 'plan').exists()
+
+
+@pytest.fixture
+def folded(tmp_path):
+    surface = hood(0.06)
+    path = tmp_path / 'hood.ply'
+    trimesh.Trimesh(surface.vertices_m, surface.faces, process=False).export(path)
+    return path
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
+def test_speeds_along_the_passes_even_the_seams_of_two_faces_further(folded, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--max-edge-length-m', 0.06, '--json')
+    plans = []
+    for more in (('--keep-off-m', 0.4), ('--optimise',)):
+        done = ran('plan', '--mesh', folded, *options, *more, '-o', tmp_path / 'plan')
+        plans.append(json.loads(done.stdout))
+        near = 'warning: the part is too near before the gun at (' in done.stderr
+        assert near == ('--keep-off-m' in more)
+    names = {path.name for path in (tmp_path / 'plan').iterdir()}
+    assert {'trajectory', 'passes.csv', 'passes.mod', 'passes.png', 'film.png'} <= names
+    assert len(plans[0]['faces']) == 2
+    assert plans[0]['sigma_n'] < plans[0]['sigma_n_unblended']
+    assert plans[1]['sigma_n'] < 0.95 * plans[0]['sigma_n']
+    assert plans[1]['film']['mean_um'] == pytest.approx(20.0, rel=0.01)
+    assert not plans[1]['contacts']
+
+
+def test_an_angle_that_is_none_is_refused(folded, tmp_path):
+    options = ('--faces', 'auto', '--target-um', 20, '--face-angle-deg', 90)
+    assert_refused(paint('plan', '--mesh', folded, *options, '-o', tmp_path / 'plan'), '90')

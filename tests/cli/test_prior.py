@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import paint
+from cli.command import ran
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.model.eq1_pattern import PATTERN
 
@@ -24,17 +24,15 @@ def folder(tmp_path_factory) -> Path:
     for one in both:
         text = yaml.safe_dump({'experiments': [one]})
         (folder / f'{one["name"]}.yaml').write_text(text)
-    done = paint('calibrate', folder / 'panel.yaml', '-o', folder / 'calibration')
-    assert done.returncode == 0, done.stderr
+    ran('calibrate', folder / 'panel.yaml', '-o', folder / 'calibration')
     return folder
 
 
 def refitted(folder: Path, campaign: str, model: str, output: Path):
     """What a refit with nothing added prints, warnings included, and its figures."""
-    done = paint(
+    done = ran(
         'refit', folder / campaign, '--add', 'none', '--model', folder / model, '-o', output
     )
-    assert done.returncode == 0, done.stderr
     return done.stdout + done.stderr, json.loads((output / 'diagnosis.json').read_text())
 
 

@@ -1,14 +1,12 @@
 """Several guns on one part, offline: one film, each gun's share, and one clear line if not."""
 
-import json
-
 import numpy as np
 import pytest
 import yaml
 
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
-from cli.command import assert_refused, paint
+from cli.command import assert_refused, figures_of, paint
 from files.recorded import Messages, pose_entries, write_bag
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.flow_drift import FlowDrift
@@ -85,12 +83,10 @@ def test_the_film_is_the_sum_of_the_guns(surface):
 
 def test_one_bag_with_both_guns(bags, tmp_path):
     guns = '--atomizer', 'robot_1', '--atomizer', '/robot_2'
-    done = paint(
+    figures = figures_of(
         'simulate', '--mesh', PANEL, '--trajectory', bags['both'], *guns, '--json', '-o', tmp_path,
         '--max-edge-length-m', 0.05,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    figures = json.loads(done.stdout)
     first, second = figures['atomizers']
     assert (first['name'], second['name']) == ('robot_1', 'robot_2')
     # The one without a state sprays all the way, the other from the middle of its pass on.

@@ -8,7 +8,7 @@ import trimesh
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint
+from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
@@ -28,11 +28,10 @@ FILES = [MARKER, 'film.csv', 'film.ply', 'film.png', 'stats.json']
 def painted_door(tmp_path_factory):
     """The sample door, painted along the sample recording, and what the command printed."""
     folder = tmp_path_factory.mktemp('door') / 'new' / 'folder'
-    done = paint(
+    done = ran(
         'simulate', '--mesh', DOOR, '--trajectory', DOOR_BAG, *TRIGGER, '--json', '-o', folder,
         '--target-um', 18, '--tolerance-um', 4,
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
     assert done.stderr == ''
     return folder, json.loads(done.stdout)
 
@@ -86,11 +85,10 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
     )
     model = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
     write_model(tmp_path / 'model.yaml', model)
-    done = paint(
+    done = ran(
         'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
         '--at', readings, *COARSE, '-o', tmp_path / 'out',
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
     assert '\nwarning: 1 of 12 readings are 0 where the model expects' in done.stderr
     lines = (tmp_path / 'out/predicted.csv').read_text().splitlines()
     assert lines[0] == 'point,x_m,y_m,z_m,thickness_um,remark,predicted_um'

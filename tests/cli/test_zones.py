@@ -7,7 +7,7 @@ import pytest
 import yaml
 
 from booth import SAMPLES
-from cli.command import COARSE, assert_refused, paint
+from cli.command import COARSE, assert_refused, paint, ran
 
 ZONES = """zones:
   - {name: foot, target_um: 20, tolerance_um: 2, box: [[-2, -2, -2], [2, 2, 0.0]]}
@@ -33,8 +33,7 @@ def test_simulate_counts_each_zone_against_its_band(panel, one_pass, zones, tmp_
         '-o',
         tmp_path / 'out',
     )
-    done = paint(*whole, '--zones', zones)
-    assert done.returncode == 0, done.stderr
+    done = ran(*whole, '--zones', zones)
     figures = json.loads((tmp_path / 'out/stats.json').read_text())
     foot, head = figures['zones']
     assert [foot['name'], head['name']] == ['foot', 'head, left']
@@ -67,8 +66,7 @@ def test_compare_tells_the_readings_of_each_zone(zones, tmp_path):
     (tmp_path / 'other.yaml').write_text(ZONES.replace('0.0', '0.3').replace(' 20,', ' 22,'))
     file.write_text(json.dumps(campaign | {'zones': 'other.yaml', 'model': 'bell.yaml'}))
     (tmp_path / 'bell.yaml').write_text('{}')
-    done = paint('compare', file, '-o', tmp_path / 'out')
-    assert done.returncode == 0, done.stderr
+    done = ran('compare', file, '-o', tmp_path / 'out')
     written = json.loads((tmp_path / 'out/comparison.json').read_text())
     foot, _ = written['zones']
     lines = (tmp_path / 'out/residuals.csv').read_text().splitlines()

@@ -9,29 +9,24 @@ from functools import cache
 from io import BytesIO
 from pathlib import Path
 
-import numpy as np
 import trimesh
 from mcap.writer import CompressionType, Writer
 
 from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
-from paint_deposition.api.shown_results import results_scenes
 from paint_deposition.batch.sweep_file import read_sweep
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.atomic import json_text
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
-from paint_deposition.files.meshes import read_mesh, write_mesh_ply
+from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.provenance import origin, planned_model
+from paint_deposition.files.provenance import planned_model
 from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
-from paint_deposition.report.live.page import FIGURES
 from robot_arm import urdf
 from workbook import write_workbook
 
@@ -198,22 +193,6 @@ def _recovered(path: Path) -> object:
         return recover(path, Path(folder) / 'recovered')
 
 
-def _results(name: str) -> Callable[[Path], object]:
-    """Reads a folder of results with this file of figures, and a film."""
-
-    def read(path: Path) -> object:
-        with tempfile.TemporaryDirectory(dir=path.parent) as folder:
-            (Path(folder) / name).symlink_to(path)
-            if name == 'stats.json':
-                surface = read_mesh(SAMPLES / 'panel.stl', max_edge_length_m=0.2)
-                film_um = np.ones(len(surface.vertices_m), np.float32)
-                colours = np.zeros((len(film_um), 4), np.uint8)
-                write_mesh_ply(Path(folder) / 'film.ply', surface, colours, thickness_um=film_um)
-            return results_scenes(Path(folder))
-
-    return read
-
-
 def _metadata(path: Path) -> object:
     with tempfile.TemporaryDirectory(dir=path.parent) as folder:
         run = Path(folder) / 'run'
@@ -234,10 +213,6 @@ def targets() -> dict[str, Target]:
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
     readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
-    made_from = origin(DepositionModel()) | {'campaign': 'campaign.yaml'}
-    compared = {'provenance': made_from}
-    figures = dict.fromkeys(FIGURES, 1.0)
-    stats = {'mesh_file': 'panel.stl', 'down': [0.0, 0.0, -1.0], 'target_um': 20.0, **figures}
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
         'rapid': Target(
@@ -275,13 +250,6 @@ def targets() -> dict[str, Target]:
         'mcap': Target('.mcap', _bag, [_mcap()]),
         'mcap_recovery': Target('.mcap', _recovered, [_mcap()]),
         'model': Target('.yaml', read_model_file, [model], 'posterior: mean: id: &a *a'),
-        'comparison': Target(
-            '.json', _results('comparison.json'), [json_text(compared).encode()],
-            '"effects": [{"id": "occlusion"}] null [] {} "brushes": NaN true',
-        ),
-        'stats': Target(
-            '.json', _results('stats.json'), [json_text(stats).encode()], 'null [] {} NaN true "'
-        ),
         'metadata': Target(
             '.yaml', _metadata, [(SAMPLES / 'panel_577/metadata.yaml').read_bytes()],
             'custom_data: model_sha256: &a *a null [] {}',

@@ -63,6 +63,14 @@ def record(start, tmp_path):
 
 
 @pytest.fixture
+def play(start):
+    """`play(bag, **parameters)`: a player of this bag, running."""
+    from paint_deposition.nodes.bags.bag_player import BagPlayer
+
+    return lambda bag, **chosen: start(BagPlayer, **{'bag': str(bag)} | chosen)
+
+
+@pytest.fixture
 def still(wait_until):
     """`still(duration_s)`: let so much time pass, in which callbacks run."""
 

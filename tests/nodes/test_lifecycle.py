@@ -3,7 +3,6 @@
 import os
 import threading
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 import pytest
@@ -183,8 +182,11 @@ def test_what_it_reads_can_be_changed_while_it_is_not_configured(
 class Faulty(ManagedNode):
     """Its work fails in a way that nobody foresaw."""
 
-    def _configure(self) -> None:
+    NAME = 'faulty'
+
+    def _configure(self):
         self.create_publisher(PoseStamped, 'poses', 10)
+        return {}
 
     def _activate(self) -> None:
         raise ZeroDivisionError('by nothing')
@@ -193,15 +195,20 @@ class Faulty(ManagedNode):
 def test_an_unexpected_error_leads_to_unconfigured(
     start, ros_context, manager, viewer, wait_until
 ):
-    node = start(partial(Faulty, 'faulty'), autostart=False)
+    node = start(Faulty, autostart=False)
     managed = manager(node)
     publishers = len(list(node.publishers))
     assert managed.configure() == (True, 'inactive')
     assert managed.activate() == (False, 'unconfigured')
     assert len(list(node.publishers)) == publishers
     wait_until(lambda: viewer.reports('faulty: state', 'ZeroDivisionError: by nothing', b'\x02'))
+    # One that is destroyed has no services, whoever holds on to it.
+    service = '/faulty/change_state'
+    assert viewer.count_services(service) == 1
+    node.destroy_node()
+    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
     with pytest.raises(ZeroDivisionError):
-        Faulty('faulty', context=ros_context)
+        Faulty(context=ros_context)
 
 
 def test_a_recorder_writes_one_whole_run_for_each_activation(
@@ -230,15 +237,6 @@ def test_a_recorder_writes_one_whole_run_for_each_activation(
         wait_until(lambda: not source.pose_publisher.get_subscription_count())
     assert len(list(tmp_path.glob('run*'))) == 2
     assert managed.shutdown() == (True, 'finalized')
-
-
-def test_a_node_that_is_destroyed_has_no_services(ros_context, viewer, wait_until):
-    """Whoever holds on to it."""
-    node = Faulty('faulty', context=ros_context, parameter_overrides=parameters(autostart=False))
-    service = '/faulty/change_state'
-    wait_until(lambda: viewer.count_services(service) == 1, what='the service')
-    node.destroy_node()
-    wait_until(lambda: viewer.count_services(service) == 0, what='its end', timeout_s=5.0)
 
 
 def of_this_process() -> tuple[int, int]:

@@ -102,11 +102,28 @@ def test_the_error_falls_to_the_noise_as_the_part_is_painted(
 def test_a_better_model_set_at_run_time_lowers_the_error(
     comparison, robot, viewer, call, wait_until, tmp_path
 ):
-    """Predictions are those of an offline run in double precision, and a service says it."""
-    node = comparison()
+    """Predictions are those of an offline run in double precision, and a service says it.
+
+    The surface is coloured around readings and grey elsewhere.
+    """
+    node = comparison(color_max_um=5.0)
     robot(node).send(MOTION)
     wait_until(lambda: node.film.counts.received == len(MOTION))
     node.publish()
+    newest = MOTION.stamps_ns[-1]
+    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: stamp_ns(m.header) == newest))
+    wait_until(lambda: viewer.newest('comparison/legend'), what='the legend')
+    mesh = viewer.newest('comparison/mesh')
+    colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
+    corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
+    places = node.readings.positions_m
+    radius_m = radius_of_readings_m(places[::2])
+    distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
+    grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
+    assert grey[distance > radius_m + 1e-4].all()
+    assert not grey[distance < radius_m - 1e-4].any()
+    texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
+    assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
     wait_until(lambda: viewer.shows('comparison/stats', lambda m: m.readings_painted == 40))
     without = viewer.newest('comparison/stats')
     assert without.model == 'default model'
@@ -126,32 +143,7 @@ def test_a_better_model_set_at_run_time_lowers_the_error(
     assert viewer.newest('comparison/stats').model == 'truth.yaml'
 
 
-def test_the_surface_is_coloured_around_readings_and_grey_elsewhere(
-    comparison, robot, viewer, wait_until
-):
-    node = comparison(color_max_um=5.0)
-    robot(node).send(MOTION)
-    wait_until(lambda: node.film.counts.received == len(MOTION))
-    node.publish()
-    newest = MOTION.stamps_ns[-1]
-    wait_until(lambda: viewer.shows('comparison/mesh', lambda m: stamp_ns(m.header) == newest))
-    wait_until(lambda: viewer.newest('comparison/legend'), what='the legend')
-    mesh = viewer.newest('comparison/mesh')
-    colours = np.array([[c.r, c.g, c.b] for c in mesh.colors])
-    corners = np.array([[p.x, p.y, p.z] for p in mesh.points])
-    places = node.readings.positions_m
-    radius_m = radius_of_readings_m(places[::2])
-    distance = np.linalg.norm(corners[:, None] - places, axis=2).min(axis=1)
-    grey = np.abs(colours - np.array(BARE_RGB) / 255.0).max(axis=1) < 1e-6
-    assert grey[distance > radius_m + 1e-4].all()
-    assert not grey[distance < radius_m - 1e-4].any()
-    texts = [m.text for m in viewer.newest('comparison/legend').markers if m.text]
-    assert (texts[0], texts[-1]) == ('-5 µm', '5 µm')
-
-
-def test_a_zero_is_warned_of_once_film_is_expected_there(
-    comparison, robot, readings, wait_until, tmp_path
-):
+def test_a_zero_is_warned_of_once_film_is_expected_there(comparison, robot, readings, wait_until):
     table = readings.read_text().splitlines()
     x, y, z, _, *rest = table[1].split(',')
     readings.write_text('\n'.join([table[0], ','.join([x, y, z, '0', *rest]), *table[2:]]))

@@ -93,7 +93,7 @@ def test_no_message_of_the_right_type_ends_a_node(
     assert not node.finished.done(), node.finished.exception()
 
 
-def test_odd_messages_spoil_no_film(made, robot, executor, wait_until, ros_context, spin, call):
+def test_odd_messages_spoil_no_film(made, robot, wait_until, call):
     """After a reset the film is as without them."""
     node = made('simulator')
     driver = robot(node)

@@ -15,7 +15,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.bags.bag_player import BagPlayer
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.topics import header
 
 MOTION = two_passes(poses=200, trigger=False)
 # The part hangs turned by 90 degrees about z, a metre along the cell's x.

@@ -105,16 +105,3 @@ def test_film_on_another_mesh_is_not_shown(
     told = 'is not on'
     wait_until(lambda: looker.reports('web_view: page', told, WARN), what='the remedy')
     assert is_bare(viewer.scene)
-
-
-def test_the_page_is_in_doubt_over_a_simulator_that_is_silent(
-    simulator, web_view, executor, wait_until
-):
-    node, view = simulator(), web_view()
-
-    def shows(words: bytes) -> bool:
-        return any(b'"kind": "trust"' in m and words in m for m in view.scene.lacking(Seen()))
-
-    wait_until(lambda: shows(b'"doubts": ""'), what='no doubt')
-    executor.remove_node(node)  # it is there, and does nothing any more
-    wait_until(lambda: shows(b'no word of the simulator for'), what='the doubt')

@@ -1,4 +1,4 @@
-"""The live page without ROS: what travels, who may look, runs painted again, results."""
+"""The live page without ROS: what travels, who may look, runs painted again."""
 
 import json
 from threading import Event
@@ -11,14 +11,11 @@ import pytest
 import paint_deposition as pd
 from chromium import CHROMIUM, Chromium
 from paint_deposition.api.replaying import Replay
-from paint_deposition.api.shown_results import results_scenes
 from paint_deposition.cli.main import run
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import GunMotion, read_recording
 from paint_deposition.report.live.page import STEP_UM, Page, Scene, Seen
-from paint_deposition.report.writers.write import write
-from small_campaign import small_campaign
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
 
@@ -148,37 +145,6 @@ def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_i
         Page(page.scenes, port=int(page.url.split(':')[2].strip('/')))
 
 
-@pytest.mark.slow
-@pytest.mark.usefixtures('undrawn')
-def test_results_show_each_part_with_each_model(tmp_path):
-    from paint_deposition.effects.library.air_drift import AirDrift
-
-    campaign = small_campaign(tmp_path)
-    found = pd.refit(campaign, AirDrift)
-    write(found, tmp_path / 'results')
-    scenes, warnings = results_scenes(tmp_path / 'results')
-    assert not warnings
-    named = [(scene.part, scene.model) for scene in scenes]
-    names = [experiment.name for experiment in campaign.experiments]
-    assert named == [(n, m) for n in names for m in ('after + air_drift', 'before')]
-    looked = [Onlooker().look(scene) for scene in scenes]
-    assert all(onlooker.film_um.max() > 1.0 for onlooker in looked)
-    rmse = [onlooker.rows['history'][-1][9] for onlooker in looked]
-    errors = found.to_dict()['experiments']
-    assert rmse[::2] == pytest.approx([e['rmse_after_um'] for e in errors], rel=0.02)
-    # From one model to the other only the film and what is said of it travel.
-    changed = looked[0].look(scenes[1]).kinds
-    assert 'part' not in changed
-    assert 'film' in changed
-    # A comparison describes its model in its figures.
-    write(pd.compare(campaign, found.model), tmp_path / 'compared')
-    compared = Onlooker().look(results_scenes(tmp_path / 'compared')[0][0])
-    np.testing.assert_array_equal(compared.film_um, Onlooker().look(scenes[0]).film_um)
-    (tmp_path / 'campaign.yaml').unlink()
-    with pytest.raises(PaintError, match='run the command in the folder in which'):
-        results_scenes(tmp_path / 'results')
-
-
 @pytest.mark.parametrize(
     ('words', 'reason'),
     [
@@ -196,19 +162,19 @@ def test_watch_says_what_it_lacks(words, reason, capsys):
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')
-def test_written_film_and_its_probe_in_a_browser(serve, scene, door, tmp_path):
+def test_a_painted_run_on_a_phone(door, tmp_path):
     surface, motion = door
-    film = pd.simulate(surface, motion)
-    write(film, tmp_path / 'results', made_from={'mesh_file': 'door.stl'})
-    ((shown,), _) = results_scenes(tmp_path / 'results')
-    page = Page([shown], port=0)
+    replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], rate=0.0)
+    replay.scene.tell('about', text='door.stl')
+    replay.paint(Event())
+    page = Page([replay.scene], port=0)
     try:
         with Chromium(tmp_path / 'browser') as browser:
             tab = browser.tab(page.url, 390, 844)
             tab.wait_until('globalThis.page?.view.film?.some((um) => um > 0)')
             assert tab.evaluate('document.body.scrollWidth') == 390  # nothing is cut off
             said = tab.evaluate("document.getElementById('figures').innerText")
-            assert f'{film.statistics.mean_um:.1f} µm' in said
+            assert f'{pd.simulate(surface, motion).statistics.mean_um:.1f} µm' in said
             assert tab.evaluate("document.getElementById('about').innerText") == 'door.stl'
     finally:
         page.close()

@@ -31,14 +31,6 @@ def publisher(cell, wait_until):
 
 
 @pytest.fixture
-def play(start):
-    """`play(bag, **parameters)`: a player of this bag, running."""
-    from paint_deposition.nodes.bags.bag_player import BagPlayer
-
-    return lambda bag, **chosen: start(BagPlayer, **{'bag': str(bag)} | chosen)
-
-
-@pytest.fixture
 def listen(ros_context, spin):
     """`listen(name)`: a node that hears the poses, running."""
     from nodes.bags.listener import Listener

@@ -7,7 +7,7 @@ from rclpy.serialization import deserialize_message, serialize_message
 
 from nodes.cell import START_NS
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.topics import header
 
 POSE, STATE = '/atomizer/pose', '/atomizer/state'
 S = 1_000_000_000

@@ -1,9 +1,11 @@
 """The live film over real DDS."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
 import trimesh
+from paint_msgs.msg import ThicknessField
 from scipy.spatial.transform import Rotation
 from visualization_msgs.msg import Marker
 
@@ -16,11 +18,31 @@ from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
+from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header_stamp_ns
+from paint_deposition.nodes.runtime.topics import header_stamp_ns
 from paint_deposition.part.facing import toward_the_gun
 
 MOTION = two_passes()
+STREAM = """
+from nodes.cell import Robot, two_passes
+from rclpy.context import Context
+
+context = Context()
+context.init()
+robot, motion = Robot(context), two_passes(trigger=False)
+print('ready', flush=True)
+while True:
+    robot.send(motion)
+"""
+LISTENER = """
+import rclpy
+from paint_msgs.msg import ThicknessField
+rclpy.init()
+node = rclpy.create_node('listener')
+node.create_subscription(ThicknessField, 'thickness/field', lambda message: print('heard'), 10)
+rclpy.spin(node)
+"""
 
 
 def centroid_m(node, film_um):
@@ -76,3 +98,43 @@ def test_a_robot_at_250_hz_loses_no_pose_to_a_large_mesh(simulator, onlooker, wa
     )
     assert len({header_stamp_ns(mesh) for mesh in meshes}) > 3
     assert min(map(len, meshes)) > 120 * 100_000
+
+
+def test_a_listener_that_stalls_gets_no_queue(simulator, robot, painted, onlooker, wait_until,
+                                              tmp_path):  # fmt: skip
+    """Nobody is sent the next message before all have taken the last one, and none is lost."""
+    node = simulator(publish_rate_hz=30.0)
+    source = robot(node)
+    other = onlooker({'thickness/field': (ThicknessField, topics.RESULTS)})
+    with NodeProcess(tmp_path / 'listener', '', code=LISTENER) as listener:
+        wait_until(lambda: 'heard' in listener.out, what='the listener')
+        listener.stall()
+        before, began_s = len(other.heard['thickness/field']), time.monotonic()
+        for row in range(0, len(MOTION), 30):
+            source.send(MOTION, slice(row, row + 30))
+            painted(node, row + 30)
+            node.publish()
+        # Of 20 editions one may be on its way, and one for each time that patience ends.
+        patience = (time.monotonic() - began_s) / ACKNOWLEDGE_TIMEOUT_S
+        assert len(other.heard['thickness/field']) <= before + 2 + patience
+        listener.go_on()
+        film = painted(node).astype(np.float32)
+
+        def newest() -> np.ndarray:
+            return np.array(other.newest('thickness/field').thickness_um, np.float32)
+
+        wait_until(lambda: np.array_equal(newest(), film), what='the newest film')
+
+
+def test_no_pose_is_left_out_while_it_activates_itself(
+    ros_domain, simulator, wait_until, tmp_path, monkeypatch, repository
+):
+    """Poses that come between its first subscription and its first callback are painted."""
+    monkeypatch.setenv('PYTHONPATH', str(repository / 'tests'), prepend=':')
+    with NodeProcess(tmp_path / 'robot', '', code=STREAM) as robot:
+        wait_until(lambda: 'ready' in robot.out, what='the robot')
+        for _ in range(3):
+            node = simulator(publish_rate_hz=1.0)
+            wait_until(lambda node=node: node.film.counts.received > 100, what='poses painted')
+            assert node.inputs[0].unpainted == 0
+            node.destroy_node()

@@ -1,4 +1,4 @@
-"""Several guns on one part: one film, whoever's poses come first."""
+"""Several guns on one part: one film, live and replayed, whoever's poses come first."""
 
 from dataclasses import replace
 
@@ -8,10 +8,13 @@ from paint_msgs.msg import ThicknessField, ThicknessStats
 from scipy.spatial.transform import Rotation
 
 from nodes.cell import Robot, offline_um, two_passes
+from paint_deposition.api.simulation import simulate
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import write_model
+from paint_deposition.files.motion_files import read_gun_motions
+from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import topics
 
@@ -131,3 +134,36 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
     ):
         with pytest.raises(PaintError, match=words):
             simulator(**{'atomizers': GUNS} | values)
+
+
+def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
+    simulator, record, guns, wait_until, painted, play
+):
+    """Live, from one bag by a player for each gun, and offline: the same film to the last bit."""
+    low = moved(two_passes(poses=320), [0.1, 0.0, -0.15])
+    node, poses = simulator(atomizers=GUNS), len(HIGH) + len(low)
+    recorder, (first, second) = record(atomizers=GUNS), guns(node)
+    wait_until(lambda: first.has_subscribers(2) and second.has_subscribers(2), what='discovery')
+    for start in range(0, len(HIGH), 37):
+        second.send(low, slice(start, start + 37))
+        first.send(HIGH, slice(start, start + 37))
+    live = painted(node, poses)
+    assert np.array_equal(live, offline_um(node, HIGH) + offline_um(node, low))
+    recorder.close()
+    run = recorder.run.folder
+
+    node.reset()
+    players = [
+        play(
+            run, namespace=f'/{name}', pose_topic=f'/{name}/atomizer/pose', rate=0.0,
+            state_topic=f'/{name}/atomizer/state', publish_clock=name == GUNS[0],
+        )
+        for name in GUNS
+    ]  # fmt: skip
+    wait_until(lambda: all(player.finished.done() for player in players), what='both replays')
+    assert np.array_equal(painted(node, poses), live)
+
+    motions = [gun.trajectory for gun in read_gun_motions([run], MotionSource(), GUNS)]
+    film = simulate(node.surface, motions, names=GUNS)
+    assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
+    assert np.abs(film.film_um - live).max() < 1e-5 * live.max()

@@ -1,13 +1,17 @@
-"""Another model while the part is painted."""
+"""Another model while the part is painted, and a model of several brushes."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from brushes import switched, two_brushes
 from nodes.cell import offline_um, parameters, two_passes, write_own_model
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.files.model_file import read_model, write_model
+from paint_deposition.model.eq1_pattern import Brush
 
 MOTION = two_passes()
 # One effect that acts on each ray, and one that needs whole strokes.
@@ -15,6 +19,8 @@ MODEL = DepositionModel(
     effects=tuple(effect_class(i).typical() for i in ('incidence_attraction', 'corner_slowdown'))
 )
 THIN = DepositionModel(planar={'K1_cm3_per_s': 0.19})
+BRUSHES = two_brushes()
+POSES = 'deposition_simulator: poses'
 
 
 @pytest.fixture
@@ -29,6 +35,12 @@ def set_model(tmp_path):
         assert node.set_parameters(changes)[0].successful
 
     return set_model
+
+
+@pytest.fixture
+def node(simulator, tmp_path):
+    write_model(tmp_path / 'brushes.yaml', BRUSHES)
+    return simulator(model_file=str(tmp_path / 'brushes.yaml'))
 
 
 def test_a_new_model_paints_the_motion_so_far_again(simulator, robot, painted, wait_until,
@@ -151,3 +163,35 @@ def test_a_new_model_may_also_paint_from_then_on_only(simulator, robot, painted,
     expected = before + 0.1 * (whole - before)
     # The state before the change had a tenth of a second that was not settled yet.
     assert np.abs(painted(node) - expected).max() < 0.05 * whole.max()
+
+
+def test_a_brush_that_is_not_in_the_model_is_refused_and_those_it_has_are_named(
+    node, robot, painted, onlooker, wait_until, tmp_path
+):
+    """In a state, whose paint is not painted; and in use, by a new model without it."""
+    viewer = onlooker()
+    # The first pass with brush 2, the way back with 4 and, from its middle on, with 2.
+    stamps = np.append(MOTION.trigger_stamps_ns, MOTION.stamps_ns[-100])
+    given = (1.0, 2), (0.0, 2), (0.8, 4), (1.0, 2)
+    robot(node).send(replace(MOTION, **switched(stamps, *given)))
+    film = painted(node)
+    taken = switched(stamps[[0, 1, 3]], given[0], given[1], given[3])
+    assert np.array_equal(film, offline_um(node, replace(MOTION, **taken), BRUSHES))
+    refusal = 'brush 4 is not in the model; its brushes: 1, 2'
+    assert node.inputs[0].state_errors == {refusal}
+    wait_until(lambda: viewer.reports(POSES, refusal, b'\x01'), what='the refusal')
+    other = DepositionModel.of_brushes([Brush(number=1, planar=BRUSHES.planar)])
+    write_model(tmp_path / 'other.yaml', other)
+    assert node.set_parameters(parameters(model_file=str(tmp_path / 'other.yaml')))[0].successful
+    wait_until(lambda: not node.repainting, what='the end of the trial')
+    assert 'brush 2 is not in the model; its brushes: 1' in node.model_problem
+    assert np.array_equal(node.film.snapshot().film_um, film)
+
+
+def test_without_a_state_nothing_says_which_brush_sprays(node, robot, painted, onlooker,
+                                                         wait_until):  # fmt: skip
+    viewer = onlooker()
+    robot(node).send(two_passes(trigger=False))
+    assert painted(node).max() == 0.0
+    told = 'no state names one of the brushes yet'
+    wait_until(lambda: viewer.reports(POSES, told), what='the warning')

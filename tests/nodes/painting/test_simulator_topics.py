@@ -23,7 +23,9 @@ PROGRESS = {'atomizer/progress': (PoseProgress, topics.PROGRESS)}
 
 def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted, onlooker,
                                                        wait_until):  # fmt: skip
-    node = simulator(color_min_um=0.0, color_max_um=40.0)
+    """The statistics are those of the film."""
+    target = {'target_um': 10.0, 'target_tolerance_um': 5.0}
+    node = simulator(color_min_um=0.0, color_max_um=40.0, **target)
     robot(node).send(MOTION)
     film = painted(node)
     node.publish()
@@ -54,8 +56,14 @@ def test_a_late_joiner_gets_mesh_legend_and_statistics(simulator, robot, painted
     texts = [m.text for m in late.newest('thickness/legend').markers if m.text]
     assert texts[0] == '0 µm'
     assert texts[-1] == '40 µm'
-    for message in (mesh, field, cloud, late.newest('thickness/stats')):
+    stats, sprayed_s = late.newest('thickness/stats'), 0.004 * (600 * (1.441 - 0.581) - 1)
+    for message in (mesh, field, cloud, stats):
         assert stamp_ns(message.header) == MOTION.stamps_ns[-1]
+    area = node.surface.vertex_areas_m2
+    expected = film_statistics(film, area, 1.9 * sprayed_s, **target)
+    for name in STATS_FIELDS:
+        assert getattr(stats, name) == pytest.approx(getattr(expected, name), rel=1e-6), name
+    assert (stats.poses_rejected, stats.pose_gaps) == (0, 0)
 
 
 def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, executor,
@@ -69,21 +77,6 @@ def test_who_takes_the_place_of_a_listener_gets_the_film(simulator, onlooker, ex
     first.destroy_node()
     second = onlooker(field)
     wait_until(lambda: second.heard['thickness/field'], what='the field')
-
-
-def test_statistics_are_those_of_the_film(simulator, robot, painted, onlooker, wait_until):
-    node = simulator(target_um=10.0, target_tolerance_um=5.0)
-    viewer = onlooker(STATS)
-    robot(node).send(MOTION)
-    film, area = painted(node), node.surface.vertex_areas_m2
-    wait_until(lambda: viewer.shows('thickness/stats', lambda m: m.poses_received == len(MOTION)))
-    stats, sprayed_s = viewer.newest('thickness/stats'), 0.004 * (600 * (1.441 - 0.581) - 1)
-    expected = film_statistics(
-        film, area, 1.9 * sprayed_s, target_um=10.0, target_tolerance_um=5.0
-    )  # fmt: skip
-    for name in STATS_FIELDS:
-        assert getattr(stats, name) == pytest.approx(getattr(expected, name), rel=1e-6), name
-    assert (stats.poses_rejected, stats.pose_gaps) == (0, 0)
 
 
 def test_every_gap_in_the_stamps_is_counted_and_shown(simulator, robot, painted, onlooker,

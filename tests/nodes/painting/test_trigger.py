@@ -11,7 +11,7 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from std_msgs.msg import Bool
 
 from nodes.cell import Robot, offline_um, two_passes
-from paint_deposition.nodes.runtime.messages import header
+from paint_deposition.nodes.runtime.topics import header
 
 POSES = 'deposition_simulator: poses'
 UNTRIGGERED = two_passes(trigger=False)
@@ -19,6 +19,7 @@ UNTRIGGERED = two_passes(trigger=False)
 
 def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, painted, onlooker,
                                                          wait_until):  # fmt: skip
+    """Poses that stop meanwhile are reported, until it is closed."""
     node = simulator()
     viewer = onlooker()
     source = robot(node)
@@ -27,33 +28,39 @@ def test_a_state_of_which_only_spraying_is_filled_sprays(simulator, robot, paint
     film = painted(node)
     assert film.max() > 5.0
     assert np.array_equal(film, offline_um(node, UNTRIGGERED))
+    silent = 'the gun sprays, and no pose has come for'
+    wait_until(lambda: viewer.reports(POSES, silent, b'\x01'))
+    source.send_state(UNTRIGGERED.stamps_ns[-1], 0.0)
+    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
     # It says that it sprays, and that no paint flows.
-    source.send_fields(UNTRIGGERED.stamps_ns[-1], spraying=True, flow=0.0)
+    source.send_fields(UNTRIGGERED.stamps_ns[-1] + 1, spraying=True, flow=0.0)
     wait_until(lambda: viewer.reports(POSES, '1 states that spray with flow 0', b'\x01'))
 
 
 def test_a_latched_trigger_from_before_the_start_counts(simulator, ros_context, spin, wait_until,
                                                         painted):  # fmt: skip
-    """The gun was closed before the node was there, and stays closed: no paint."""
+    """The gun was closed before the node was there, and stays closed: no paint.
+
+    It is heard beside a robot that sends by best effort and keeps nothing, which is heard as well.
+    """
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     gun = Node('gun', context=ros_context)
     states = gun.create_publisher(AtomizerState, 'atomizer/state', latched)
-    closed = AtomizerState(spraying=False)
-    closed.header.stamp.sec = int(UNTRIGGERED.stamps_ns[0] // 10**9) - 60
-    states.publish(closed)
-    node = simulator()
-    source = Robot(ros_context)
-    source.destroy_publisher(source.state_publisher)
+    before_ns = int(UNTRIGGERED.stamps_ns[0]) - 60_000_000_000
+    states.publish(AtomizerState(header=header('', before_ns)))
+    source = Robot(ros_context, reliable=False)
     spin(gun, source)
-    wait_until(lambda: source.pose_publisher.get_subscription_count(), what='discovery')
+    node = simulator()
+    wait_until(lambda: source.has_subscribers(1), what='discovery')
     wait_until(lambda: node.film.guns[0].flow == 0.0, what='the latched state')
-    source.send(UNTRIGGERED)
+    for row in range(len(UNTRIGGERED)):
+        source.send(UNTRIGGERED, slice(row, row + 1))
+        painted(node, row + 1)
     assert painted(node).max() == 0.0
-    # From here on it is heard as before.
-    closed.spraying = True
-    closed.header.stamp.sec += 120
-    states.publish(closed)
-    wait_until(lambda: node.inputs[0].spraying, what='the next state')
+    for publisher, flow in ((states, 0.5), (source.state_publisher, 0.25)):
+        at = header('', int(UNTRIGGERED.stamps_ns[-1]))
+        publisher.publish(AtomizerState(header=at, spraying=True, flow=flow))
+        wait_until(lambda flow=flow: node.film.guns[0].flow == flow, what='the next state')
 
 
 def test_what_leaves_the_part_bare_is_reported(simulator, robot, onlooker, wait_until):
@@ -70,18 +77,6 @@ def test_what_leaves_the_part_bare_is_reported(simulator, robot, onlooker, wait_
     source.send(aside, slice(50, None))
     bare = 'cm3 were sprayed and nothing lands on the part: check part_pose'
     wait_until(lambda: viewer.reports(POSES.replace('poses', 'part'), bare, b'\x01'))
-
-
-def test_poses_that_stop_while_the_gun_sprays_are_reported(simulator, robot, painted, onlooker,
-                                                       wait_until):  # fmt: skip
-    node, viewer = simulator(), onlooker()
-    source, motion = robot(node), two_passes()
-    source.send(motion)
-    painted(node)
-    silent = 'the gun sprays, and no pose has come for'
-    wait_until(lambda: viewer.reports(POSES, silent, b'\x01'))
-    source.send_state(motion.stamps_ns[-1] + 1, 0.0)
-    wait_until(lambda: viewer.reports(POSES, 'waiting for poses', b'\x00'))
 
 
 def test_each_robot_is_heard_as_reliably_as_it_sends(
@@ -116,23 +111,6 @@ def test_each_robot_is_heard_as_reliably_as_it_sends(
     assert 310 < row < 599
     wait_until(lambda: node.film.counts.received == 600, what='all poses')
     assert node.film.counts.rejected == node.inputs[0].messages_lost == 0
-
-
-def test_a_latched_state_is_heard_beside_a_robot_that_keeps_none(
-    simulator, ros_context, spin, wait_until
-):
-    """A node that starts later hears the one, and the other as well."""
-    latched = Robot(ros_context)
-    profile = QoSProfile(depth=20, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-    states = latched.create_publisher(AtomizerState, 'atomizer/state', profile)
-    weak = Robot(ros_context, reliable=False)
-    spin(latched, weak)
-    states.publish(AtomizerState(header=header('', 1), spraying=True, flow=0.5))
-    node = simulator()
-    wait_until(lambda: node.film.guns[0].flow == 0.5, what='the latched state')
-    wait_until(lambda: weak.has_subscribers(1), what='best effort')
-    weak.send_state(2, 0.0)
-    wait_until(lambda: node.film.guns[0].flow == 0.0, what='the other')
 
 
 def test_a_best_effort_robot_that_is_there_is_not_asked_for_more(

@@ -37,10 +37,10 @@ def declared(ros_context, executor):
     """`declared(name=value, ...)`: a node with the table under these overrides, and its values."""
 
     class Tester(PaintNode):
-        PARAMETERS = TABLE
+        NAME, PARAMETERS = 'tester', TABLE
 
     def declared(**overrides):
-        node = Tester('tester', context=ros_context, parameter_overrides=parameters(**overrides))
+        node = Tester(context=ros_context, parameter_overrides=parameters(**overrides))
         executor.add_node(node)
         return node, dict(node.values)
 

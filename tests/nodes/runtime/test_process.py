@@ -15,23 +15,23 @@ import os, signal, sys, time
 from pathlib import Path
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.parameters import NodeParameter
-from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.process import run_node
+from paint_deposition.nodes.runtime.node import PaintNode, run_node
 
 
 class Worker(PaintNode):
+    NAME = 'worker'
     PARAMETERS = {
         'does': NodeParameter('run', 'What it does [word]'),
     }
 
     def __init__(self, **kwargs):
-        super().__init__('worker', **kwargs)
+        super().__init__(**kwargs)
         self.ready = False
         if self.values['does'] == 'begin':
             os.kill(os.getpid(), signal.SIGINT)
         self.create_timer(0.02, self.work)
 
-    def _validate(self, values):
+    def _validate(self, values, changed):
         if values['does'] == 'load at once':
             os.kill(os.getpid(), signal.SIGINT)
 

@@ -3,8 +3,6 @@
 import difflib
 from collections.abc import Iterable, Sequence
 
-# Names less alike than this share, as difflib measures it, are not taken for each other.
-ALIKE = 0.4
 # Letters of a value in a message.
 LONGEST_QUOTED = 60
 
@@ -60,7 +58,8 @@ def did_you_mean(name: object, known: Iterable[str], otherwise: str = '') -> str
     known = list(known)
     # A forgotten unit is likelier than a wrong letter: K1 is meant for K1_cm3_per_s, not K2.
     near = [other for other in known if other.lower().startswith(f'{name}_'.lower())]
-    near = near or difflib.get_close_matches(str(name), known, n=1, cutoff=ALIKE)
+    # Names less alike than this share are not taken for each other.
+    near = near or difflib.get_close_matches(str(name), known, n=1, cutoff=0.4)
     if near:
         return f'did you mean {near[0]!r}?'
     return otherwise or f'there are: {", ".join(known) or "none"}'

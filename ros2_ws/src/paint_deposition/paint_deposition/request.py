@@ -67,8 +67,8 @@ def given(
     )  # fmt: skip
 
 
-class PartMesh(BaseModel):
-    """How the mesh of a part is read."""
+class OnePart(BaseModel):
+    """How the mesh of a part is read, and the motion over it."""
 
     mesh_scale: Number = given(
         1.0,
@@ -83,11 +83,6 @@ class PartMesh(BaseModel):
         'z = 0.',
         metavar='X Y Z',
     )  # fmt: skip
-
-
-class OnePart(PartMesh):
-    """How the mesh of a part is read, and the motion over it."""
-
     max_pose_gap_s: Number = given(
         0.25, 'A longer interval between poses is a gap, in which the gun is off [s].', above=0.0
     )
@@ -223,7 +218,13 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     more = f' (and {others} more)' if others else ''
     key = '.'.join(str(part) for part in first['loc'] if part != '[key]')
     place = where and f'{where}: '
-    value, field = first['input'], _field(model, first['loc'])
+    value, field = first['input'], None
+    inner: type[BaseModel] | None = model
+    for name in (part for part in first['loc'] if isinstance(part, str) and inner):
+        field = inner.model_fields.get(name) if inner else None
+        kinds = (field.annotation, *get_args(field.annotation)) if field else ()
+        models = (k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel))
+        inner = next(models, None)
     if first['type'] == 'value_error':
         return f'{place}{f"{key}: " if key else ""}{first["ctx"]["error"]}{more}'
     if not first['loc']:
@@ -245,17 +246,6 @@ def _reason(model: type[BaseModel], where: str, error: ValidationError) -> str:
     choice = f'{first["ctx"]["expected"]}: ' if one_of else ''
     numbers = (float,) if where else (float, int)
     return f'{place}{key} is {shown}; expected {choice}{_expected(field, numbers)}{more}'
-
-
-def _field(model: type[BaseModel] | None, place: tuple[int | str, ...]) -> FieldInfo | None:
-    """The innermost field that a place in the values stands for."""
-    field = None
-    for name in (part for part in place if isinstance(part, str) and model):
-        field = model.model_fields.get(name) if model else None
-        kinds = (field.annotation, *get_args(field.annotation)) if field else ()
-        models = (k for k in kinds if isinstance(k, type) and issubclass(k, BaseModel))
-        model = next(models, None)
-    return field
 
 
 def _takes_a(field: FieldInfo, kinds: tuple[type, ...]) -> bool:

@@ -35,9 +35,6 @@ from paint_deposition.planning.requests import MeasureRequest
 from paint_deposition.request import takes
 
 Progress = Callable[[str], None]
-MOST_MODELS = 6
-# Starts of the fit that stands in for a model where none is given.
-STARTS = 10
 
 
 def calibrate(
@@ -83,7 +80,7 @@ def compare(
         study, _ = clean_and_fit(campaign, model, model.effects)
         progress('comparing')
         return replace(compared(study, model), warnings=(*study.warnings, *doubts))
-    study, fit = clean_and_fit(campaign, bell, starts=STARTS)
+    study, fit = clean_and_fit(campaign, bell, starts=10)
     progress('comparing')
     reaches = short_reaches(study.campaign, fit.model)
     warnings = (*study.warnings, *doubts, *map(str, reaches))
@@ -106,8 +103,8 @@ def compare_models(
     Raises:
         PaintError: there are fewer than two, or more than a picture can show.
     """
-    if not 2 <= len(models) <= MOST_MODELS:
-        raise PaintError(f'{len(models)} models to compare; give 2 to {MOST_MODELS}')
+    if not 2 <= len(models) <= 6:
+        raise PaintError(f'{len(models)} models to compare; give 2 to 6')
     progress('fitting the pattern')
     for model in models.values():
         model.require_brushes(campaign.brushes)

@@ -42,11 +42,6 @@ from paint_deposition.planning.surface_map import painted_side
 from paint_deposition.request import takes
 
 Progress = Callable[[str, float], None]
-# The film counts where the programme lays more than this share of its greatest film.
-COUNTED_ABOVE = 0.1
-# A gun whose mean direction is shorter paints more sides than one.
-ONE_SIDE = 0.9
-DRAWS = 8
 
 
 @takes(IndexRequest)
@@ -197,9 +192,10 @@ def improve(
     if film_um.max() < NO_PAINT_UM:
         raise RecordingError(f'{trajectory.source}: no paint lands on the part')
     if target_region is None:
-        target_region = film_um > COUNTED_ABOVE * film_um.max()
+        target_region = film_um > 0.1 * film_um.max()
         towards = -seen.path.rotation[seen.path.flow > 0.0][:, :, 2].mean(axis=0)
-        if (length := np.linalg.norm(towards)) >= ONE_SIDE:
+        # A gun whose mean direction is shorter paints more sides than one.
+        if (length := np.linalg.norm(towards)) >= 0.9:
             target_region &= painted_side(surface, towards / length)
     sought = WantedFilm.of(surface, target_region, request.target_um, point_zones)
     if sought.target_um is None:
@@ -207,7 +203,7 @@ def improve(
         sought = replace(sought, target_um=mean_um)
     models = [model, *rivals]
     if posterior is not None:
-        models += draw_models(model, posterior, DRAWS, seed)
+        models += draw_models(model, posterior, 8, seed)
     retiming = retime_for_evenness(surface, sought, original, models, request, progress)
     programme, drive = retiming.programme, None
     if robot:

@@ -23,9 +23,8 @@ from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajector
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.live.page import Scene
 
-# The film is shown so often, and a motion without pauses is painted in steps so long [s].
+# The film is shown so often [s].
 PERIOD_S = 0.2
-STEP_S = 1.0
 
 
 class Replay:
@@ -100,7 +99,15 @@ class Replay:
     def paint(self, stop: Event) -> None:
         """Paint once, until the end or until that is no longer wanted."""
         self.scene.begin_again()
-        films = LiveFilms(tuple(map(self._unpainted, self._motions, self._models)))
+        unpainted = []
+        for gun, model in zip(self._motions, self._models, strict=True):
+            film = LiveFilm(
+                self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
+            )
+            # It knows when the gun will be switched, as it does offline.
+            film.replay(events_of(gun.trajectory, until=0))
+            unpainted.append(film)
+        films = LiveFilms(tuple(unpainted))
         self._show(films, 0.0)
         shown_ns = now_ns = self._start_ns - 1
         began_s = time.monotonic()
@@ -113,31 +120,19 @@ class Replay:
                 stop.wait(PERIOD_S)
                 elapsed_s = (time.monotonic() - began_s) * self._rate
             else:
-                elapsed_s = (now_ns - self._start_ns) * 1e-9 + STEP_S
+                elapsed_s = (now_ns - self._start_ns) * 1e-9 + 1.0
             now_ns = min(self._start_ns + round(elapsed_s * 1e9), self._end_ns)
             for number, film in enumerate(films.guns):
-                self._feed(number, film, shown_ns, now_ns)
+                motion, times_ns = self._motions[number].trajectory, self._times_ns[number]
+                first, end = np.searchsorted(times_ns, [shown_ns, now_ns], side='right').tolist()
+                film.replay(events_of(motion, first, end))
+                batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
+                for row in range(first, end):
+                    for place, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
+                        name, flow = self._motions[number].name, self._flows[number][row]
+                        self.scene.move_gun(name, place, z_axis, flow)
             shown_ns = now_ns
             self._show(films, (now_ns - self._start_ns) * 1e-9)
-
-    def _unpainted(self, motion: GunMotion, model: DepositionModel) -> LiveFilm:
-        """A film that knows when the gun will be switched, as it is offline."""
-        film = LiveFilm(
-            self._points, model, occluder=self._surface.occluder, max_pose_gap_s=self._gap_s
-        )
-        film.replay(events_of(motion.trajectory, until=0))
-        return film
-
-    def _feed(self, number: int, film: LiveFilm, after_ns: int, until_ns: int) -> None:
-        """Pass on the poses of a gun in this time."""
-        motion, flow = self._motions[number].trajectory, self._flows[number]
-        first, end = np.searchsorted(self._times_ns[number], [after_ns, until_ns], side='right')
-        rows = slice(int(first), int(end))
-        batch = PoseBatch(motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw)
-        film.replay(events_of(motion, int(first), int(end)))
-        for row in range(*rows.indices(len(motion))):
-            for position, z_axis in zip(*batch.select([row]).finite_axes(), strict=True):
-                self.scene.move_gun(self._motions[number].name, position, z_axis, flow[row])
 
     def _show(self, films: LiveFilms, time_s: float) -> None:
         film, (target_um, tolerance_um) = films.snapshot(), self._target

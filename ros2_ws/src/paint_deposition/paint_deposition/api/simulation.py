@@ -9,12 +9,7 @@ import numpy as np
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError, PaintError, RecordingError
-from paint_deposition.film.common_film import (
-    TOTAL,
-    Coats,
-    CommonFilm,
-    require_same_film_effects,
-)
+from paint_deposition.film.common_film import TOTAL, Coats, CommonFilm, require_same_film_effects
 from paint_deposition.film.film import CoatFilm, Film, GunFilm
 from paint_deposition.film.integrator import NO_PAINT_UM, FilmIntegrator, Precision
 from paint_deposition.film.live_film import without_refused_states

@@ -224,7 +224,20 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
     if effect != 'none':
         added = load_effect_file(Path(effect)) if effect.endswith('.py') else effect_class(effect)
     if effect_file is not None:
-        _require_place_for(effect_file, effect, added)
+        # What cannot become an effect file is refused before anything is computed.
+        from paint_deposition.effects.learned.curves import LearnedCurve
+
+        if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
+            raise click.UsageError(
+                f'--as-effect is for a law learned over one covariate, and --add is {effect}; '
+                'give --add learned:COVARIATE, as learned:time_s'
+            )
+        if effect_file.suffix != '.py':
+            raise click.UsageError(f'--as-effect {effect_file}: give a name that ends in .py')
+        if effect_file.exists():
+            raise click.UsageError(
+                f'--as-effect {effect_file} is there already; give another name'
+            )
 
     def lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
         yield from _diagnosis_lines(diagnosis)
@@ -232,21 +245,6 @@ def refit_command(effect: str, effect_file: Path | None, seed: int, **given: Any
             yield _write_as_effect(diagnosis, effect_file)
 
     _run('refit', partial(pd.refit, added=added, seed=seed), lines, **given)
-
-
-def _require_place_for(effect_file: Path, effect: str, added: Any) -> None:
-    """Refuse what cannot become an effect file, before anything is computed."""
-    from paint_deposition.effects.learned.curves import LearnedCurve
-
-    if not (isinstance(added, type) and issubclass(added, LearnedCurve)):
-        raise click.UsageError(
-            f'--as-effect is for a law learned over one covariate, and --add is {effect}; give '
-            '--add learned:COVARIATE, as learned:time_s'
-        )
-    if effect_file.suffix != '.py':
-        raise click.UsageError(f'--as-effect {effect_file}: give a name that ends in .py')
-    if effect_file.exists():
-        raise click.UsageError(f'--as-effect {effect_file} is there already; give another name')
 
 
 def _write_as_effect(diagnosis: pd.Diagnosis, effect_file: Path) -> str:

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     from paint_deposition.files.recordings.bag_summary import PoseSource
     from paint_deposition.motion.stream_quality import StreamQuality
 
-MOST_NAMED = 8
 # Figures, and the same in words.
 Contents = tuple[dict[str, Any], list[str]]
 
@@ -169,7 +168,7 @@ def _readings_contents(path: Path, points_file: Path | None) -> Contents:
     warnings = [*readings.doubts]
     if zeros:
         warnings.append(
-            f'{np.count_nonzero(film == 0.0)} readings are 0 (points {some(zeros, MOST_NAMED)}): '
+            f'{np.count_nonzero(film == 0.0)} readings are 0 (points {some(zeros, most=8)}): '
             'bare metal, or not measured; write n/a for the latter, or say zero: in the campaign'
         )
     print_all('warning', warnings)
@@ -219,34 +218,28 @@ def _box(points_m: Any) -> tuple[dict[str, list[float]], str]:
 def _bag_lines(
     path: Path, topics: list[BagTopic], sources: list[PoseSource], triggers: list[str]
 ) -> list[str]:
-    from paint_deposition.files.recordings.message_definitions import TF_TYPES
+    from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, TF_TYPES
 
     width = max((len(topic.name) for topic in topics), default=0)
     lines = [str(path), *(f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in topics)]
+    kinds = {JOINT_TYPE: 'joints on', 'transforms': 'transforms from'}
     for source in sources:
-        lines += _source_lines(source)
+        what = f'{kinds.get(source.type, "poses on")} {source.topic}'
+        if source.quality is None:
+            lines.append(f'{what} will not do: {source.faults[0]}')
+            continue
+        frame = f" in frame '{source.frame_id}'" if source.frame_id else ''
+        lines += [
+            f'{what}: {source.quality.poses}{frame} over {source.quality.duration_s:.3f} s, '
+            f'{_stream_words(source.quality)}, in {source.unit}',
+            *(f'  warning: {fault}' for fault in source.faults),
+            f'  {"to be used with care" if source.faults else "will do"}: {source.options}',
+        ]
     if not sources:
         lines.append('no poses: there are no messages with poses, joints or transforms that move')
     if {topic.type for topic in topics} & {*TF_TYPES}:
         lines.append('transforms: --tf TARGET SOURCE takes the motion from them')
     return [*lines, f'triggers: {" ".join(triggers) or "none"}']
-
-
-def _source_lines(source: PoseSource) -> list[str]:
-    """One source of poses: its figures, and whether it will do."""
-    from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
-
-    kinds = {JOINT_TYPE: 'joints on', 'transforms': 'transforms from'}
-    what = f'{kinds.get(source.type, "poses on")} {source.topic}'
-    if source.quality is None:
-        return [f'{what} will not do: {source.faults[0]}']
-    frame = f" in frame '{source.frame_id}'" if source.frame_id else ''
-    return [
-        f'{what}: {source.quality.poses}{frame} over {source.quality.duration_s:.3f} s, '
-        f'{_stream_words(source.quality)}, in {source.unit}',
-        *(f'  warning: {fault}' for fault in source.faults),
-        f'  {"to be used with care" if source.faults else "will do"}: {source.options}',
-    ]
 
 
 def _stream_words(quality: StreamQuality) -> str:

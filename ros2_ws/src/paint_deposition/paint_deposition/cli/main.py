@@ -19,7 +19,7 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 # an example, as it runs in the folder of the samples. Modules are only loaded when their command
 # is used, so that help comes at once.
 COMMANDS = {
-    'demo': ('demo', 'A first film, and what readings make of it, on one page.',
+    'demo': ('samples', 'A first film, and what readings make of it, on one page.',
         '-o my_demo'),
     'simulate': ('simulate', 'Film on a part from a recorded trajectory.',
         '--mesh door.stl --trajectory door_horizontal --trigger /atomizer/state -o film'),
@@ -45,7 +45,7 @@ COMMANDS = {
         '--trajectory passes/passes.mod --urdf my_arm.urdf --part-pose 2 0 0 0 0 0 1 -o map'),
     'locate': ('place', 'Find the pose of the part from touched points.',
         '--touched my_touched.csv --points my_points.csv'),
-    'watch': ('runs', 'Show a run, results or a live cell on a page in 3D.',
+    'watch': ('runs', 'Show a run or a live cell on a page in 3D.',
         'door_horizontal --mesh door.stl --trigger /atomizer/state'),
     'view': ('runs', 'Open a recorded run in Rerun, where that is installed.',
         'door_horizontal'),
@@ -53,7 +53,7 @@ COMMANDS = {
         'door_horizontal --mesh door.stl --out door.png'),
     'recover': ('runs', 'Recover an unfinished run as a complete bag.',
         'my_broken_run -o recovered'),
-    'doctor': ('doctor', 'Say what is installed, and test it.',
+    'doctor': ('samples', 'Say what is installed, and test it.',
         '--json'),
 }  # fmt: skip
 
@@ -96,29 +96,23 @@ class Commands(click.Group):
             formatter.write_dl([(name, summary) for name, (_, summary, _) in COMMANDS.items()])
 
 
-def _show_version(context: click.Context, _: click.Parameter, wanted: bool) -> None:
-    if wanted:
-        from paint_deposition.files.version import git_version
-
-        click.echo(f'paint {__version__} {git_version()}'.rstrip())
-        context.exit()
-
-
 @click.group(
     cls=Commands,
     invoke_without_command=True,
     context_settings={'help_option_names': ['-h', '--help'], 'max_content_width': 100},
 )
-@click.option(
-    '--version', is_flag=True, expose_value=False, is_eager=True, callback=_show_version,
-    help='Show the version and exit.',
-)  # fmt: skip
+@click.option('--version', 'shows_version', is_flag=True, help='Show the version and exit.')
 @click.pass_context
-def paint(context: click.Context) -> None:
+def paint(context: click.Context, shows_version: bool) -> None:
     """Film build of robotic bells: from recordings and gauge readings to a model that fits.
 
     Lengths are in metres, film in micrometres. `paint COMMAND --help` says more.
     """
+    if shows_version:
+        from paint_deposition.files.version import git_version
+
+        click.echo(f'paint {__version__} {git_version()}'.rstrip())
+        context.exit()
     if context.invoked_subcommand is None:
         click.echo(context.get_help())
 
@@ -142,24 +136,21 @@ def _interrupt(number: int, frame: object) -> None:
 
 def run(arguments: list[str] | None = None) -> int:
     """Run a command and return its exit code."""
+    exit_code = 2
     try:
         return paint.main(args=arguments, prog_name='paint', standalone_mode=False) or 0
-    except (PaintError, click.ClickException) as error:
-        text = error.format_message() if isinstance(error, click.ClickException) else str(error)
-        return _refuse(text)
+    except PaintError as error:
+        text = str(error)
+    except click.ClickException as error:
+        text = error.format_message()
     except OSError as error:
-        return _refuse(f'{error.filename or "output"}: {error.strerror or error}')
+        text = f'{error.filename or "output"}: {error.strerror or error}'
     except MemoryError:
-        return _refuse('there is not enough memory; give smaller files, or a machine with more')
+        text = 'there is not enough memory; give smaller files, or a machine with more'
     except (click.Abort, KeyboardInterrupt):
-        click.echo('paint: interrupted', err=True)
-        return 130
-
-
-def _refuse(text: str) -> int:
-    """Say in one line what was wrong."""
+        text, exit_code = 'interrupted', 130
     click.echo(f'paint: {" ".join(text.split())}', err=True)
-    return 2
+    return exit_code
 
 
 if __name__ == '__main__':

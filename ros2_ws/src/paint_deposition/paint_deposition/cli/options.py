@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce, wraps
 from pathlib import Path
-from types import NoneType
+from types import MappingProxyType, NoneType
 from typing import Annotated, Any, Literal, get_args, get_origin
 
 import click
@@ -18,14 +18,7 @@ from pydantic.fields import FieldInfo
 
 import paint_deposition as pd
 from paint_deposition.errors import PaintError
-from paint_deposition.request import (
-    DrivingRobot,
-    FilmBand,
-    MotionOptions,
-    OnePart,
-    PartMesh,
-    Request,
-)
+from paint_deposition.request import DrivingRobot, FilmBand, MotionOptions, OnePart, Request
 
 Decorator = Callable[[Callable], Callable]
 
@@ -94,24 +87,19 @@ def options_of(
         own = {name: value for name, value in values.items() if value is not None}
         return kind(**{n: math.radians(v) if _is_angle(n) else v for n, v in own.items()})
 
-    def naming_options(command: Callable) -> Callable:
-        @wraps(command)
-        def with_names(**values: Any) -> Any:
-            try:
-                return command(**values)
-            except PaintError as error:
-                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
-                raise type(error)(said) from None
-
-        return with_names
-
-    return lambda command: naming_options(option_group(options, into, made)(command))
+    return option_group(options, into, made, called)
 
 
 def option_group(
-    options: Sequence[Decorator], into: str, kind: Callable[..., Any] = dict
+    options: Sequence[Decorator],
+    into: str,
+    kind: Callable[..., Any] = dict,
+    called: Mapping[str, str] = MappingProxyType({}),
 ) -> Decorator:
-    """Give a command these options; it takes what was given as one argument, of a kind."""
+    """Give a command these options; it takes what was given as one argument, of a kind.
+
+    In what the command then raises, words that are ``called`` otherwise as options are renamed.
+    """
 
     def with_options(function: Callable) -> Callable:
         return reduce(lambda taken, option: option(taken), reversed(options), function)
@@ -119,7 +107,11 @@ def option_group(
     def with_group(command: Callable) -> Callable:
         @wraps(command)
         def with_one(**given: Any) -> Any:
-            return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+            try:
+                return command(**{into: kind(**{n: given.pop(n) for n in names})}, **given)
+            except PaintError as error:
+                said = re.sub(r'\w+', lambda word: called.get(word[0], word[0]), str(error))
+                raise type(error)(said) from None
 
         return with_options(with_one)
 
@@ -231,7 +223,7 @@ BRUSH = click.option(
 )  # fmt: skip
 ALLOW_EFFECTS = click.option(
     '--allow-effects', is_flag=True, expose_value=False, callback=_allow_effects,
-    help='Run the Python code of effect files that recordings, results or campaigns name, too.',
+    help='Run the Python code of effect files that recordings or campaigns name, too.',
 )  # fmt: skip
 PART_POSE = option_of(MotionOptions, 'part_pose', callback=_pose)
 MAX_POSE_GAP = option_of(OnePart, 'max_pose_gap_s')
@@ -283,7 +275,7 @@ def part_options(
     options: list[Decorator] = [
         click.option('--mesh', required=required, type=FILE,
                      help='The part: STL, PLY, OBJ, glTF, 3MF or STEP.'),
-        *(option_of(PartMesh, name) for name in PartMesh.model_fields),
+        *(option_of(OnePart, name) for name in ('mesh_scale', 'body', 'down')),
         click.option(
             '--max-edge-length-m', default=max_edge_length_m, show_default=True, type=POSITIVE,
             help='Longest edge of the refined mesh: larger triangles are split.',

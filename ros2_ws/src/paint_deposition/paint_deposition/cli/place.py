@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -16,12 +16,6 @@ from paint_deposition.cli.results import Progress, Results, inputs, print_all, r
 from paint_deposition.errors import RecordingError
 from paint_deposition.planning.requests import FilmBuild, MeasureRequest
 from paint_deposition.request import MotionOptions
-
-if TYPE_CHECKING:
-    from paint_deposition.planning.driving import PartPlaces
-
-# Below this probability an effect is named as one that the part hardly shows.
-HARDLY = 0.15
 
 
 def _span(axis: str) -> Any:
@@ -78,13 +72,10 @@ def place_command(
         recorded = pd.read_recording(trajectory)
         found = place(recorded, cell, x, y, free_roll, show)
         results.write(found, made_from=inputs(trajectory=trajectory, urdf=robot['urdf']))
-    results.print(_place_lines(found), notes=recorded.notes)
-
-
-def _place_lines(found: PartPlaces) -> Iterator[str]:
-    yield found.sentence
+    lines = [found.sentence]
     if found.speed.max() > 0.0:
-        yield '--part-pose ' + ' '.join(f'{value + 0.0:.6g}' for value in found.part_pose)
+        lines.append('--part-pose ' + ' '.join(f'{value + 0.0:.6g}' for value in found.part_pose))
+    results.print(lines, notes=recorded.notes)
 
 
 @click.command('locate')
@@ -185,12 +176,13 @@ def measure_command(
 
 def _point_lines(result: pd.ChosenReadings) -> Iterator[str]:
     yield result.sentence
-    power = sorted(result.power.items(), key=lambda pair: -pair[1])
-    for name, chance in power:
-        if chance >= HARDLY:
-            grid = result.grid_power[name]
-            yield f'{name:>22} {100 * chance:3.0f} %   on a grid {100 * grid:3.0f} %'
-    hidden = [name for name, chance in power if chance < HARDLY]
+    hidden = []
+    for name, chance in sorted(result.power.items(), key=lambda pair: -pair[1]):
+        if chance < 0.15:  # the part hardly shows it
+            hidden.append(name)
+            continue
+        grid = result.grid_power[name]
+        yield f'{name:>22} {100 * chance:3.0f} %   on a grid {100 * grid:3.0f} %'
     if hidden:
         yield f'unlikely to be detected on this part at their typical size: {", ".join(hidden)}'
     yield (

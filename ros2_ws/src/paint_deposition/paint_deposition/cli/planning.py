@@ -39,23 +39,23 @@ def recommend_command(
     chosen = chosen_model(model_file, brush=brush)
     answer = pd.recommend(chosen.model, **dict(request))
     results.write(answer, model=chosen.model, made_from=inputs(model_file=model_file))
-    results.print(_recommendation_lines(answer), chosen.words)
-
-
-def _recommendation_lines(answer: pd.Recommendation) -> Iterator[str]:
-    yield answer.sentence
-    for minimum in answer.minima:
-        yield f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
-    for low, high in answer.windows_m:
-        yield f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'
+    lines = [answer.sentence]
+    lines += (
+        f'minimum: sigma_n {100 * minimum.sigma_n:.2f} % at {1e3 * minimum.index_m:.0f} mm'
+        for minimum in answer.minima
+    )
+    lines += (
+        f'within tolerance: {1e3 * low:.0f} to {1e3 * high:.0f} mm'
+        for low, high in answer.windows_m
+    )
     if answer.index_drift_m and answer.standoff_drift_m:
         index, standoff = answer.index_drift_m, answer.standoff_drift_m
-        yield (
+        lines.append(
             f'the index may drift to {1e3 * index[0]:.0f} and {1e3 * index[1]:.0f} mm, the '
             f'standoff by {standoff[0] * 1e3:+.0f} and {standoff[1] * 1e3:+.0f} mm'
         )
-    for note in answer.notes:
-        yield f'note: {note}'
+    lines += (f'note: {note}' for note in answer.notes)
+    results.print(lines, chosen.words)
 
 
 @click.command('plan')

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
 # A bar shows itself only for work that takes longer, and never when piped.
 SHOW_PROGRESS_AFTER_S = 2.0
-REDRAWN_EVERY_S = 0.5
 BAR = '{desc}: {percentage:3.0f}%|{bar}| [{elapsed}]'
 LINE = '{desc} [{elapsed}]'
 
@@ -72,7 +71,7 @@ class Progress:
         pause_s = self._after_s
         while not self._done.wait(pause_s):
             self._bar.refresh()
-            pause_s = REDRAWN_EVERY_S
+            pause_s = 0.5
 
 
 def print_all(label: str, lines: Iterable[str]) -> None:

@@ -1,4 +1,4 @@
-"""Commands on recorded runs: `watch` also results and the live cell, `view`, `recover`."""
+"""Commands on recorded runs: `watch` also the live cell, `view`, `recover`."""
 
 from __future__ import annotations
 
@@ -22,9 +22,6 @@ from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN,
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
     from paint_deposition.request import FilmBand
-
-NODE = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
-RERUN = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
 
 
 @click.command('watch')
@@ -62,39 +59,35 @@ def watch_command(
     token: str,
     **pace: float,
 ) -> None:
-    """Show RUN on a page in a browser: the part in 3D, gun, film, figures, readings.
+    """Show RUN on a page in a browser: the part in 3D, gun, film, figures.
 
     RUN is a recorded motion, which is painted again as it went (with the --mesh, unless the run
-    names it), or a folder of results of simulate, plan, improve, compare, diagnose or refit.
+    names it).
     """
     if live == (run is not None):
         raise click.UsageError('give RUN, or --live for what a simulator paints now')
     if live and not part.mesh:
         raise click.UsageError("--live needs the mesh of the simulator's part; give --mesh")
     if run is None:
-        _become_node({
+        values = {
             'mesh_file': part.mesh, 'mesh_scale': part.mesh_scale,
             'max_edge_length_m': part.max_edge_length_m, 'target_um': band.target_um,
             'target_tolerance_um': band.tolerance_um, 'host': host, 'port': port,
-        }, token)  # fmt: skip
-        return
-    replay: Replay | None = None
+        }  # fmt: skip
+        # This process becomes the node, which says what it needs; others can read its words.
+        os.environ[TOKEN] = token
+        given = (f'{name}:={value}' for name, value in values.items() if value not in ('', None))
+        node = 'from paint_deposition.nodes.executables import web_view; sys.exit(web_view())'
+        command = python(node, '--ros-args', *(word for value in given for word in ('-p', value)))
+        os.execv(command[0], command)
     with Progress('watch') as show:
-        show('loading')
-        from paint_deposition.api.shown_results import is_results, results_scenes
-
-        if is_results(run):
-            show('painting the parts')
-            scenes, warnings = results_scenes(run)
-        else:
-            replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
-            scenes, warnings = [replay.scene], [*replay.warnings]
-        page = Page(scenes, host, port, token, replay.command if replay else None)
-    print_all('warning', warnings)
+        replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
+        page = Page([replay.scene], host, port, token, replay.command)
+    print_all('warning', replay.warnings)
     click.echo(f'{page.url}  (Ctrl-C ends it)')
     stop = Event()
     try:
-        replay.run(stop) if replay else stop.wait()
+        replay.run(stop)
     except KeyboardInterrupt:
         stop.set()
     finally:
@@ -105,6 +98,7 @@ def _replay(
     show: Progress, run: Path, part: options.Part, model_file: Path | None,
     motion: dict[str, Any], given: dict[str, float],
 ) -> Replay:  # fmt: skip
+    show('loading')
     from paint_deposition.api.replaying import Replay
     from paint_deposition.files.motion_files import read_gun_motions
     from paint_deposition.files.motion_source import MotionSource
@@ -114,7 +108,7 @@ def _replay(
 
     show('reading')
     if not run.exists():
-        raise click.UsageError(f'{run} is not there; give a recorded run or a folder of results')
+        raise click.UsageError(f'{run} is not there; give a recorded run')
     recorded = custom_data(run)
     if recorded and not motion['state_topic']:
         with open_bag(run) as bag:
@@ -133,15 +127,6 @@ def _replay(
     return replay
 
 
-def _become_node(parameters: dict[str, object], token: str) -> None:
-    """Become the node `web_view`, which says what it needs; others can read its words."""
-    os.environ[TOKEN] = token
-    words = [w for name, value in parameters.items() if value not in ('', None)
-             for w in ('-p', f'{name}:={value}')]  # fmt: skip
-    command = python(NODE, '--ros-args', *words)
-    os.execv(command[0], command)
-
-
 @click.command('view')
 @click.argument('run', type=options.FILE)
 def view_command(run: Path) -> None:
@@ -155,7 +140,8 @@ def view_command(run: Path) -> None:
         raise PaintError(f'{run}: no .mcap file; give a run that run_recorder recorded')
     if find_spec('rerun') is None:
         raise PaintError('Rerun is not installed; run: pip install rerun-sdk')
-    sys.exit(subprocess.run(python(RERUN, *map(str, files))).returncode)
+    rerun = 'import runpy; runpy.run_module("rerun", run_name="__main__", alter_sys=True)'
+    sys.exit(subprocess.run(python(rerun, *map(str, files))).returncode)
 
 
 @click.command('recover')

@@ -18,8 +18,6 @@ from paint_deposition.request import FilmBand
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
 
-MOST_WARNINGS = 5
-
 
 @click.command('simulate')
 @options.part_options(0.01, zones=True)
@@ -191,7 +189,8 @@ def sweep_command(sweep: Path, results: Results, scheduler: str | None, count: i
         f'case {first}{f" and {len(others)} more" if others else ""}: {reason}'
         for reason, (first, *others) in named.items()
     ]
-    if len(warnings) > MOST_WARNINGS:
-        more = f'{len(warnings) - MOST_WARNINGS} more in {results.output / "cases.parquet"}'
-        warnings = [*warnings[:MOST_WARNINGS], more]
+    most = 5
+    if len(warnings) > most:
+        more = f'{len(warnings) - most} more in {results.output / "cases.parquet"}'
+        warnings = [*warnings[:most], more]
     results.print(found.lines, notes=found.job.notes, warnings=warnings)

@@ -11,10 +11,6 @@ from pathlib import Path
 # As cli/main.py does, before NumPy is loaded: a node multiplies no large matrices.
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
-REMEDIES = {
-    'rclpy': 'source a ROS 2 installation, or use the one that `make build` installs',
-    'paint_msgs': 'build the workspace with `make build` or colcon and source it',
-}
 # Fast DDS reads its settings from the file that is named here; in Jazzy under its former name.
 FAST_DDS_FILES = 'FASTDDS_DEFAULT_PROFILES_FILE', 'FASTRTPS_DEFAULT_PROFILES_FILE'
 if not any(name in os.environ for name in FAST_DDS_FILES):
@@ -28,13 +24,16 @@ def _run(name: str, place: str, node_class: str) -> int:
     signals: list[int] = []
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda number, _: signals.append(number))
-    for needed, remedy in REMEDIES.items():
+    for needed, remedy in (
+        ('rclpy', 'source a ROS 2 installation, or use the one that `make build` installs'),
+        ('paint_msgs', 'build the workspace with `make build` or colcon and source it'),
+    ):
         if find_spec(needed) is None:
             sys.stderr.write(f'{name}: needs {needed}; {remedy}\n')
             return 2
     module = importlib.import_module(f'paint_deposition.nodes.{place}')
-    process = importlib.import_module('paint_deposition.nodes.runtime.process')
-    return process.run_node(getattr(module, node_class), signals)
+    base = importlib.import_module('paint_deposition.nodes.runtime.node')
+    return base.run_node(getattr(module, node_class), signals)
 
 
 atomizer_source = partial(_run, 'atomizer_source', 'robot.atomizer_source', 'AtomizerSource')

@@ -24,25 +24,18 @@ from paint_deposition.nodes.painting.painting_parameters import (
     model_parameters,
 )
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
 from paint_deposition.nodes.runtime.parameters import (
     NodeParameter,
     direction_parameter,
-    fixed_while_running,
+    fixed,
     mesh_parameters,
     requested,
 )
+from paint_deposition.nodes.runtime.topics import header, pose_message
 from paint_deposition.planning.plan import Plan, kept_clear, plan
 from paint_deposition.planning.recommendation import Recommendation, recommend
-from paint_deposition.planning.requests import (
-    GunEnvelope,
-    IndexRequest,
-    PlanRequest,
-)
-
-SPACING_M = 0.02
-
+from paint_deposition.planning.requests import GunEnvelope, IndexRequest, PlanRequest
 
 # (stage, share of it that is done, 0 to 1); it raises CancelledError to cancel the work.
 Progress = Callable[[str, float], None]
@@ -54,6 +47,7 @@ class IndexPlanner(PaintNode):
     The planned motion is published on `planned_path`, latched, in the frame of the mesh.
     """
 
+    NAME = 'index_planner'
     PARAMETERS = model_parameters('') | dict(
         brush=NodeParameter(
             0,
@@ -65,7 +59,7 @@ class IndexPlanner(PaintNode):
         standoff_m=requested(PlanRequest, 'standoff_m'),
         travel_rad=requested(PlanRequest, 'travel_rad'),
         gun_turns=requested(IndexRequest, 'gun_turns', False),
-        **fixed_while_running(
+        **fixed(
             'passes are planned once, when the node starts; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.02),
             direction=requested(PlanRequest, 'direction', 'horizontal'),
@@ -81,7 +75,7 @@ class IndexPlanner(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('index_planner', **kwargs)
+        super().__init__(**kwargs)
         self._requests = 0
         self._last = Status(OK, 'no request yet')
         self.create_service(RecommendIndex, 'recommend_index', self._recommend)
@@ -217,8 +211,8 @@ class IndexPlanner(PaintNode):
 
     # --- parameters and diagnostics
 
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if 'model_file' in names:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        if 'model_file' in changed:
             self._next_model = model_from_parameters(values)
 
     def _on_change(self, names: set[str]) -> None:
@@ -259,9 +253,9 @@ def _fill_response(
 
 
 def _path_message(trajectory: Trajectory, start_ns: int) -> Path:
-    """Poses about SPACING_M apart, both ends included, with stamps from ``start_ns`` on."""
+    """Poses about 20 mm apart, both ends included, with stamps from ``start_ns`` on."""
     step = np.linalg.norm(np.diff(trajectory.positions_m, axis=0), axis=1)
-    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / SPACING_M)
+    travelled = np.floor(np.concatenate([[0.0], np.cumsum(step)]) / 0.02)
     kept = np.append(True, np.diff(travelled) > 0.0)
     kept[-1] = True
     stamps_ns = start_ns + trajectory.stamps_ns - trajectory.stamps_ns[0]

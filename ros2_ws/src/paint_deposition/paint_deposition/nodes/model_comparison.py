@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point
@@ -24,13 +23,9 @@ from paint_deposition.nodes.painting.health import painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
-from paint_deposition.nodes.runtime.parameters import (
-    NodeParameter,
-    fixed_while_configured,
-    thickness_parameter,
-)
+from paint_deposition.nodes.runtime.parameters import CONFIGURED, NodeParameter, fixed
+from paint_deposition.nodes.runtime.topics import ColouredMesh, header
 from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
@@ -44,25 +39,26 @@ class ModelComparison(PaintingNode):
     them are for display only.
     """
 
+    NAME = 'model_comparison'
     PARAMETERS = PAINTING | dict(
-        **fixed_while_configured(
+        **fixed(
             'the film is painted where they were taken; clean the node up or restart it',
+            CONFIGURED,
             measurements_file=NodeParameter(
                 '',
                 'Gauge readings, CSV with x_m,y_m,z_m,thickness_um in the frame of the mesh '
                 '[path]',
             ),
         ),
-        color_max_um=thickness_parameter(
-            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]'
+        color_max_um=NodeParameter(
+            0.0,
+            'Residual at the ends of the colours; 0: a quarter of the thickest reading [µm]',
+            (0.0, 10_000.0),
         ),
     )
     PRECISION = 'double'
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('model_comparison', **kwargs)
-
-    def _configure(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         super()._configure()
         latched = partial(self.create_publisher, qos_profile=topics.LATCHED)
         self._mesh_publisher = latched(Marker, 'comparison/mesh')
@@ -71,19 +67,18 @@ class ModelComparison(PaintingNode):
         self.create_trigger_service('~/compare', self._compare)
         self._publish_legend()
         self.publish()
-
-    def _diagnostic_tasks(self) -> Mapping[str, Task]:
         return painting_tasks(self) | {'comparison': self.status}
 
     # --- the part and its readings
 
-    def _read_part(self) -> None:
+    def _load_files(self) -> None:
         if not self.values['measurements_file']:
             raise PaintError('model_comparison: measurements_file is empty: give gauge readings')
         self._is_read = False
         self.readings = read_readings(self.values['measurements_file'])
         self.get_logger().info(self.readings.understood)
         self._noise = gauge_noise(self.readings)
+        super()._load_files()
 
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
         def experiment_on(surface: Surface) -> Experiment:
@@ -107,12 +102,9 @@ class ModelComparison(PaintingNode):
             self.get_logger().warning(doubt)
         frame_id = self.frame.frame_id
         self._mesh = ColouredMesh(surface.vertices_m, surface.faces, frame_id, 'residual')
-        self._spread_colours()
-
-    def _spread_colours(self) -> None:
         at = slice(len(self._experiment))
         places, normals = self.points.positions_m[at], self.points.normals[at]
-        self._spreading = interpolation_matrix(self.surface, places, normals)
+        self._spreading = interpolation_matrix(surface, places, normals)
         self._coloured = reached(self._spreading)
 
     def residuals(self) -> Residuals:
@@ -150,20 +142,8 @@ class ModelComparison(PaintingNode):
         self._shown = film
         residuals = self.residuals()
         stamp_ns = self.film.newest_ns or 0
-        self._stats_publisher.publish(self._stats(residuals, stamp_ns))
-        means = self._experiment.means
-        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
-        scale = self._scale
-        rows = scale.rows(self._spreading @ at_points, self._coloured)
-        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
-
-    def _publish_legend(self) -> None:
-        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
-        self._legend_publisher.publish(bar)
-
-    def _stats(self, residuals: Residuals, stamp_ns: int) -> ComparisonStats:
         x, y, z = self.readings.positions_m[residuals.worst].tolist()
-        return ComparisonStats(
+        stats = ComparisonStats(
             header=header(self.frame.frame_id, stamp_ns),
             model=self._model_name,
             readings=len(residuals),
@@ -176,6 +156,16 @@ class ModelComparison(PaintingNode):
             worst_position=Point(x=x, y=y, z=z),
             worst_residual_um=float(residuals.residual_um[residuals.worst]),
         )
+        self._stats_publisher.publish(stats)
+        means = self._experiment.means
+        at_points = means.mean_um - film.gauge_um[: len(self._experiment)]
+        scale = self._scale
+        rows = scale.rows(self._spreading @ at_points, self._coloured)
+        self._mesh_publisher.publish(self._mesh.serialise(stamp_ns, scale.palette, rows))
+
+    def _publish_legend(self) -> None:
+        bar = legend(self._scale, 'µm', self.surface, self.frame.frame_id)
+        self._legend_publisher.publish(bar)
 
     def _compare(self) -> tuple[bool, str]:
         """The comparison in one line."""

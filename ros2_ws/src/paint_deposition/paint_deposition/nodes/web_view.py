@@ -17,20 +17,12 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import (
-    stamp_ns,
-    transforms_of,
-    trigger_change,
-)
+from paint_deposition.files.recordings.headers import stamp_ns, transforms_of, trigger_change
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
 from paint_deposition.motion.pose_stream import PoseBatch
-from paint_deposition.nodes.painting.frames import (
-    PartFrame,
-    TfQueue,
-    placed_in_order,
-)
+from paint_deposition.nodes.painting.frames import PartFrame, TfQueue, placed_in_order
 from paint_deposition.nodes.painting.painting_parameters import read_part
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
@@ -39,16 +31,13 @@ from paint_deposition.nodes.runtime.parameters import (
     atomizers_parameter,
     direction_parameter,
     display_parameters,
-    fixed_while_running,
+    fixed,
     mesh_parameters,
     require_display,
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.facing import turned
 from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
-
-# The simulator speaks twice a second [s].
-SILENT_S = 2.0
 
 
 class WebView(PaintNode):
@@ -57,8 +46,9 @@ class WebView(PaintNode):
     The part is read from its mesh, as the simulator does, and follows the simulator's `part`.
     """
 
+    NAME = 'web_view'
     PARAMETERS = display_parameters() | dict(
-        fixed_while_running(
+        fixed(
             'the page is served with it; restart the node with the new value',
             **mesh_parameters(max_edge_length_m=0.01),
             down=direction_parameter('As for deposition_simulator [-]'),
@@ -77,7 +67,7 @@ class WebView(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('web_view', **kwargs)
+        super().__init__(**kwargs)
         results = topics.RESULTS
         for message, topic, take, profile in (
             (Part, topics.PART_TOPIC, self._take_part, topics.LATCHED),
@@ -130,7 +120,7 @@ class WebView(PaintNode):
     def close(self) -> None:
         self.page.close()
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         require_display(values)
 
     def _on_change(self, names: set[str]) -> None:
@@ -195,7 +185,8 @@ class WebView(PaintNode):
 
     def _show_trust(self) -> None:
         silent_s = time.monotonic() - self._trusted_s
-        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > SILENT_S else ''
+        # The simulator speaks twice a second.
+        silent = f'no word of the simulator for {silent_s:.0f} s' if silent_s > 2.0 else ''
         self.scene.tell('trust', doubts=silent or self._doubts)
 
     def _say(self, problem: str) -> None:
@@ -213,8 +204,14 @@ class WebView(PaintNode):
             topic.take_pending()
         for gun, waiting in self._waiting.items():
             for pose, placed in placed_in_order(waiting, self._frame.on_part, time.monotonic()):
-                if not isinstance(placed, NoTransform):
-                    self._move_gun(gun, pose, *placed)
+                if isinstance(placed, NoTransform):
+                    continue
+                position_m, quaternion = placed
+                stamps = np.array([stamp_ns(pose.header)])
+                batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
+                for position, z_axis in zip(*batch.finite_axes(), strict=True):
+                    # Without any state the gun is taken to spray, as the simulator does.
+                    self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def _take_part_pose(self, placed: TransformStamped) -> None:
         for _, parent, _, pose in transforms_of(SimpleNamespace(transforms=[placed])):
@@ -226,15 +223,6 @@ class WebView(PaintNode):
 
     def _take_pose(self, gun: str, message: PoseStamped, _info: Any) -> None:
         self._waiting[gun].append((time.monotonic(), message))
-
-    def _move_gun(
-        self, gun: str, message: PoseStamped, position_m: np.ndarray, quaternion: np.ndarray
-    ) -> None:
-        stamps = np.array([stamp_ns(message.header)])
-        batch = PoseBatch(stamps, position_m[np.newaxis], quaternion[np.newaxis])
-        for position, z_axis in zip(*batch.finite_axes(), strict=True):
-            # Without any state the gun is taken to spray, as the simulator does.
-            self.scene.move_gun(gun, position, z_axis, self._flow.get(gun, 1.0))
 
     def status(self) -> Status:
         sent, now_s = self.page.bytes_sent, time.monotonic()

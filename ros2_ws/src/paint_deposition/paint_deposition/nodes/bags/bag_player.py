@@ -37,14 +37,13 @@ from paint_deposition.files.recordings.pose_topics import (
     read_frames,
 )
 from paint_deposition.files.recordings.triggers import BOOL_TYPE, choose_state_topic
-from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, relative_flow
+from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 from paint_deposition.nodes.bags.pace import FlowControl, ReplayClock
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header, header_stamp_ns, pose_message
 from paint_deposition.nodes.runtime.node import OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-
-LOG_TIME = attrgetter('log_time_ns')
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
+from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, pose_message
+from paint_deposition.request import MotionOptions
 
 
 class BagPlayer(PaintNode):
@@ -59,14 +58,11 @@ class BagPlayer(PaintNode):
     same time while the replay is paused.
     """
 
-    PARAMETERS = fixed_while_running(
+    NAME = 'bag_player'
+    PARAMETERS = fixed(
         'the replay has begun with it; start another player',
         bag=NodeParameter('', 'Bag to replay: ROS 1 .bag, rosbag2 folder or .mcap file [path]'),
-        pose_topic=NodeParameter(
-            '',
-            "PoseStamped topic in the bag, or with urdf its joint states; empty: the bag's only "
-            'one [topic]',
-        ),
+        pose_topic=requested(MotionOptions, 'pose_topic', ''),
         tf=NodeParameter(
             [],
             'Frame of the poses and frame of the TCP, where transforms of the bag give the poses; '
@@ -78,10 +74,8 @@ class BagPlayer(PaintNode):
         urdf=NodeParameter(
             '', 'The robot whose joint states in the bag give the poses; empty: they do not [path]'
         ),
-        tip_link=NodeParameter(
-            '', 'Link of urdf that is the TCP; empty: tool0, else the last link [name]'
-        ),
-        base_link=NodeParameter('', 'Link of urdf the poses are in; empty: the root [name]'),
+        tip_link=requested(MotionOptions, 'tip_link', ''),
+        base_link=requested(MotionOptions, 'base_link', ''),
         state_topic=NodeParameter(
             '', 'Trigger in the bag, AtomizerState or std_msgs/Bool; empty: none [topic]'
         ),
@@ -102,7 +96,7 @@ class BagPlayer(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('bag_player', **kwargs)
+        super().__init__(**kwargs)
         # Reliable, so that subscribers acknowledge.
         profile = QoSProfile(depth=max(topics.POSE_DEPTH, self.values['window']))
         self._pose_publisher = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
@@ -201,11 +195,12 @@ class BagPlayer(PaintNode):
             jumps = 'another node publishes /clock, too: time jumps for nodes with use_sim_time'
             return Status(WARN, f'{jumps}; set publish_clock to false for one of them')
         status = self._flow_control.status if self._time.running else 'paused'
+        ahead = self._flow_control.lag(time.monotonic())
         values = {
             'bag': self.values['bag'],
             'poses published': self.poses_published,
             'states published': self.states_published,
-            'poses ahead of the slowest subscriber': self._flow_control.poses_ahead,
+            'poses ahead of the slowest subscriber': max(ahead.values(), default=0),
         }
         return Status(WARN if status.startswith('waiting') else OK, status, values)
 
@@ -234,10 +229,15 @@ class BagPlayer(PaintNode):
                     self._flow_control.wait_for_subscribers(self._subscribers_to_await)
                     self._subscribers_to_await = 0  # when looping
                     self._time.change(started=True)
-                self._wait_until_due(message.log_time_ns)
+                # Wait for the end of a pause, the time of the message, and the flow control.
+                while not self.stopped.is_set():
+                    if self._time.wait_for(message.log_time_ns, timeout_s=0.05):
+                        break
+                if self.values['rate'] == 0.0:
+                    self._flow_control.wait_for_room()
+                    self._time.change(time_ns=message.log_time_ns)
                 if self.stopped.is_set():
                     return
-                self._time.jump_to(message.log_time_ns)
                 self._publish(message, as_state)
         self._time.change(started=False)
         self._publish_clock()
@@ -246,53 +246,42 @@ class BagPlayer(PaintNode):
         """Poses, states and transforms by log time; at equal times, poses last."""
         named = [self._pose_topic, self._state_topic.name if self._state_topic else '']
         read = [*filter(None, named), *self._transform_topics]
-        poses: Iterable[RawMessage] = computed_poses(*self._motion) if self._motion else ()
-        messages = merge(bag.messages(read) if read else (), poses, key=LOG_TIME)
-        for _, simultaneous in groupby(messages, key=LOG_TIME):
+        poses: Iterable[RawMessage] = ()
+        if self._motion:
+            motion, log_times_ns = self._motion
+            frame_id, stamps_ns = motion.frame_id, motion.stamps_ns.tolist()
+            # Log times never go back.
+            logged_ns = np.maximum.accumulate(log_times_ns).tolist()
+            places = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
+            poses = (
+                RawMessage('', '', at_ns, serialize_message(pose_message(frame_id, stamp, place)))
+                for stamp, at_ns, place in zip(stamps_ns, logged_ns, places, strict=True)
+            )
+        log_time = attrgetter('log_time_ns')
+        messages = merge(bag.messages(read) if read else (), poses, key=log_time)
+        for _, simultaneous in groupby(messages, key=log_time):
             yield from sorted(simultaneous, key=lambda each: each.topic == self._pose_topic)
-
-    def _wait_until_due(self, log_time_ns: int) -> None:
-        """Wait for the end of a pause, the time of a message, and the flow control."""
-        while not self.stopped.is_set():
-            if self._time.wait_for(log_time_ns, timeout_s=0.05):
-                break
-        if self.values['rate'] == 0.0:
-            self._flow_control.wait_for_room()
 
     def _publish(self, message: RawMessage, as_state: Callable[[RawMessage], bytes]) -> None:
         if message.topic == self._pose_topic:
             self._flow_control.add_sent(header_stamp_ns(message.cdr), time.monotonic())
             self._pose_publisher.publish(message.cdr)
             self.poses_published += 1
+        elif message.type == PART_POSE_TYPE:  # it becomes a static transform
+            publisher = self._transform_publishers[True]
+            placed = deserialize_message(message.cdr, TransformStamped)
+            publisher.publish(serialize_message(publisher.msg_type(transforms=[placed])))
         elif message.topic in self._transform_topics:
-            self._publish_transform(message)
+            self._transform_publishers[message.topic.endswith(STATIC)].publish(message.cdr)
         else:
             self._state_publisher.publish(as_state(message))
             self.states_published += 1
-
-    def _publish_transform(self, message: RawMessage) -> None:
-        """A recorded `part_pose` becomes a static transform."""
-        cdr, is_place = message.cdr, message.type == PART_POSE_TYPE
-        publisher = self._transform_publishers[is_place or message.topic.endswith(STATIC)]
-        if is_place:
-            placed = deserialize_message(cdr, TransformStamped)
-            cdr = serialize_message(publisher.msg_type(transforms=[placed]))
-        publisher.publish(cdr)
 
     def _publish_clock(self) -> None:
         with self._clock_order:
             time_ns = self._time.time_ns
             if self._clock_publisher and time_ns is not None:
                 self._clock_publisher.publish(Clock(clock=Time(nanoseconds=time_ns).to_msg()))
-
-
-def computed_poses(motion: Trajectory, log_times_ns: np.ndarray) -> Iterator[RawMessage]:
-    """Serialised poses of a motion that is no topic of its own; log times (N,) never go back."""
-    logged_ns = np.maximum.accumulate(log_times_ns).tolist()
-    poses = np.hstack([motion.positions_m, motion.quaternions_xyzw]).tolist()
-    for stamp, at_ns, values in zip(motion.stamps_ns.tolist(), logged_ns, poses, strict=True):
-        pose = serialize_message(pose_message(motion.frame_id, stamp, values))
-        yield RawMessage('', '', at_ns, pose)
 
 
 def state_converter(bag: Bag, states: BagTopic | None) -> Callable[[RawMessage], bytes]:

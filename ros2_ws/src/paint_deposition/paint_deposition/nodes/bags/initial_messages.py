@@ -17,7 +17,7 @@ from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.film.live_film import STREAM_RESTART_NS
 from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
-from paint_deposition.nodes.runtime.messages import header_stamp_ns
+from paint_deposition.nodes.runtime.topics import header_stamp_ns
 
 # Of each topic of a gun, for the time in which a simulator reads the mesh of the next part.
 REMEMBERED_MESSAGES = 20_000
@@ -126,7 +126,11 @@ class InitialMessages:
         later = [placed for placed in self._placed if placed.sent_ns > sent_ns]
         before = [*self._placed][: len(self._placed) - len(later)][-1:]
         place = list(Rigid.of(part.part_pose).values) if is_pose(part.part_pose) else []
-        stays = not later and before and _pose(before[0]) == place
+        stays = False
+        if before and not later:
+            placed = deserialize_message(before[0].cdr, TransformStamped).transform
+            t, q = placed.translation, placed.rotation
+            stays = [t.x, t.y, t.z, q.x, q.y, q.z, q.w] == place
         self._placed = deque(before if stays else later, REMEMBERED_MESSAGES)
         early[self._part_pose] = len(later)
         return cut_ns, {topic: count for topic, count in early.items() if count}
@@ -207,10 +211,3 @@ class InitialMessages:
             if row not in kept:
                 del states[row]
         return len(remembered)
-
-
-def _pose(message: Recorded) -> list[float]:
-    """The pose in a message of the part's pose."""
-    placed = deserialize_message(message.cdr, TransformStamped).transform
-    t, q = placed.translation, placed.rotation
-    return [t.x, t.y, t.z, q.x, q.y, q.z, q.w]

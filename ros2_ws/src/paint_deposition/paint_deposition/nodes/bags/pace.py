@@ -15,7 +15,6 @@ from rclpy.publisher import Publisher
 from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
-GRAPH_PERIOD_S = 0.1
 LOG_PERIOD_S = 5.0
 ACKNOWLEDGED_WITHIN = Duration(seconds=0.05)
 # If a subscriber reports the same pose for so long while none is sent, later poses are lost to it.
@@ -28,7 +27,7 @@ class ReplayClock:
     """Bag time as a function of the steady clock; thread-safe.
 
     It does not advance before it is started and while it is paused. `rate` is bag seconds per
-    second; at 0, time jumps from message to message. `running` is False while paused.
+    second; at 0, time is changed from message to message. `running` is False while paused.
     """
 
     def __init__(self, rate: float, running: bool = True) -> None:
@@ -60,12 +59,6 @@ class ReplayClock:
             goes = self._started and self.running and self._rate
             self._since_s = time.monotonic() if goes else None
             self._changed.notify_all()
-
-    def jump_to(self, time_ns: int) -> None:
-        """At rate 0: jump to the time of a message."""
-        with self._changed:
-            if self._rate == 0.0:
-                self._time_ns = time_ns
 
     def wait_for(self, time_ns: int, timeout_s: float) -> bool:
         """Wait for that time, at rate 0 only for the end of a pause.
@@ -129,14 +122,15 @@ class FlowControl:
         self._discovered_s = -math.inf
         self._mute: set[str] = set()
         self.status = 'starting'
-        node.create_subscription(PoseProgress, PROGRESS_TOPIC, self._take_report, PROGRESS)
+        node.create_subscription(
+            PoseProgress, PROGRESS_TOPIC,
+            lambda said: self.report(
+                said.reporter or None, stamp_ns(said.header), time.monotonic()
+            ),
+            PROGRESS,
+        )  # fmt: skip
 
     # --- who has taken what
-
-    @property
-    def poses_ahead(self) -> int:
-        """Poses that the slowest reporting subscriber has not taken yet."""
-        return max(self.lag(time.monotonic()).values(), default=0)
 
     def add_sent(self, stamp_ns: int, now_s: float) -> None:
         """Add a pose that is about to be published, by its stamp."""
@@ -170,27 +164,21 @@ class FlowControl:
         with self._lock:
             waited_for = {}
             for name, subscriber in self.subscribers.items():
-                if subscriber.taken < self._sent:
-                    self._time_out(subscriber, now_s)
+                if subscriber.taken == self._sent:
+                    continue
+                quiet_since_s = max(self._sent_s, subscriber.advanced_s)
+                if subscriber.reported_s is None:
+                    subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
+                elif (
+                    now_s - quiet_since_s > LOST_TIMEOUT_S
+                    # Without reports in this time it may be busy.
+                    and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
+                ):
+                    subscriber.lost += self._sent - subscriber.taken
+                    subscriber.taken = self._sent
                 if subscriber.taken < self._sent and not subscriber.never_reported:
                     waited_for[name] = self._sent - subscriber.taken
             return waited_for
-
-    def _time_out(self, subscriber: Subscriber, now_s: float) -> None:
-        quiet_since_s = max(self._sent_s, subscriber.advanced_s)
-        if subscriber.reported_s is None:
-            subscriber.never_reported |= now_s - quiet_since_s > NO_REPORT_TIMEOUT_S
-        elif (
-            now_s - quiet_since_s > LOST_TIMEOUT_S
-            # Without reports in this time it may be busy.
-            and subscriber.reported_s > quiet_since_s + 0.5 * LOST_TIMEOUT_S
-        ):
-            subscriber.lost += self._sent - subscriber.taken
-            subscriber.taken = self._sent
-
-    def _take_report(self, progress: PoseProgress) -> None:
-        stamp = stamp_ns(progress.header)
-        self.report(progress.reporter or None, stamp, time.monotonic())
 
     def _discover(self) -> frozenset[str]:
         """Full names of the subscribers that also publish progress."""
@@ -220,7 +208,7 @@ class FlowControl:
                 logged_s = now_s
                 topic = self._publisher.topic_name
                 self._log_status(f'waiting for {wanted} subscribers on {topic}, {count} there')
-            self._stopped.wait(GRAPH_PERIOD_S)
+            self._stopped.wait(0.1)
         self._discover()
 
     def wait_for_room(self) -> None:
@@ -244,27 +232,24 @@ class FlowControl:
         logged_s = time.monotonic()
         while not self._stopped.is_set():
             now_s = time.monotonic()
-            if now_s - self._discovered_s > GRAPH_PERIOD_S:
+            if now_s - self._discovered_s > 0.1:
                 self._discover()
             behind = self.lag(now_s)
             if max(behind.values(), default=0) < limit:
                 break
-            self._warn_of_mute_subscribers()
+            mute = {name for name, s in self.subscribers.items() if s.never_reported}
+            for name in mute - self._mute:
+                self._node.get_logger().warning(
+                    f'{name} has never reported its progress: it is no longer waited for, and '
+                    'may lose poses when its queue overflows'
+                )
+            self._mute = mute
             if now_s - logged_s > LOG_PERIOD_S:
                 logged_s = now_s
                 late = ', '.join(f'{name}, {count} poses behind' for name, count in behind.items())
                 self._log_status(f'waiting for {late}')
             self._stopped.wait(0.001)
         self.status = 'playing'
-
-    def _warn_of_mute_subscribers(self) -> None:
-        mute = {name for name, s in self.subscribers.items() if s.never_reported}
-        for name in mute - self._mute:
-            self._node.get_logger().warning(
-                f'{name} has never reported its progress: it is no longer waited for, and may '
-                'lose poses when its queue overflows'
-            )
-        self._mute = mute
 
     def _log_status(self, status: str) -> None:
         self.status = status

@@ -1,10 +1,8 @@
 """What a recorder keeps: its parameters and topics, and the counts of each topic."""
 
-import os
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from paint_msgs.msg import Part
 from rclpy.node import Node
 from rclpy.qos import QoSProfile
 from rosbags.interfaces import (
@@ -16,39 +14,26 @@ from rosbags.interfaces import (
     QosTime,
 )
 
-from paint_deposition.files.provenance import provenance
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
 from paint_deposition.nodes.runtime.managed_node import MANAGED
-from paint_deposition.nodes.runtime.messages import header_stamp_ns, message_class
 from paint_deposition.nodes.runtime.parameters import (
+    CONFIGURED,
     FILE_NAME,
     FILE_NAME_RULE,
     NodeParameter,
     atomizers_parameter,
-    fixed_while_configured,
+    fixed,
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
     AdaptiveSubscription,
     gun_topic,
+    header_stamp_ns,
+    message_class,
 )
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
-# Without the mesh markers: cloud and field hold the same in a fortieth of their size.
-CELL_TOPICS = (
-    'thickness/cloud',
-    'thickness/field',
-    'thickness/stats',
-    'comparison/stats',
-    'planned_path',
-    # The pose of the part, for poses of the TCP in other frames.
-    PART_POSE,
-    '/tf',
-    STATIC_TF,
-    '/diagnostics',
-    PARAMETER_EVENTS,
-)
 
 RECORDER = dict(
     **MANAGED,
@@ -57,8 +42,9 @@ RECORDER = dict(
         'Folder in which the run is created [path]',
         fixed_because='remote nodes must not choose where files are written; restart the node',
     ),
-    **fixed_while_configured(
+    **fixed(
         'the run is made with it; clean the node up, or call ~/stop and start another recorder',
+        CONFIGURED,
         topics=NodeParameter(
             [],
             'Topics to record; empty: motion, film, plan, diagnostics and parameter changes '
@@ -82,33 +68,29 @@ RECORDER = dict(
         model_file=NodeParameter('', 'Model to keep with the run; empty: none [path]'),
     ),
 )
-# (topic, serialised message, log time [ns], time sent [ns])
-TakeMessage = Callable[[str, bytes, int, int], None]
 MISSED_BEFORE_DISCOVERY = 'sent before the recorder heard their publisher'
 
 
 def default_topics(guns: Sequence[str]) -> list[str]:
-    """Motion, film, plan, diagnostics, parameter changes; of several guns the film of each."""
+    """Motion, film, plan, diagnostics, parameter changes; of several guns the film of each.
+
+    Without the mesh markers: cloud and field hold the same in a fortieth of their size.
+    """
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
-    return [*motion, *shares, *CELL_TOPICS]
-
-
-def part_data(part: Part, model_file: str) -> dict[str, str]:
-    """The custom data of a part's run."""
-    data = {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
-    if part.part_pose:
-        data['part_pose'] = ' '.join(map(str, part.part_pose))
-    # The mesh file of a simulator on another machine may not exist here.
-    mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
-    return provenance(mesh_file, model_file) | data
+    return [
+        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats',
+        'comparison/stats', 'planned_path', PART_POSE, '/tf', STATIC_TF, '/diagnostics',
+        PARAMETER_EVENTS,
+    ]  # fmt: skip
 
 
 class RecordedTopic(AdaptiveSubscription):
     """A subscription to the serialised messages of a topic, which counts what a run lacks.
 
-    `max_gap_ns` is the longest interval between header stamps that is no gap; None: gaps are not
-    counted. `begun_ns` is when the run began.
+    `take` is called with topic, message, log time and time sent [ns]. `max_gap_ns` is the longest
+    interval between header stamps that is no gap; None: gaps are not counted. `begun_ns` is when
+    the run began.
 
     Attributes:
         run_topic: the topic as the run stores it; name: of the topic.
@@ -122,7 +104,7 @@ class RecordedTopic(AdaptiveSubscription):
         self,
         node: Node,
         run_topic: RunTopic,
-        take: TakeMessage,
+        take: Callable[[str, bytes, int, int], None],
         max_gap_ns: int | None,
         begun_ns: int,
         depth: int,
@@ -173,19 +155,23 @@ class RecordedTopic(AdaptiveSubscription):
 
     def _record(self, cdr: bytes, info: Mapping[str, Any]) -> None:
         self.messages += 1
-        if info.get('publication_sequence_number') is None or info.get('publisher_gid') is None:
+        number, publisher = info.get('publication_sequence_number'), info.get('publisher_gid')
+        if number is None or publisher is None:
             self.unnumbered += 1
         else:
-            self._count_before_first(info)
+            self._count_before_first(publisher['data'], number, info)
         if self._max_gap_ns is not None:
-            self._count_gap(header_stamp_ns(cdr), self._max_gap_ns)
+            before_ns, self.newest_stamp_ns = self.newest_stamp_ns, header_stamp_ns(cdr)
+            gap_ns = self.newest_stamp_ns - before_ns
+            if before_ns and gap_ns > self._max_gap_ns:
+                self.gaps += 1
+                self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         # Log times order the messages; times of receipt may go back a little under load.
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
         self._pass_on(self.name, cdr, self._log_time_ns, info['source_timestamp'])
 
-    def _count_before_first(self, info: Mapping[str, Any]) -> None:
+    def _count_before_first(self, publisher: bytes, number: int, info: Mapping[str, Any]) -> None:
         """Count what a publisher sent in the run before it was heard, by how often it sends."""
-        publisher, number = info['publisher_gid']['data'], info['publication_sequence_number']
         sent_ns = info['source_timestamp']
         if publisher not in self._first and len(self._first) < MOST_PUBLISHERS:
             waited_ns = max(info['received_timestamp'] - self._begun_ns, 0)
@@ -195,13 +181,6 @@ class RecordedTopic(AdaptiveSubscription):
         if 0 < number - first <= 50:
             period_ns = max((sent_ns - first_sent_ns) / (number - first), 1.0)
             self._before_first[publisher] = int(min(first - 1, waited_ns / period_ns))
-
-    def _count_gap(self, stamp_ns: int, max_gap_ns: int) -> None:
-        gap_ns = stamp_ns - self.newest_stamp_ns
-        if self.newest_stamp_ns and gap_ns > max_gap_ns:
-            self.gaps += 1
-            self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
-        self.newest_stamp_ns = stamp_ns
 
 
 def bag_qos(profile: QoSProfile) -> Qos:

@@ -1,16 +1,15 @@
 """Node `run_recorder`: records a run in the layout of rosbag2, and reports lost messages."""
 
 import itertools
+import os
 import shutil
 import time
 from collections import Counter
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 from paint_msgs.msg import Part, PoseProgress
 from rclpy.serialization import deserialize_message
-from rclpy.topic_endpoint_info import TopicEndpointInfo
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
@@ -29,10 +28,8 @@ from paint_deposition.nodes.bags.recorded_topic import (
     RecordedTopic,
     bag_qos,
     default_topics,
-    part_data,
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import require_file_name
 from paint_deposition.nodes.runtime.topics import (
@@ -40,6 +37,7 @@ from paint_deposition.nodes.runtime.topics import (
     PROGRESS,
     PROGRESS_TOPIC,
     gun_topic,
+    header,
 )
 
 # The run of a part that has left takes poses that were sent for it until none has come so long.
@@ -54,14 +52,12 @@ class RunRecorder(ManagedNode):
     `paint recover` reads the incomplete run.
     """
 
+    NAME = 'run_recorder'
     PARAMETERS = RECORDER
     run: RunWriter
     runs = 0
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('run_recorder', **kwargs)
-
-    def _configure(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         guns = self.values['atomizers'] or ['']
         wanted = self.values['topics'] or default_topics(guns)
         self._part_topic = self.resolve_topic_name(PART_TOPIC)
@@ -84,6 +80,7 @@ class RunRecorder(ManagedNode):
             for gun in guns
         }
         self.create_trigger_service('~/stop', self._stop)
+        return {'recording': self.status}
 
     def _activate(self) -> None:
         # Only after a run of this node's own is another name chosen for one that exists.
@@ -140,29 +137,27 @@ class RunRecorder(ManagedNode):
                 self._guarded(self._end_of_leaving)
         for name in self._wanted:
             publishers = self.get_publishers_info_by_topic(name)
-            if publishers and name not in self._refused and self._error is None:
-                try:
-                    self._subscribe(name, publishers)
-                except RecordingError as error:
-                    self._refused.add(name)
-                    self.get_logger().error(f'{name} is not recorded: {error}')
-
-    def _subscribe(self, name: str, publishers: list[TopicEndpointInfo]) -> None:
-        types = sorted({publisher.topic_type for publisher in publishers})
-        if len(types) > 1:
-            raise RecordingError(f'{name} is published as {" and ".join(types)}')
-        if name in self.recorded:
-            self.recorded[name].match_qos()
-            return
-        is_pose = types[0] == POSE_TYPE
-        max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
-        offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
-        run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
-        self._guarded(self.run.add_topic, run_topic)
-        self.recorded[name] = RecordedTopic(
-            self, run_topic, self._write, max_gap_ns, self._begun_ns,
-            depth=5000 if is_pose or name == TF else 100,
-        )  # fmt: skip
+            if not publishers or name in self._refused or self._error is not None:
+                continue
+            types = sorted({publisher.topic_type for publisher in publishers})
+            is_pose = types[0] == POSE_TYPE
+            max_gap_ns = round(self.values['max_pose_gap_s'] * 1e9) if is_pose else None
+            offered = [bag_qos(publisher.qos_profile) for publisher in publishers]
+            try:
+                if len(types) > 1:
+                    raise RecordingError(f'{name} is published as {" and ".join(types)}')
+                if name in self.recorded:
+                    self.recorded[name].match_qos()
+                    continue
+                run_topic = RunTopic(name, types[0], definitions.installed(types[0]), offered)
+                self._guarded(self.run.add_topic, run_topic)
+                self.recorded[name] = RecordedTopic(
+                    self, run_topic, self._write, max_gap_ns, self._begun_ns,
+                    depth=5000 if is_pose or name == TF else 100,
+                )  # fmt: skip
+            except RecordingError as error:
+                self._refused.add(name)
+                self.get_logger().error(f'{name} is not recorded: {error}')
 
     # --- writing
 
@@ -220,7 +215,12 @@ class RunRecorder(ManagedNode):
         if not part.run and not any(self.run.counts.get(poses) for poses in self._progress):
             return  # a reset from before this recorder
         try:
-            data = part_data(part, self.values['model_file'])
+            # The mesh file of a simulator on another machine may not exist here.
+            mesh_file = part.mesh_file if os.path.isfile(part.mesh_file) else ''
+            data = provenance(mesh_file, self.values['model_file'])
+            data |= {'part_type': part.type, 'serial': part.serial, 'coat': str(part.coat)}
+            if part.part_pose:
+                data['part_pose'] = ' '.join(map(str, part.part_pose))
             new_run = self._create_run(part.run, data, keep_name=False)
             self._drain()
             self._end_of_leaving()
@@ -312,9 +312,6 @@ class RunRecorder(ManagedNode):
         if self._too_late:
             lost += f', {self._too_late} poses and states came too late for the run before'
         return f'{lost}, {sum(topic.gaps for topic in topics)} gaps'
-
-    def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return {'recording': self.status}
 
     def status(self) -> Status:
         if not self.active and self._error is None:

@@ -1,11 +1,13 @@
-"""The subscriptions to a gun's poses and states, which pass poses on in batches."""
+"""The subscriptions to a gun's poses and states, which paint poses in batches."""
+
+from __future__ import annotations
 
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Callable
 from functools import partial
 from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from geometry_msgs.msg import PoseStamped
@@ -14,42 +16,38 @@ from paint_msgs.msg import AtomizerState, PoseProgress
 from paint_deposition.errors import PaintError
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow
 from paint_deposition.motion.trajectory import SPRAYS_NOTHING
-from paint_deposition.nodes.painting.frames import (
-    PartFrame,
-    TfQueue,
-    placed_in_order,
-)
+from paint_deposition.nodes.painting.frames import TfQueue, placed_in_order
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.node import PaintNode
 from paint_deposition.nodes.runtime.topics import PROGRESS_TOPIC, AdaptiveSubscription, gun_topic
+
+if TYPE_CHECKING:
+    from paint_deposition.nodes.painting.painting_node import PaintingNode
 
 POSES_PER_BATCH = 50
 # No robot announces a state so long before the pose at which it holds.
 AHEAD_NS = 1_000_000_000
-AHEAD = 'states stamped over 1 s ahead of the poses sent after them: set the clocks'
 # Of what a peer names: so many different ones are told apart, and so many characters of each.
 MOST_NAMES, LONGEST_NAME = 20, 200
-OTHERS, STATES_REFUSED = 'others', 'states refused'
-NO_FLOW = 'states that spray with flow 0'
+STATES_REFUSED = 'states refused'
 
 
 class AtomizerInput:
     """Subscribes to a gun's `atomizer/pose` and `atomizer/state`; publishes `atomizer/progress`.
 
-    The gun's name, if any, precedes the three topics: `robot_1/atomizer/pose`. States are passed
-    on at once, poses in batches of fifty or every twentieth of a second.
+    The gun's name, if any, precedes the three topics: `robot_1/atomizer/pose`. States switch the
+    gun at once, poses are painted in batches of fifty or every twentieth of a second.
 
     Args:
-        name: of the gun, '' for the only one of a cell.
-        frame: of the part, into which poses are transformed.
-        on_poses, on_state: callbacks; the latter raises PaintError to refuse a state.
+        node: has the films and the frame of the part.
+        number: of the gun among those of the node.
 
     Attributes:
+        name: of the gun, '' for the only one of a cell.
         poses_received: since the node started.
-        newest_ns: stamp of the last pose that was passed on or dropped, 0 before the first.
+        newest_ns: stamp of the last pose that was painted or dropped, 0 before the first.
         sent_ns: when the last pose received was sent, 0 before the first.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
@@ -57,22 +55,16 @@ class AtomizerInput:
         tf_queue: poses that wait for their transform.
         refused_frames: poses refused for their frame, by frame; refusal: reason of the last.
         unpainted: poses received while the node was not active.
+        times_s: (computing time, duration of the motion) of the last batches.
         anomalies: other poses and states with something wrong, counted by its description.
         state_errors: why states were refused, each reason once.
         intervals, jumps: between stamps, and steps that no robot makes. These and all counts from
             `refused_frames` on are since the last reset.
     """
 
-    def __init__(
-        self,
-        node: PaintNode,
-        name: str,
-        frame: PartFrame,
-        on_poses: Callable[[PoseBatch], None],
-        on_state: Callable[[TriggerChange], None],
-    ) -> None:
-        self._node, self._frame, self.name = node, frame, name
-        self._on_poses, self._on_state = on_poses, on_state
+    def __init__(self, node: PaintingNode, number: int) -> None:
+        name = node.gun_names[number]
+        self._node, self._number, self.name = node, number, name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
         self.poses_received = self.newest_ns = self.sent_ns = 0
@@ -90,6 +82,7 @@ class AtomizerInput:
         self._held: list[PoseStamped | AtomizerState] | None = None
         self._hold_after_ns = 0
         self.tf_queue: TfQueue = deque()
+        self.times_s: deque[tuple[float, float]] = deque(maxlen=100)
         subscribe = partial(AdaptiveSubscription, node, depth=node.values['pose_queue_depth'])
         self._topics = [
             subscribe(
@@ -122,7 +115,7 @@ class AtomizerInput:
         return sum(topic.lost for topic in self._topics) - self._lost_before
 
     def reset(self) -> None:
-        """Reset the counts; poses that were not passed on yet are dropped."""
+        """Reset the counts; poses that were not painted yet are dropped."""
         self.reset_counts()
         self.newest_ns = stamp_ns(self._newest.header) if self._newest is not None else 0
         self.tf_queue.clear()
@@ -163,20 +156,20 @@ class AtomizerInput:
                 self._held.append(message)
             else:
                 self.anomalies['messages dropped, since too many waited for the part'] += 1
-        elif isinstance(message, AtomizerState):
-            self._process_state(message)
-        else:
+        elif isinstance(message, PoseStamped):
             self.tf_queue.append((time.monotonic(), message))
             self._place()
+        else:
+            self._switch(message)
 
     # --- batches
 
     def take_pending(self, at_once: bool = True) -> None:
         """Take all messages in the queues, each state before the first pose that was sent later.
 
-        They are passed on at once, or when they fill a batch or have waited for long enough.
+        They are painted at once, or when they fill a batch or have waited for long enough.
         """
-        self._frame.take_pending()
+        self._node.frame.take_pending()
         for topic in self._topics:
             topic.take_pending()
         # Latched states may come behind others that were sent later.
@@ -195,7 +188,7 @@ class AtomizerInput:
             self.flush()
 
     def flush(self) -> None:
-        """Pass on the next batch; poses that wait for their transform are not in it."""
+        """Paint the next batch if the node is active; poses without a transform wait."""
         self._flushed_s = time.monotonic()
         self._place()
         if not self._poses:
@@ -215,7 +208,21 @@ class AtomizerInput:
                 f'{self._pose_topic}: the TCP would move at {self.jumps.fastest_m_per_s:.0f} m/s '
                 'between two poses: do two guns publish here, or two clocks stamp the poses?'
             )
-        self._on_poses(batch)
+        if self._node.active:
+            began_s = time.monotonic()
+            self._node.film.guns[self._number].add_poses(batch)
+            spent_s = time.monotonic() - began_s
+            steps_ns = np.diff(stamps)
+            if (steps_ns > 0).any():
+                # N poses stand for N intervals: one of them lies before the batch.
+                duration_s = float(np.median(steps_ns[steps_ns > 0])) * len(batch) * 1e-9
+                self.times_s.append((spent_s, duration_s))
+            return
+        if not self.unpainted:
+            self._node.get_logger().warning(
+                f'{self._pose_topic}: poses arrive and are not painted: the node is inactive'
+            )
+        self.unpainted += len(batch)
 
     # --- poses
 
@@ -226,7 +233,8 @@ class AtomizerInput:
         self._newest, self.sent_ns = message, sent_ns
         if self._state_ahead and sent_ns > self._state_ahead[1]:
             if self._state_ahead[0] - stamp_ns(message.header) > AHEAD_NS:
-                self.anomalies[AHEAD] += 1
+                ahead = 'states stamped over 1 s ahead of the poses sent after them'
+                self.anomalies[f'{ahead}: set the clocks'] += 1
             self._state_ahead = None
         self.pose_s = time.monotonic()
         self._process(message, sent_ns)
@@ -235,25 +243,22 @@ class AtomizerInput:
 
     def _place(self) -> None:
         """Put the poses whose transforms are known into the next batch."""
-        for pose, placed in placed_in_order(self.tf_queue, self._frame.on_part, time.monotonic()):
-            if isinstance(placed, NoTransform):
-                self._reject(pose, placed)
-            else:
-                self.anomalies['poses without a frame'] += not pose.header.frame_id
+        frame = self._node.frame
+        for pose, placed in placed_in_order(self.tf_queue, frame.on_part, time.monotonic()):
+            frame_id = pose.header.frame_id
+            if not isinstance(placed, NoTransform):
+                self.anomalies['poses without a frame'] += not frame_id
                 self._poses.append((stamp_ns(pose.header), *placed))
-
-    def _reject(self, message: PoseStamped, missing: NoTransform) -> None:
-        frame_id = message.header.frame_id
-        if frame_id not in self.refused_frames and len(self.refused_frames) >= MOST_NAMES:
-            frame_id = OTHERS
-        self.refusal = str(missing)
-        self.refused_s = time.monotonic()
-        if frame_id not in self.refused_frames:
-            self._node.get_logger().error(
-                f"{self._pose_topic}: poses in frame '{frame_id}' are refused: the mesh is in "
-                f"frame '{self._frame.frame_id}' and {missing}"
-            )
-        self.refused_frames[frame_id] += 1
+                continue
+            if frame_id not in self.refused_frames and len(self.refused_frames) >= MOST_NAMES:
+                frame_id = 'others'
+            self.refusal, self.refused_s = str(placed), time.monotonic()
+            if frame_id not in self.refused_frames:
+                self._node.get_logger().error(
+                    f"{self._pose_topic}: poses in frame '{frame_id}' are refused: the mesh is in "
+                    f"frame '{frame.frame_id}' and {placed}"
+                )
+            self.refused_frames[frame_id] += 1
 
     # --- states
 
@@ -264,10 +269,10 @@ class AtomizerInput:
             self._state_ahead = state_ns, sent_ns
         self._process(message, sent_ns)
 
-    def _process_state(self, message: AtomizerState) -> None:
+    def _switch(self, message: AtomizerState) -> None:
         try:
             change = trigger_change(message)
-            self._on_state(change)
+            self._node.film.guns[self._number].add_trigger(change)
         except PaintError as error:
             if str(error) not in self.state_errors and len(self.state_errors) < MOST_NAMES:
                 self._node.get_logger().error(f'{self._state_topic} refused: {error}')
@@ -275,9 +280,10 @@ class AtomizerInput:
             self.anomalies[STATES_REFUSED] += 1
             return
         if message.spraying and change.flow == 0.0:
-            if not self.anomalies[NO_FLOW]:
+            without_flow = 'states that spray with flow 0'
+            if not self.anomalies[without_flow]:
                 self._node.get_logger().warning(f'{self._state_topic} {SPRAYS_NOTHING}')
-            self.anomalies[NO_FLOW] += 1
+            self.anomalies[without_flow] += 1
         self.spraying = change.flow > 0.0
         self.programmed_m_per_s = message.programmed_speed_m_per_s
 

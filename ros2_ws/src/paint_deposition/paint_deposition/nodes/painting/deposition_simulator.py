@@ -9,7 +9,6 @@ from typing import Any
 from paint_msgs.srv import SaveFilm
 from rclpy.callback_groups import ReentrantCallbackGroup
 
-from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.nodes.painting.film_display import (
     FilmDisplay,
     shares,
@@ -20,16 +19,15 @@ from paint_deposition.nodes.painting.health import FilmTrust, painting_tasks
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.painting.painting_parameters import PAINTING
 from paint_deposition.nodes.painting.part_change import PartChange, mesh_version
-from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
+from paint_deposition.nodes.runtime.node import Task
 from paint_deposition.nodes.runtime.parameters import (
+    CONFIGURED,
     NodeParameter,
     display_parameters,
-    fixed_while_configured,
+    fixed,
     require_display,
     require_file_name,
 )
-from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
 from paint_deposition.report.writers.write import write_film
 
 
@@ -44,6 +42,7 @@ class DepositionSimulator(PaintingNode):
         parts: the part in the cell, and its change.
     """
 
+    NAME = 'deposition_simulator'
     PARAMETERS = PAINTING | {
         'publish_rate_hz': NodeParameter(
             5.0,
@@ -52,8 +51,9 @@ class DepositionSimulator(PaintingNode):
             (0.1, 30.0),
         ),
         **display_parameters(),
-        **fixed_while_configured(
+        **fixed(
             'its zones are found on the mesh once; clean the node up or restart it',
+            CONFIGURED,
             zones_file=NodeParameter(
                 '', 'Zones of the part with targets of their own, YAML; empty: none [path]'
             ),
@@ -65,10 +65,7 @@ class DepositionSimulator(PaintingNode):
         ),
     }
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('deposition_simulator', **kwargs)
-
-    def _configure(self) -> None:
+    def _configure(self) -> Mapping[str, Task]:
         super()._configure()
         # In a group of their own, so that poses do not wait for the disk.
         saving = ReentrantCallbackGroup()
@@ -78,35 +75,19 @@ class DepositionSimulator(PaintingNode):
         self.parts = PartChange(self, self._mesh_version, self._saving, saving)
         self.publish()
         self.trust = FilmTrust(self)
+        return painting_tasks(self, self.display.diagnostic_values) | {'part': self.parts.status}
 
     def _cleanup(self) -> None:
         super()._cleanup()
         self.parts.close()
         self._saving.shutdown()
 
-    def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        return painting_tasks(self, self.display.diagnostic_values) | {'part': self._part_status}
+    def _load_files(self) -> None:
+        self._mesh_version = mesh_version(self.values['mesh_file'])
+        super()._load_files()
 
-    def _part_status(self) -> Status:
-        """The status of the part, and whether any of the paint lands on it."""
-        status, film = self.parts.status(), self.film.snapshot()
-        # Less paint may fly past before the part.
-        if status.level != OK or film.emitted_cm3 < 5.0 or film.raw_um.max() > NO_PAINT_UM:
-            return status
-        beside = (
-            f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
-            'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
-        )
-        return Status(WARN, beside, status.values)
-
-    def _read_part(self) -> None:
-        self._mesh_version = mesh_version(self.mesh_file)
-
-    def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
-        return surface, surface.points()
-
-    def _validate(self, values: Mapping[str, Any]) -> None:
-        super()._validate(values)
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        super()._validate(values, changed)
         require_display(values)
 
     def reset(self) -> tuple[bool, str]:

@@ -24,22 +24,17 @@ from paint_deposition.film.common_film import CommonFilm
 from paint_deposition.film.statistics import FilmStatistics, film_statistics
 from paint_deposition.nodes.painting.painting_node import PaintingNode
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import ColouredMesh, header, white_marker
-from paint_deposition.nodes.runtime.topics import gun_topic
+from paint_deposition.nodes.runtime.topics import ColouredMesh, gun_topic, header, white_marker
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
 
-# The share of a core that building and publishing a large message may take.
-MAX_CORE_SHARE = 0.2
 # A subscriber that acknowledges nothing for so long does not delay the others.
 ACKNOWLEDGE_TIMEOUT_S = 5.0
-CLOUD_FIELDS = ('x', 'y', 'z', 'thickness_um')
 STATS_FIELDS = (
     'mean_um', 'std_dev_um', 'min_um', 'max_um', 'coverage', 'within_target',
     'painted_volume_cm3', 'capture_fraction',
 )  # fmt: skip
-BAR_STEPS = 64
 
 
 def statistics_of(
@@ -68,17 +63,17 @@ def shares(laid_cm3: Mapping[str, float]) -> dict[str, float]:
 def cloud_message(surface: Surface, film_um: np.ndarray, at: Header) -> PointCloud2:
     """A cloud of all vertices, x, y, z [m], with their film (V,) as thickness_um."""
     points = np.column_stack([surface.vertices_m, film_um]).astype(np.float32)
-    kind = PointField.FLOAT32
+    names, kind = ('x', 'y', 'z', 'thickness_um'), PointField.FLOAT32
     return PointCloud2(
         header=at,
         height=1,
         width=len(points),
         fields=[
             PointField(name=name, offset=4 * k, datatype=kind, count=1)
-            for k, name in enumerate(CLOUD_FIELDS)
+            for k, name in enumerate(names)
         ],
         is_bigendian=sys.byteorder == 'big',
-        point_step=4 * len(CLOUD_FIELDS),
+        point_step=4 * len(names),
         row_step=points.nbytes,
         data=array('B', points.tobytes()),
         is_dense=True,
@@ -96,7 +91,7 @@ class LargeTopic:
 
     The next message waits until all reliable subscribers have acknowledged the last one, so that
     a slow link gets fewer messages instead of a queue. It also waits as long as needed to keep
-    the work within ``MAX_CORE_SHARE`` of a core.
+    the work within a fifth of a core.
     """
 
     def __init__(self, node: Node, message: type, topic: str, profile: QoSProfile) -> None:
@@ -121,7 +116,7 @@ class LargeTopic:
             return
         self._publisher.publish(make())
         self._sent, self._sent_s = wanted, time.monotonic()
-        self._next_allowed_s = began_s + (self._sent_s - began_s) / MAX_CORE_SHARE
+        self._next_allowed_s = began_s + 5.0 * (self._sent_s - began_s)
 
     def _count_subscribers(self, event: Any) -> None:
         self._subscribers = event.current_count
@@ -175,7 +170,17 @@ class FilmDisplay:
         self._publish_large(film, at)
         if changed:
             self._publish_duration_s = time.monotonic() - began_s
-        self._publish_stats()
+        # The statistics are published when a count has changed, too.
+        node, message = self._node, self._stats
+        refused = sum(source.poses_refused for source in node.inputs)
+        counts = node.film.counts
+        longest_s = max(source.intervals.longest_ns for source in node.inputs) * 1e-9
+        now = counts.received + refused, counts.rejected + refused, counts.gaps, longest_s
+        if now != self._counts:
+            self._counts = now
+            message.poses_received, message.poses_rejected, message.pose_gaps = now[:3]
+            message.longest_gap_s = longest_s
+            self._figures.publish(message)
 
     def _update_stats(self, film: CommonFilm, run: str, at: Header) -> None:
         node, values = self._node, self._node.values
@@ -218,20 +223,6 @@ class FilmDisplay:
         rows = self._scale.rows(self._film_um, is_painted)
         return self._mesh.serialise(self._node.film.newest_ns or 0, self._scale.palette, rows)
 
-    def _publish_stats(self) -> None:
-        """Publish the statistics if the film or a count has changed."""
-        node, message = self._node, self._stats
-        refused = sum(source.poses_refused for source in node.inputs)
-        counts = node.film.counts
-        longest_s = max(source.intervals.longest_ns for source in node.inputs) * 1e-9
-        now = counts.received + refused, counts.rejected + refused, counts.gaps, longest_s
-        if now == self._counts:
-            return
-        self._counts = now
-        message.poses_received, message.poses_rejected, message.pose_gaps = now[:3]
-        message.longest_gap_s = longest_s
-        self._figures.publish(message)
-
 
 def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> MarkerArray:
     """A bar in the scale's colours with values beside it, upright at the side of the part."""
@@ -244,11 +235,11 @@ def legend(scale: ColourScale, unit: str, surface: Surface, frame_id: str) -> Ma
         + (widths.max() + 0.08 * size - widths.mean()) * across
         + (heights.min() - heights.mean()) * up
     )
-    bar = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id)
-    for step in range(BAR_STEPS):
-        r, g, b, a = (scale.palette[step * TABLE // BAR_STEPS] / 255.0).tolist()
+    bar, steps = white_marker(Marker.TRIANGLE_LIST, 'legend', 0, frame_id), 64
+    for step in range(steps):
+        r, g, b, a = (scale.palette[step * TABLE // steps] / 255.0).tolist()
         for right, over in ((0, 0), (1, 0), (1, 1), (0, 0), (1, 1), (0, 1)):
-            place = corner + 0.04 * size * right * across + size * (step + over) / BAR_STEPS * up
+            place = corner + 0.04 * size * right * across + size * (step + over) / steps * up
             bar.points.append(_point(place))
             bar.colors.append(ColorRGBA(r=r, g=g, b=b, a=a))
     markers = [bar]

@@ -14,14 +14,14 @@ from paint_deposition.files.recordings.headers import pose_of, stamp_ns, transfo
 from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC, Rigid, is_frame
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import PaintNode
-from paint_deposition.nodes.runtime.topics import AdaptiveSubscription
+from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, header
 
 # Transforms, static ones at the start included, may arrive later than the poses. One that is still
 # missing after so long is not waited for any longer.
 TF_TIMEOUT_S = 1e-9 * LONGEST_GAP_NS
-MAX_WAITING = 5000
+# Position (3,) [m] and quaternion (4,).
+Place = tuple[np.ndarray, np.ndarray]
 
 
 class PartFrame:
@@ -85,8 +85,8 @@ class PartFrame:
         """The same as another node has published it."""
         self._tree.place(self.frame_id, parent_frame, part_pose)
 
-    def on_part(self, message: PoseStamped) -> tuple[np.ndarray, np.ndarray]:
-        """Position (3,) [m] and quaternion (4,) of a pose, in the frame of the part.
+    def on_part(self, message: PoseStamped) -> Place:
+        """A pose in the frame of the part.
 
         Raises:
             NoTransform: there is none from its frame, or none yet.
@@ -108,7 +108,6 @@ class PartFrame:
 
 # Poses that wait, in order, for their transform, and since when [monotonic s].
 TfQueue = deque[tuple[float, PoseStamped]]
-Place = tuple[np.ndarray, np.ndarray]
 
 
 def placed_in_order(
@@ -117,7 +116,7 @@ def placed_in_order(
     """Take poses from a queue, the oldest first, until one has to wait for its transform.
 
     As in tf2's MessageFilter, it delays all behind it. It is given up if the transform cannot come
-    any more, after `TF_TIMEOUT_S`, or if more than `MAX_WAITING` poses wait.
+    any more, after `TF_TIMEOUT_S`, or if more than 5000 poses wait.
 
     Yields:
         Each pose, and its place or why it has none.
@@ -128,7 +127,7 @@ def placed_in_order(
         try:
             placed = place(pose)
         except NoTransform as missing:
-            in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= MAX_WAITING
+            in_time = now_s - since_s < TF_TIMEOUT_S and len(waiting) <= 5000
             if missing.may_come and in_time:
                 return
             placed = missing

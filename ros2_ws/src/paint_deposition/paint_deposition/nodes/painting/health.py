@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable, Mapping
 from functools import partial
 
+import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from paint_msgs.msg import PoseProgress
 
@@ -137,7 +138,10 @@ def _state_of_another_type(node: PaintingNode, gun: str) -> str:
 
 def film_status(node: PaintingNode, more_values: Mapping[str, object]) -> Status:
     """The status of part, model and computing time."""
-    guns, factor = node.film.guns, node.real_time_factor
+    guns = node.film.guns
+    # Computing time over duration of the motion; above 1 the node falls behind.
+    sums = [np.sum(source.times_s, axis=0) for source in node.inputs if source.times_s]
+    factor = float(sum(spent_s / duration_s for spent_s, duration_s in sums))
     files = node.values['model_files'] or [node.values['model_file'] or 'default']
     effects = dict.fromkeys(effect.id for gun in guns for effect in gun.model.effects)
     values = {
@@ -189,7 +193,17 @@ class FilmTrust:
         for source, film in zip(node.inputs, node.film.guns, strict=True):
             wrong = what_was_wrong(source, film) | {UNPAINTED: source.unpainted}
             found = [f'{n} {words}' for words, n in wrong.items() if n and words in DOUBTFUL]
-            found += sprays_without_poses(source) + self._behind(source)
+            found += sprays_without_poses(source)
+            topic = node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
+            present = {node_name(info) for info in node.get_publishers_info_by_topic(topic)}
+            for (gun, name), (newest_ns, heard_s) in tuple(self._reports.items()):
+                behind_s = 1e-9 * (source.newest_ns - newest_ns)
+                if gun == source.name and name not in present:  # it has ended
+                    del self._reports[gun, name]
+                elif gun == source.name and time.monotonic() - heard_s > 3.0:
+                    found.append(f'{name} has stalled')
+                elif gun == source.name and behind_s > 2.0:
+                    found.append(f'{name} is {behind_s:.0f} s behind')
             doubts += [f'{source.name}: {doubt}' if source.name else doubt for doubt in found]
         if node.model_problem:
             doubts.append(node.model_problem)
@@ -200,22 +214,6 @@ class FilmTrust:
                 hardware_id=node.get_fully_qualified_name(),
             )
         )  # fmt: skip
-
-    def _behind(self, source: AtomizerInput) -> list[str]:
-        """Who is behind with the poses of a gun."""
-        topic = self._node.resolve_topic_name(gun_topic(source.name, PROGRESS_TOPIC))
-        present = {node_name(info) for info in self._node.get_publishers_info_by_topic(topic)}
-        doubts = []
-        for (gun, name), (newest_ns, heard_s) in tuple(self._reports.items()):
-            if gun != source.name:
-                continue
-            if name not in present:  # it has ended
-                del self._reports[gun, name]
-            elif time.monotonic() - heard_s > 3.0:
-                doubts.append(f'{name} has stalled')
-            elif source.newest_ns - newest_ns > 2_000_000_000:
-                doubts.append(f'{name} is {1e-9 * (source.newest_ns - newest_ns):.0f} s behind')
-        return doubts
 
     def _take_report(self, gun: str, report: PoseProgress) -> None:
         key = gun, report.reporter[:LONGEST_NAME]

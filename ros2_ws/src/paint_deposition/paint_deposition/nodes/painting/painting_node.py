@@ -1,11 +1,10 @@
 """The base class of the nodes that paint: the part, the incoming motion, the models."""
 
-import time
+import threading
 from abc import ABC, abstractmethod
-from collections import deque
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from concurrent.futures import Future
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,7 +16,6 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.zones_file import read_zones
 from paint_deposition.film.common_film import CommonFilm, LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
 from paint_deposition.motion.trajectory import BEFORE_ALL_NS
 from paint_deposition.nodes.painting.atomizer_input import AtomizerInput
 from paint_deposition.nodes.painting.frames import PartFrame
@@ -26,14 +24,76 @@ from paint_deposition.nodes.painting.painting_parameters import (
     models_from_parameters,
     read_part,
 )
-from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
-from paint_deposition.nodes.runtime.topics import gun_topic
-from paint_deposition.part.facing import facing
+from paint_deposition.nodes.runtime.node import Task
+from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.surface import Surface
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
+
+
+class Repainting:
+    """Compiles models in a thread, and repaints the motion so far with them.
+
+    Args:
+        current: the films to replace, one for each gun; painting goes on in them meanwhile.
+        make: creates the new, unpainted films; called in the thread.
+        from_start: whether to repaint the motion so far.
+
+    Attributes:
+        prepared: the films, or an error, once the thread has ended.
+        aborted: set it to stop as soon as possible, but after a compilation under way.
+    """
+
+    def __init__(
+        self, current: LiveFilms, make: Callable[[], LiveFilms], from_start: bool
+    ) -> None:
+        self._logs = [gun.log for gun in current.guns]
+        self._make, self._from_start = make, from_start
+        self.aborted = threading.Event()
+        self.prepared: Future[LiveFilms] = Future()
+        threading.Thread(target=self._run, name='repainting', daemon=True).start()
+
+    def _run(self) -> None:
+        try:
+            films = self._make()
+            films.warm_up()
+            repainted = zip(films.guns, self._logs, strict=True) if self._from_start else ()
+            for film, log in repainted:
+                # The rest is for the thread of the executor, which must not be blocked.
+                while log.poses - film.log.poses > 250 and log.complete:
+                    for event in log.events(film.log.poses, film.log.changes):
+                        if self.aborted.is_set():
+                            return
+                        film.replay([event])
+            self.prepared.set_result(films)
+        except BaseException as error:  # raised again by `result`
+            self.prepared.set_exception(error)
+
+    def result(self, current: LiveFilms) -> LiveFilms | None:
+        """The films to continue with, up to date; call it once they are ``prepared``.
+
+        Returns:
+            The new films, or ``current`` with the new models if the motion so far is not
+            repainted. None if the motion was restarted meanwhile: repaint again.
+
+        Raises:
+            Exception: whatever was raised in the thread.
+        """
+        films = self.prepared.result()
+        if not self._from_start or not all(log.complete for log in self._logs):
+            for gun, prepared in zip(current.guns, films.guns, strict=True):
+                gun.switch_model(prepared.model)
+            return current
+        if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
+            return None
+        for film, gun in zip(films.guns, current.guns, strict=True):
+            if gun.log.poses or gun.log.changes:
+                film.replay(gun.log.events(film.log.poses, film.log.changes))
+            else:  # after a reset the gun stays on or off
+                film.reset_keeping_trigger_of(gun)
+        return films
 
 
 class PaintingNode(ManagedNode, ABC):
@@ -58,20 +118,15 @@ class PaintingNode(ManagedNode, ABC):
     model_problem = ''
     _shown: CommonFilm | None = None
 
-    def _configure(self) -> None:
-        self.inputs = [
-            AtomizerInput(
-                self, name, self.frame, partial(self._add_poses, number),
-                partial(self._add_trigger, number),
-            )
-            for number, name in enumerate(self.gun_names)
-        ]  # fmt: skip
+    def _configure(self) -> Mapping[str, Task]:
+        self.inputs = [AtomizerInput(self, number) for number in range(len(self.gun_names))]
         if self.autostarting:  # messages received before the node is active are painted
             self.hold()
         self._shown = None
         self.create_trigger_service('~/reset', self.reset)
         self.create_steady_timer(0.1, self._update)
         self.show_timer = self._new_show_timer()
+        return {}
 
     def _activate(self) -> None:
         self.release()
@@ -86,31 +141,24 @@ class PaintingNode(ManagedNode, ABC):
     def _load_files(self) -> None:
         self.gun_names: list[str] = self.values['atomizers'] or ['']
         self.mesh_file: str = self.values['mesh_file']
-        # (computing time, duration of the motion) of the last batches of each gun.
-        self._times_s: list[deque[tuple[float, float]]] = [
-            deque(maxlen=100) for _ in self.gun_names
-        ]
         self.model_problem = ''
         self._noted: set[str] = set()
         self.frame = PartFrame(self, self.values['frame_id'])
-        self._set_part_pose()
+        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
         self.models = models_from_parameters(self.values)
-        self._read_part()
         self.get_logger().info('getting ready; a new model is compiled first')
         self._take_part(self.prepare(self.mesh_file))
 
     # --- for the subclass
 
-    @abstractmethod
     def _points_on(self, surface: Surface) -> tuple[Surface, SurfacePoints]:
-        """The points of the part to paint, and its surface with the side outward that they need.
+        """The points of the part to paint, by default its vertices, and its surface with the side
+        outward that they need.
 
         Raises:
             PaintError: they are not on the surface.
         """
-
-    def _read_part(self) -> None:
-        """Read what ``_points_on`` needs; called before the mesh is read."""
+        return surface, surface.points()
 
     def prepare(self, mesh_file: str) -> PreparedPart:
         """The part of a mesh, ready to be painted; a large one takes a second, in any thread.
@@ -140,7 +188,7 @@ class PaintingNode(ManagedNode, ABC):
         """Paint this part from now on."""
         self.surface, self.points, self.zones = part.surface, part.points, part.zones
         self.film, self._shown = part.film, None
-        self._outward_side = OutwardSide(len(self.gun_names))
+        self._guns_to_orient = list(range(len(self.gun_names)))
         self._surface_changed()
 
     def _surface_changed(self) -> None:
@@ -155,36 +203,6 @@ class PaintingNode(ManagedNode, ABC):
         """Publish the film, if it has changed."""
 
     # --- motion
-
-    def _add_poses(self, gun: int, batch: PoseBatch) -> None:
-        """Paint poses of a gun, given by its number, if the node is active."""
-        if not self.active:
-            source = self.inputs[gun]
-            if not source.unpainted:
-                topic = gun_topic(source.name, 'atomizer/pose')
-                self.get_logger().warning(
-                    f'{topic}: poses arrive and are not painted: the node is inactive'
-                )
-            source.unpainted += len(batch)
-            return
-        began_s = time.monotonic()
-        self.film.guns[gun].add_poses(batch)
-        spent_s = time.monotonic() - began_s
-        steps_ns = np.diff(batch.stamps_ns)
-        steps_ns = steps_ns[steps_ns > 0]
-        if len(steps_ns):
-            # N poses stand for N intervals: one of them lies before the batch.
-            duration_s = float(np.median(steps_ns)) * len(batch) * 1e-9
-            self._times_s[gun].append((spent_s, duration_s))
-
-    def _add_trigger(self, gun: int, change: TriggerChange) -> None:
-        self.film.guns[gun].add_trigger(change)
-
-    @property
-    def real_time_factor(self) -> float:
-        """Computing time over duration of the motion; above 1 the node falls behind."""
-        sums = [np.sum(times_s, axis=0) for times_s in self._times_s if times_s]
-        return float(sum(spent_s / duration_s for spent_s, duration_s in sums))
 
     def hold(self, after_ns: int = BEFORE_ALL_NS) -> None:
         """Keep poses and states that are sent later unprocessed until `release`."""
@@ -235,18 +253,16 @@ class PaintingNode(ManagedNode, ABC):
 
     # --- the part and the model
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if values['part_pose'] and not values['part_parent_frame']:
             raise PaintError('part_pose is given without part_parent_frame: name its frame')
-
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        if names & MODEL_PARAMETERS:
+        if changed & MODEL_PARAMETERS:
             # Effect files are tested in the thread that repaints, so that poses do not wait.
             self._next_models = models_from_parameters(values, read_effect_file)
 
     def _on_change(self, names: set[str]) -> None:
         if names & {'part_pose', 'part_parent_frame'}:
-            self._set_part_pose()
+            self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
         if 'trigger_latency_s' in names:
             for gun in self.film.guns:
                 gun.trigger_latency_s = self.values['trigger_latency_s']
@@ -260,9 +276,6 @@ class PaintingNode(ManagedNode, ABC):
 
     def _new_show_timer(self) -> Timer:
         return self.create_steady_timer(1.0 / self.values['publish_rate_hz'], self.publish)
-
-    def _set_part_pose(self) -> None:
-        self.frame.set_part_pose(self.values['part_parent_frame'], self.values['part_pose'])
 
     def _repaint(self, from_start: bool = True) -> None:
         """Start to repaint with the current models and parameters, in a thread."""
@@ -279,20 +292,20 @@ class PaintingNode(ManagedNode, ABC):
 
     def _abort_repainting(self) -> None:
         if self.repainting is not None:
-            self.repainting.abort()
+            self.repainting.aborted.set()
             self.repainting = None
 
     def _update(self) -> None:
         """Adopt a repainted film, and turn the part inside out if the guns point at its back."""
-        if self.repainting is not None and self.repainting.done:
-            self._adopt_repainted(self.repainting)
-        oriented = self._outward_side.orient(self.surface, self.film.guns)
+        if self.repainting is not None and self.repainting.prepared.done():
+            self._adopt(self.repainting)
+        oriented = self._toward_the_guns()
         if oriented is self.surface:
             return
         try:
             self.surface, self.points = self._points_on(oriented)
         except PaintError as error:  # readings that were taken on its other side, say
-            self._outward_side = OutwardSide(0)
+            self._guns_to_orient = []
             self.model_problem = f'the gun paints the other side of the part: {error}'
             self.get_logger().error(self.model_problem)
             return
@@ -306,7 +319,31 @@ class PaintingNode(ManagedNode, ABC):
         if self.repainting is not None:
             self._repaint()
 
-    def _adopt_repainted(self, repainting: Repainting) -> None:
+    def _toward_the_guns(self) -> Surface:
+        """The surface with its outward side toward the first gun that points at the part.
+
+        An earlier gun may still overrule a later one, as long as its own poses have not decided:
+        the side does not depend on whose poses arrive first.
+        """
+        most = 2000
+        for number in tuple(self._guns_to_orient):
+            poses = self.film.guns[number].log.first_poses(most)
+            if poses is None:
+                continue
+            positions, axes = poses.finite_axes()
+            front, back, _ = facing(self.surface, positions, axes)
+            pointing = front + back
+            # So many that point at the part, or so many in all, have decided.
+            decided = pointing >= 50 or len(poses) >= most
+            if decided:
+                self._guns_to_orient.remove(number)
+            if pointing:
+                if decided:
+                    self._guns_to_orient = [g for g in self._guns_to_orient if g < number]
+                return toward_the_gun(self.surface, positions, axes)
+        return self.surface
+
+    def _adopt(self, repainting: Repainting) -> None:
         self.repainting = None
         self.model_problem = ''
         try:

@@ -18,10 +18,11 @@ from paint_deposition.motion.part_frame import POSE_FORMAT, is_pose
 from paint_deposition.motion.pose_stream import DEFAULT_POSE_MEMORY
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
+    CONFIGURED,
     NodeParameter,
     atomizers_parameter,
     direction_parameter,
-    fixed_while_configured,
+    fixed,
     mesh_parameters,
 )
 from paint_deposition.part.points import SurfacePoints
@@ -49,9 +50,10 @@ def model_parameters(use: str) -> dict[str, NodeParameter]:
 
 PAINTING = dict(
     **MANAGED,
-    **fixed_while_configured(
+    **fixed(
         'the film so far lies on this mesh, in this frame; clean the node up or restart it for '
         'another part',
+        CONFIGURED,
         **mesh_parameters(max_edge_length_m=0.01),
         down=direction_parameter(
             'Direction of gravity in the frame of the mesh, any length; empty: -z for a part that '
@@ -74,8 +76,9 @@ PAINTING = dict(
         'own stamp [s]',
         (0.0, 10.0),
     ),
-    **fixed_while_configured(
+    **fixed(
         'the subscriptions and the pose memory are made with it; clean the node up or restart it',
+        CONFIGURED,
         max_pose_gap_s=NodeParameter(
             0.25, 'A longer interval between pose stamps is gun off [s]', (0.001, 60.0)
         ),

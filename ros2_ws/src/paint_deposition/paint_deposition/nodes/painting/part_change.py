@@ -18,17 +18,16 @@ from rclpy.duration import Duration
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError
+from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
+from paint_deposition.nodes.runtime.topics import header
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
 
-# A change that takes longer delays the first poses on the part, and is reported.
-LATE_S = 0.05
 # Path, modification time [ns] and size of a mesh file; None where there is no such file.
 Version = tuple[str, int | None, int | None]
 
@@ -79,7 +78,9 @@ class PartChange:
         # Films of former parts that are not on disk yet, four at most, and why.
         self._unsaved: list[Callable[[], list[Path]]] = []
         self._save_error = ''
-        node.create_steady_timer(10.0, self._save_again)
+        node.create_steady_timer(
+            10.0, lambda: self._save_error and self._saving.submit(self._save_films)
+        )
         self._publisher = node.create_publisher(Part, topics.PART_TOPIC, topics.LATCHED)
         node.create_service(ChangePart, '~/change_part', self._answer, callback_group=group)
 
@@ -93,8 +94,8 @@ class PartChange:
             raise PaintError(self._save_error)
 
     def status(self) -> Status:
-        """The status of the part and of its last change."""
-        part = self.part
+        """The status of the part and of its last change, and whether paint lands on it."""
+        part, film = self.part, self._node.film.snapshot()
         ready = [v[0] for v, kept in self._parts.items() if v != self._version and kept.done()]
         values = {
             'type': part.type or 'unknown',
@@ -107,9 +108,17 @@ class PartChange:
         }
         if self._save_error:
             return Status(ERROR, self._save_error, values)
-        if self._gap_s > LATE_S:
+        # A change that takes longer delays the first poses on the part.
+        if self._gap_s > 0.05:
             late = f'the first poses of {part.run} waited {self._gap_s:.2f} s for its mesh'
             return Status(WARN, f'{late}: prepare it before the part comes', values)
+        # Less paint may fly past before the part.
+        if film.emitted_cm3 >= 5.0 and film.raw_um.max() <= NO_PAINT_UM:
+            beside = (
+                f'{film.emitted_cm3:.0f} cm3 were sprayed and nothing lands on the part: check '
+                'part_pose, mesh_scale and the TCP, whose z axis points at the surface'
+            )
+            return Status(WARN, beside, values)
         return Status(OK, part.run or 'the part has no serial number', values)
 
     # --- the change
@@ -118,20 +127,20 @@ class PartChange:
         self, request: ChangePart.Request, response: ChangePart.Response
     ) -> ChangePart.Response:
         try:
-            wrong = await (self._prefetch if request.prepare else self._change)(request, response)
-            response.success = not wrong
+            if not request.prepare:
+                response.success = not await self._change(request, response)
+            elif request.mesh_file:
+                mesh_file = os.path.expanduser(request.mesh_file)
+                part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
+                response.message = f'{mesh_file} is prepared: {part.surface!r}'
+                response.success = True
+            else:
+                raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
         except (PaintError, MemoryError) as error:
             response.message = str(error) or 'not enough memory'
         except OSError as error:
             response.message = f'{error.filename}: {error.strerror}'
         return response
-
-    async def _prefetch(self, request: ChangePart.Request, response: ChangePart.Response) -> None:
-        if not request.mesh_file:
-            raise PaintError('prepare needs a mesh_file: name the mesh to read ahead of time')
-        mesh_file = os.path.expanduser(request.mesh_file)
-        part = await self._node.result_of(self._prepared(mesh_version(mesh_file)))
-        response.message = f'{mesh_file} is prepared: {part.surface!r}'
 
     async def _change(self, request: ChangePart.Request, response: ChangePart.Response) -> str:
         """Change the part; what of it failed after the part had changed, if anything."""
@@ -143,14 +152,21 @@ class PartChange:
         following = self._requested(request)
         # Poses that are still in the queues belong to the previous part.
         node.catch_up()
-        began_s, following.last_sent_ns = time.monotonic(), self._last_sent_ns
+        began_s = time.monotonic()
+        following.last_sent_ns = max(source.sent_ns for source in node.inputs)
         guns = [source.name or 'the gun' for source in node.inputs if source.spraying]
         notes = [f'{gun} sprays while the part is changed' for gun in guns]
         self.waiting = True
         try:
             notes += await self._receive_all(following.last_sent_ns)
             await self._begin(following, request)
-            unplaced = self._place(request.part_pose)
+            # After the part: a recorder then knows whose pose it is.
+            unplaced = ''
+            if len(request.part_pose):
+                kind, values = Parameter.Type.DOUBLE_ARRAY, list(request.part_pose)
+                placed = node.set_parameters_atomically([Parameter('part_pose', kind, values)])
+                if not placed.successful:
+                    unplaced = f'it stands where the part before did: {placed.reason}'
         finally:
             self.waiting = False
             node.release()
@@ -185,20 +201,6 @@ class PartChange:
         self.part, self._since = following, datetime.now(timezone.utc)
         self._run, self._resets = following.run, 0
         self._publish(since_ns, request.part_pose)
-
-    def _place(self, part_pose: Sequence[float]) -> str:
-        """Say where the part stands, after the part: a recorder then knows whose pose it is.
-
-        Returns:
-            Why it stands where the part before did, if it does.
-        """
-        if not len(part_pose):
-            return ''
-        pose = Parameter('part_pose', Parameter.Type.DOUBLE_ARRAY, list(part_pose))
-        placed = self._node.set_parameters_atomically([pose])
-        return '' if placed.successful else (
-            f'it stands where the part before did: {placed.reason}'
-        )  # fmt: skip
 
     async def _receive_all(self, last_sent_ns: int) -> list[str]:
         """Paint what was sent until then, and keep what was sent later.
@@ -274,18 +276,13 @@ class PartChange:
         self._resets += 1
         if self._run:
             self.part.run = f'{self._run}_reset_{self._resets}'
-        self.part.last_sent_ns = self._last_sent_ns
+        self.part.last_sent_ns = max(source.sent_ns for source in self._node.inputs)
         self._is_heard(within_s=1.0)
         self._publish(self._newest_ns(), ())
 
     def _is_heard(self, within_s: float = 0.0) -> bool:
         """Whether all subscribers have the newest message of the part."""
         return self._publisher.wait_for_all_acked(Duration(seconds=within_s))
-
-    @property
-    def _last_sent_ns(self) -> int:
-        """When the newest pose of any gun was sent, 0 before the first."""
-        return max(source.sent_ns for source in self._node.inputs)
 
     def _newest_ns(self) -> int:
         """Stamp of the newest pose of the part in the cell; without any the time now."""
@@ -336,10 +333,6 @@ class PartChange:
             self._save_error = f'{films}: {str(error) or "not enough memory"}'
             self._node.get_logger().error(self._save_error)
         return paths
-
-    def _save_again(self) -> None:
-        if self._save_error:
-            self._saving.submit(self._save_films)
 
     def _publish(self, since_ns: int, part_pose: Sequence[float]) -> None:
         part, node = self.part, self._node

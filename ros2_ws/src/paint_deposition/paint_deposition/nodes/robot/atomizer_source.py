@@ -19,16 +19,17 @@ from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S, Signa
 from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_pose
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.nodes.robot.robot_poses import (
-    QUEUE_DEPTH,
-    SILENT_S,
-    JointPoses,
-    TfPoses,
-)
-from paint_deposition.nodes.runtime.messages import header, message_class, pose_message
+from paint_deposition.nodes.robot.robot_poses import QUEUE_DEPTH, SILENT_S, JointPoses, TfPoses
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH, AdaptiveSubscription
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed, requested
+from paint_deposition.nodes.runtime.topics import (
+    POSE_DEPTH,
+    AdaptiveSubscription,
+    header,
+    message_class,
+    pose_message,
+)
+from paint_deposition.request import MotionOptions
 
 # Late subscribers need the current state, slow ones every change.
 LATCHED_STATES = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
@@ -39,8 +40,6 @@ USABLE: dict[str, tuple[Callable[[float], bool], str]] = {
     'trigger': (math.isfinite, 'a number or Bool'),
     'brush': (lambda value: value.is_integer() and 0 <= value <= MOST, f'0 to {MOST}'),
 }
-# (topic, message, message info of the middleware)
-TakeMessage = Callable[[str, Any, Mapping[str, Any]], None]
 SIGNAL = 'a topic, or a field of its messages, as /io.states[3] or /io.level > 12'
 
 
@@ -52,7 +51,8 @@ class AtomizerSource(PaintNode):
     message, or at the time it was sent if there is none.
     """
 
-    PARAMETERS = fixed_while_running(
+    NAME = 'atomizer_source'
+    PARAMETERS = fixed(
         'the subscriptions are made with it when the node starts; restart the node',
         urdf_file=NodeParameter(
             '',
@@ -66,11 +66,7 @@ class AtomizerSource(PaintNode):
             '', 'Link or frame of the poses; empty: the root of urdf_file [name]'
         ),
         joint_topic=NodeParameter('joint_states', "The robot's sensor_msgs/JointState [topic]"),
-        joint_prefix=NodeParameter(
-            '',
-            "What the joints' names have before those of urdf_file, or lack; empty: nothing "
-            '[name]',
-        ),
+        joint_prefix=requested(MotionOptions, 'joint_prefix', ''),
         angle_unit=NodeParameter(
             '',
             'Unit of joints that turn; empty: rad, unless they turn too far [name]',
@@ -106,7 +102,7 @@ class AtomizerSource(PaintNode):
     )
 
     def __init__(self, **kwargs: Any):
-        super().__init__('atomizer_source', **kwargs)
+        super().__init__(**kwargs)
         self._state_publisher = self.create_publisher(
             AtomizerState, 'atomizer/state', LATCHED_STATES
         )
@@ -119,13 +115,26 @@ class AtomizerSource(PaintNode):
         self.poses_published = 0
         # Of the robot's poses: their frame, when the last came, and how late they are sent.
         self._base, self._pose_s, self._clock_offset_s = '', time.monotonic(), 0.0
-        self._motion = self._create_motion()
+        # What computes the poses; None beside a robot that publishes them itself.
+        self._motion: JointPoses | TfPoses | None = None
+        base, joints = self.values['base_link'], self.values['joint_topic']
+        if self._robot is not None:
+            self._motion = JointPoses(self._robot, joints, self._publish_pose)
+            self._missing[joints] = self._motion.take
+        elif base:
+            tip = self.values['tip_link'] or DEFAULT_TIP
+            self._motion = TfPoses(self, base, tip, self._publish_pose)
+        if self._motion is None:
+            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
+        else:
+            self._base, depth = self._motion.base, QoSProfile(depth=POSE_DEPTH)
+            self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
         self._problems: dict[str, str] = {}  # by topic
         self._heard: list[AdaptiveSubscription] = []
         self.create_steady_timer(0.1, self._discover_topics)
         self.report({'robot': self._robot_status, 'signals': self._signals_status})
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if not any(values[name] for name in ('urdf_file', 'base_link', 'trigger')):
             raise PaintError(
                 f'{self.get_name()}: urdf_file and base_link are empty: give the robot, or the '
@@ -153,25 +162,6 @@ class AtomizerSource(PaintNode):
         self._signals = {name: signal for name, signal in named.items() if signal is not None}
 
     # --- poses
-
-    def _create_motion(self) -> JointPoses | TfPoses | None:
-        """What computes the poses; None beside a robot that publishes them itself."""
-        values = self.values
-        if self._robot is None and not values['base_link']:
-            self.create_subscription(PoseStamped, POSES, self._watch_pose, qos_profile_sensor_data)
-            return None
-        depth = QoSProfile(depth=POSE_DEPTH)
-        self._pose_publisher = self.create_publisher(PoseStamped, POSES, depth)
-        if self._robot is None:
-            tip = values['tip_link'] or DEFAULT_TIP
-            motion: JointPoses | TfPoses = TfPoses(
-                self, values['base_link'], tip, self._publish_pose
-            )
-        else:
-            motion = JointPoses(self._robot, values['joint_topic'], self._publish_pose)
-            self._missing[values['joint_topic']] = motion.take
-        self._base = motion.base
-        return motion
 
     def _publish_pose(self, stamp: int, tip: Rigid, sent_ns: int) -> None:
         if sent_ns:
@@ -210,7 +200,9 @@ class AtomizerSource(PaintNode):
             subscription.match_qos()
 
     def _on_signal_message(self, topic: str, message: Any, info: Mapping[str, Any]) -> None:
-        """Take trigger, flow, brush and speed, which may be fields of one message."""
+        """Take trigger, flow, brush and speed, which may be fields of one message, and publish
+        the state if it has changed.
+        """
         stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
         problem = ''
         for name, signal in self._signals.items():
@@ -230,13 +222,8 @@ class AtomizerSource(PaintNode):
             else:
                 self._values[name] = value
         self._problems[topic] = problem
-        if not problem:
-            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
-            self._publish_state(stamp or now_ns)
-
-    def _publish_state(self, stamp: int) -> None:
-        """Publish the state if all signals are known and it has changed."""
-        if self._signals.keys() - self._values.keys():
+        # All signals must be known.
+        if problem or self._signals.keys() - self._values.keys():
             return
         full = self.values['calibrated_flow']
         speed = self._values.get('speed', math.nan) * self.values['speed_scale']
@@ -248,7 +235,8 @@ class AtomizerSource(PaintNode):
         )
         if str(state) != self._published:  # NaN does not equal itself
             self._published = str(state)
-            state.header = header(self._base, stamp)
+            now_ns = info['source_timestamp'] or self.get_clock().now().nanoseconds
+            state.header = header(self._base, stamp or now_ns)
             self._state_publisher.publish(state)
 
     # --- diagnostics

@@ -6,7 +6,7 @@ import os
 import threading
 import time
 from collections import deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
 from datetime import timezone
 from types import SimpleNamespace
@@ -21,9 +21,9 @@ from paint_msgs.msg import AtomizerState
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.recordings.triggers import MAX_CLOCK_OFFSET_S
 from paint_deposition.nodes.robot.atomizer_source import LATCHED_STATES
-from paint_deposition.nodes.runtime.messages import header
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.topics import header
 
 TIMEOUT_S = 5.0
 POLL_S = 0.2
@@ -61,8 +61,8 @@ class SignalSource(PaintNode):
 
     PASSWORD: str  # the variable of the environment
 
-    def __init__(self, name: str, **kwargs: Any):
-        super().__init__(name, **kwargs)
+    def __init__(self, **kwargs: Any):
+        super().__init__(**kwargs)
         self._publisher = self.create_publisher(AtomizerState, 'atomizer/state', LATCHED_STATES)
         named = ('trigger', *FIELDS)
         self.signals = {self.values[kind]: kind for kind in named if self.values[kind]}
@@ -78,7 +78,7 @@ class SignalSource(PaintNode):
         self.report({'signals': self.status})
         self.start_thread(self._keep_following)
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
         if urlsplit(values['url']).username is not None:
             raise PaintError(
                 f'{self.get_name()}: url holds a login, which all nodes of the cell could read; '
@@ -124,25 +124,24 @@ class SignalSource(PaintNode):
                 at_ns = arrived_ns - round(1e9 * self.values['delay_s'])
             self._newest_ns = max(self._newest_ns, at_ns)
             self._received[kind] = value
-            if not {*self.signals.values()} - self._received.keys():
-                self._publish(self._newest_ns)
+            if {*self.signals.values()} - self._received.keys():
+                return
+            values, known = self.values, self._received
+            full, flow = values['calibrated_flow'], known.get('flow', math.nan)
+            state = AtomizerState(
+                spraying=known['trigger'] > values['trigger_level'],
+                flow=flow / full if full > 0.0 and 'flow' in known else 1.0,
+                **{field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()},
+            )
+            if str(state) != self._published:  # NaN does not equal itself
+                self._published = str(state)
+                state.header = header('', self._newest_ns)
+                self._publisher.publish(state)
 
     def refuse(self, signal: str, reason: str) -> None:
         """Say why what came of a signal is no value."""
         with self._lock:
             self._problems[signal] = f'{signal} {reason}; the gun stays as it was'
-
-    def _publish(self, at_ns: int) -> None:
-        values, known = self.values, self._received
-        spraying = known['trigger'] > values['trigger_level']
-        full, flow = values['calibrated_flow'], known.get('flow', math.nan)
-        relative = flow / full if full > 0.0 and 'flow' in known else 1.0
-        points = {field: known.get(name, math.nan) for name, (field, _) in FIELDS.items()}
-        state = AtomizerState(spraying=spraying, flow=relative, **points)
-        if str(state) != self._published:  # NaN does not equal itself
-            self._published = str(state)
-            state.header = header('', at_ns)
-            self._publisher.publish(state)
 
     def status(self) -> Status:
         with self._lock:
@@ -170,7 +169,8 @@ class RwsSource(SignalSource):
     Events have no time of their own: `delay_s` is taken from their arrival.
     """
 
-    PARAMETERS = fixed_while_running(
+    NAME = 'rws_source'
+    PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('http://192.168.125.1', 'Address of the controller [URL]'),
         user=NodeParameter(
@@ -179,9 +179,6 @@ class RwsSource(SignalSource):
         **SIGNALS,
     )
     PASSWORD = 'RWS_PASSWORD'
-
-    def __init__(self, **kwargs: Any):
-        super().__init__('rws_source', **kwargs)
 
     def follow(self) -> None:
         """Subscribe to all signals in one group, and take its events."""
@@ -221,24 +218,18 @@ class RwsSource(SignalSource):
                 opener.open(f'{url}/logout', None, TIMEOUT_S).close()
 
     def _take_all(self, event: str | bytes) -> None:
-        for path, value in signal_values(event):
+        """Take the value of each signal in an event, which is XHTML."""
+        for item in ElementTree.fromstring(event).iter():
+            if not item.get('class', '').startswith('ios-signalstate'):
+                continue
+            link, value = '', None
+            for inner in item.iter():
+                link = inner.get('href', '') or link
+                value = inner.text if inner.get('class') == 'lvalue' else value
+            path = link.partition(PATH)[2].partition(';')[0]
             for signal in self.signals:
-                if path == signal or path.endswith(f'/{signal}'):
-                    self.take(signal, value)
-
-
-def signal_values(event: str | bytes) -> Iterator[tuple[str, float]]:
-    """The path and the value of each signal in an event of RWS, which is XHTML."""
-    for item in ElementTree.fromstring(event).iter():
-        if not item.get('class', '').startswith('ios-signalstate'):
-            continue
-        link, value = '', None
-        for inner in item.iter():
-            link = inner.get('href', '') or link
-            value = inner.text if inner.get('class') == 'lvalue' else value
-        path = link.partition(PATH)[2].partition(';')[0]
-        if path and value is not None:
-            yield path, float(value)
+                if value is not None and f'/{path}'.endswith(f'/{signal}'):
+                    self.take(signal, float(value))
 
 
 class OpcuaSource(SignalSource):
@@ -248,7 +239,8 @@ class OpcuaSource(SignalSource):
     that sends none.
     """
 
-    PARAMETERS = fixed_while_running(
+    NAME = 'opcua_source'
+    PARAMETERS = fixed(
         'the signals are subscribed to with it; restart the node',
         url=NodeParameter('opc.tcp://127.0.0.1:4840', 'Address of the server [URL]'),
         period_s=NodeParameter(
@@ -271,11 +263,8 @@ class OpcuaSource(SignalSource):
     )
     PASSWORD = 'OPCUA_PASSWORD'
 
-    def __init__(self, **kwargs: Any):
-        super().__init__('opcua_source', **kwargs)
-
-    def _validate(self, values: Mapping[str, Any]) -> None:
-        super()._validate(values)
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        super()._validate(values, changed)
         keys = [values['certificate_file'], values['private_key_file']]
         if (values['security_policy'] != 'None') != all(keys) or any(keys) != all(keys):
             raise PaintError(

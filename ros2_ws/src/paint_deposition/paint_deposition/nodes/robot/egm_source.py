@@ -12,10 +12,9 @@ from rclpy.qos import QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError
-from paint_deposition.nodes.runtime.messages import header, pose_message
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status
-from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed_while_running
-from paint_deposition.nodes.runtime.topics import POSE_DEPTH
+from paint_deposition.nodes.runtime.parameters import NodeParameter, fixed
+from paint_deposition.nodes.runtime.topics import POSE_DEPTH, header, pose_message
 
 # What is read of EGM's messages: field, number and type of the wire format that ABB documents in
 # 3HAC073319 (EGM, sensor protocol); others are passed over.
@@ -32,10 +31,6 @@ MESSAGES = {
     },
     'Robot': {'header': (1, 'Header'), 'feedBack': (2, 'FeedBack')},
 }  # fmt: skip
-# The clock of the controller drifts: only so many packets say what the fastest way takes.
-REMEMBERED = 2500
-SILENT_S = 2.0
-POLL_S = 0.2
 
 
 @cache
@@ -96,7 +91,8 @@ class EgmStream:
         self.sender = self.other = ''
         self.other_ns = self._heard_ns = self._sent_ns = 0
         self._newest: int | None = None
-        self._ways_ns: deque[int] = deque(maxlen=REMEMBERED)
+        # The clock of the controller drifts: only so many packets say what the fastest way takes.
+        self._ways_ns: deque[int] = deque(maxlen=2500)
 
     def take(self, packet: bytes, arrived_ns: int, sender: str = '') -> Position | None:
         """The position in a packet; None for one that is not the robot's, invalid, repeated or
@@ -177,7 +173,8 @@ class EgmSource(PaintNode):
     measured, by the controller's clock and ``lag_s``.
     """
 
-    PARAMETERS = fixed_while_running(
+    NAME = 'egm_source'
+    PARAMETERS = fixed(
         'the stream is read with it; restart the node',
         address=NodeParameter('0.0.0.0', 'Address of this machine that the robot sends to [IP]'),
         robot_address=NodeParameter(
@@ -208,7 +205,7 @@ class EgmSource(PaintNode):
     )  # fmt: skip
 
     def __init__(self, **kwargs: Any):
-        super().__init__('egm_source', **kwargs)
+        super().__init__(**kwargs)
         profile = QoSProfile(depth=POSE_DEPTH)
         self._poses = self.create_publisher(PoseStamped, 'atomizer/pose', profile)
         self._joints = self.create_publisher(JointState, 'joint_states', profile)
@@ -217,7 +214,7 @@ class EgmSource(PaintNode):
         self.report({'robot': self.status})
         self.start_thread(self._listen)
 
-    def _validate(self, values: Any) -> None:
+    def _validate(self, values: Any, changed: set[str]) -> None:
         egm_message()
         if len(values['external_joints']) != len(values['external_scales']):
             raise PaintError(
@@ -236,7 +233,7 @@ class EgmSource(PaintNode):
                 f'cannot listen on {address[0]}, UDP port {address[1]}: {error.strerror}; end '
                 'what else listens there, or give another port'
             ) from None
-        self._socket.settimeout(POLL_S)
+        self._socket.settimeout(0.2)
 
     def close(self) -> None:
         super().close()
@@ -250,6 +247,8 @@ class EgmSource(PaintNode):
         self._socket.close()
 
     def _listen(self) -> None:
+        frame_id, names = self.values['frame_id'], self.values['joint_names']
+        external = self.values['external_joints']
         while not self.stopped.is_set():
             try:
                 packet, (sender, _) = self._socket.recvfrom(65_536)
@@ -260,21 +259,15 @@ class EgmSource(PaintNode):
                 self.stream.invalid += 1
             elif position := self.stream.take(packet, arrived_ns, sender):
                 self._heard_s = time.monotonic()
-                self._publish(*position)
-
-    def _publish(
-        self, stamp: int, pose: tuple[float, ...] | None, joints: np.ndarray, axes: np.ndarray
-    ) -> None:
-        frame_id = self.values['frame_id']
-        if pose is not None:
-            self._poses.publish(pose_message(frame_id, stamp, pose))
-        names, external = self.values['joint_names'], self.values['external_joints']
-        if len(joints) >= len(names) and len(axes) >= len(external):
-            scaled = axes[: len(external)] * self.values['external_scales']
-            positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
-            at = header(frame_id, stamp)
-            message = JointState(header=at, name=[*names, *external], position=positions)
-            self._joints.publish(message)
+                stamp, pose, joints, axes = position
+                if pose is not None:
+                    self._poses.publish(pose_message(frame_id, stamp, pose))
+                if len(joints) >= len(names) and len(axes) >= len(external):
+                    scaled = axes[: len(external)] * self.values['external_scales']
+                    positions = [*joints[: len(names)].tolist(), *scaled.tolist()]
+                    at = header(frame_id, stamp)
+                    message = JointState(header=at, name=[*names, *external], position=positions)
+                    self._joints.publish(message)
 
     def status(self) -> Status:
         stream, values = self.stream, self.values
@@ -290,7 +283,7 @@ class EgmSource(PaintNode):
         if time.time_ns() - stream.other_ns < 10_000_000_000:
             remedy = 'give each robot a port and a node of its own, or robot_address'
             return Status(ERROR, f'{stream.other} sends, too: {remedy}', figures)
-        if time.monotonic() - self._heard_s > SILENT_S:
+        if time.monotonic() - self._heard_s > 2.0:
             return Status(
                 WARN, f'no packets on UDP port {values["port"]}: start EGMStreamStart with the '
                 'address of this machine in UDPUC', figures,

@@ -104,19 +104,12 @@ class TfPoses:
             self._tree.fix(child, parent, pose)
 
     def _take(self, message: Any, info: Mapping[str, Any]) -> None:
+        """Take moving transforms, and look up the poses that all transforms are now known for."""
         for child, parent, stamp, pose in transforms_of(message):
             if self._tree.add(child, parent, stamp, pose):
                 self._waiting.clear()
                 self._published_ns = 0
             self._waiting.append((stamp, child))
-        self._publish_due(info['source_timestamp'])
-
-    @property
-    def _moving(self) -> set[str]:
-        """Frames between tip and base that move in their parents; none if not connected."""
-        return self._tree.moving_between(self.tip, self.base, self._published_ns) or set()
-
-    def _publish_due(self, sent_ns: int) -> None:
         moving = self._moving
         if not moving:
             return
@@ -128,12 +121,17 @@ class TfPoses:
         for stamp in sorted(due):
             self._published_ns = stamp
             try:
-                pose = self._tree.lookup(self.tip, self.base, stamp)
+                found = self._tree.lookup(self.tip, self.base, stamp)
             except NoTransform:
                 self._failed_lookups += 1
                 continue
             self._received_s = time.monotonic()
-            self._take_pose(stamp, pose, sent_ns)
+            self._take_pose(stamp, found, info['source_timestamp'])
+
+    @property
+    def _moving(self) -> set[str]:
+        """Frames between tip and base that move in their parents; none if not connected."""
+        return self._tree.moving_between(self.tip, self.base, self._published_ns) or set()
 
     def status(self) -> Status:
         """Whether tf connects tip and base, and transforms arrive."""

@@ -7,13 +7,9 @@ from rclpy.lifecycle import LifecycleNodeMixin, LifecycleState, TransitionCallba
 
 from paint_deposition.errors import PaintError
 from paint_deposition.nodes.runtime.node import ERROR, OK, PaintNode, Status, Task
-from paint_deposition.nodes.runtime.parameters import (
-    NodeParameter,
-    ParameterTable,
-    fixed_while_running,
-)
+from paint_deposition.nodes.runtime.parameters import NodeParameter, ParameterTable, fixed
 
-MANAGED = fixed_while_running(
+MANAGED = fixed(
     'it is read when the node starts',
     autostart=NodeParameter(
         True,
@@ -39,11 +35,11 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     autostarting = False
     _failure: Exception | None = None
 
-    def __init__(self, name: str, **kwargs: Any):
+    def __init__(self, **kwargs: Any):
         # The entities that `configure` created, and those that `activate` created.
         self._created: list[set[Any]] = []
         # The mixin does not pass arguments on; it is initialised once the node exists.
-        PaintNode.__init__(self, name, **kwargs)
+        PaintNode.__init__(self, **kwargs)
 
     def _start(self) -> None:
         LifecycleNodeMixin.__init__(self)
@@ -60,8 +56,13 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     # --- for the subclass
 
-    def _configure(self) -> None:
-        """Create what the configured node has; its files have been read."""
+    def _configure(self) -> Mapping[str, Task]:
+        """Create what the configured node has, whose files have been read.
+
+        Returns:
+            Its diagnostic tasks, by name.
+        """
+        return {}
 
     def _activate(self) -> None:
         """Start working."""
@@ -72,12 +73,9 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
     def _cleanup(self) -> None:
         """Stop threads and the like; publishers, timers and so on are destroyed anyway."""
 
-    def _diagnostic_tasks(self) -> Mapping[str, Task]:
-        """The diagnostic tasks of the configured node, by name."""
-        return {}
-
     @property
-    def configured(self) -> bool:
+    def configured(self) -> bool:  # type: ignore[override]
+        """Whether the node is in the state `inactive` or `active`."""
         return len(self._created) > 0
 
     @property
@@ -122,8 +120,7 @@ class ManagedNode(LifecycleNodeMixin, PaintNode):
 
     def _load_and_configure(self) -> None:
         self._load()
-        self._configure()
-        self.tasks = {**self._diagnostic_tasks(), 'state': self._state_status}
+        self.tasks = {**self._configure(), 'state': self._state_status}
 
     def _run_cleanup(self) -> None:
         try:

@@ -1,10 +1,13 @@
-"""The base class of all nodes: parameters, timers, threads and diagnostics."""
+"""The base class of all nodes, and the process of one."""
 
 from __future__ import annotations
 
 import concurrent.futures
 import os
+import signal
+import sys
 import threading
+import traceback
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -12,13 +15,16 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import rclpy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
 from rcl_interfaces.msg import SetParametersResult
 from rclpy.clock import Clock
 from rclpy.clock_type import ClockType
+from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 from rclpy.qos import QoSProfile
+from rclpy.signals import SignalHandlerOptions
 from rclpy.task import Future
 from rclpy.timer import Timer
 from std_srvs.srv import Trigger
@@ -44,25 +50,28 @@ Task = Callable[[], Status]
 
 
 class PaintNode(Node):
-    """A node with a table of parameters, which can end its process.
+    """A node with a name and a table of parameters, which can end its process.
 
     Keyword arguments are those of rclpy's Node (context, namespace, parameter_overrides, ...).
 
     Attributes:
         loading: whether a node of this process is reading its files.
         stopping: whether this process was asked to end.
+        configured: whether the files have been read.
         values: current values of the parameters, by name.
         stopped: whether the thread of this node is to end.
         tasks: the diagnostic tasks, by name.
         finished: a future that ends the process: its result is the exit code, or an exception.
     """
 
+    NAME = 'paint_node'
     PARAMETERS: ParameterTable = MappingProxyType({})
     loading = stopping = False
+    configured = True
     _thread: threading.Thread | None = None
 
-    def __init__(self, name: str, **kwargs: Any):
-        super().__init__(name, **kwargs)
+    def __init__(self, **kwargs: Any):
+        super().__init__(self.NAME, **kwargs)
         self.finished: Future = Future()
         self.stopped = threading.Event()
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
@@ -71,7 +80,7 @@ class PaintNode(Node):
             named = {name: v for name, v in self.values.items() if name != 'output_directory'}
             files = [Path(file).resolve() for file in self._files_of(named)]
             self._input_folders = [file if file.is_dir() else file.parent for file in files]
-            self._validate(self.values)
+            self._validate(self.values, set())
             self._start()
         except PaintError:
             # The subclass is not constructed yet: it has nothing of its own to destroy.
@@ -103,14 +112,14 @@ class PaintNode(Node):
 
     # --- for the subclass
 
-    def _validate(self, values: Mapping[str, Any]) -> None:
-        """Raise PaintError if these values contradict each other."""
+    def _validate(self, values: Mapping[str, Any], changed: set[str]) -> None:
+        """Raise PaintError if these values contradict each other, or cannot be had now.
+
+        ``changed`` has the names of those that change in a node whose files have been read.
+        """
 
     def _load_files(self) -> None:
         """Read the files named in ``self.values``; a PaintError ends the node."""
-
-    def _validate_change(self, values: Mapping[str, Any], names: set[str]) -> None:
-        """Raise PaintError if these parameters cannot be changed to the new values now."""
 
     def _on_change(self, names: set[str]) -> None:
         """Apply the changes of these parameters; ``self.values`` has the new values."""
@@ -125,11 +134,6 @@ class PaintNode(Node):
 
     # --- for all users
 
-    @property
-    def configured(self) -> bool:
-        """Whether the files have been read."""
-        return True
-
     def start_thread(self, work: Callable[[], None]) -> None:
         """Do work that ends soon once ``stopped`` is set, which closing the node does."""
         self._thread = threading.Thread(target=work, name=self.get_name(), daemon=True)
@@ -140,7 +144,7 @@ class PaintNode(Node):
         if self._thread is not None:
             self._thread.join()
 
-    def create_steady_timer(self, period_s: float, callback: Callable[[], None]) -> Timer:
+    def create_steady_timer(self, period_s: float, callback: Callable[[], Any]) -> Timer:
         """A timer that also runs while a simulated clock stands still."""
         return self.create_timer(period_s, callback, clock=self._steady)
 
@@ -252,9 +256,7 @@ class PaintNode(Node):
                 self.PARAMETERS[name].checked(name, new[name])
             for file in self._files_of(new):
                 self.require_named_folder(file)
-            self._validate(self.values | new)
-            if self.configured:
-                self._validate_change(self.values | new, set(new))
+            self._validate(self.values | new, set(new) if self.configured else set())
         except (PaintError, MemoryError) as error:
             reason = str(error) or 'not enough memory'
             return SetParametersResult(successful=False, reason=reason)
@@ -264,3 +266,85 @@ class PaintNode(Node):
         self.values |= {change.name: change.value for change in changes}
         if self.configured:
             self._on_change({change.name for change in changes})
+
+
+def run_node(make_node: Callable[[], PaintNode], signals: list[int] | None = None) -> int:
+    """Run one node until it finishes or the process gets a signal; return the exit code.
+
+    SIGINT, which `ros2 launch` sends twice, and SIGTERM stop the node between callbacks with exit
+    code 0. A PaintError is one line on stderr and exit code 2, any other exception a traceback
+    and exit code 1. The node is closed in every case. ``signals`` were received before the call.
+    """
+    node: PaintNode | None = None
+    received = [] if signals is None else signals
+
+    def on_signal(number: int, _frame: object) -> None:
+        received.append(number)
+        PaintNode.stopping = True
+        PaintNode.end_if_loading()
+
+    try:
+        _handle_signals(on_signal)
+        if received:
+            return 0
+        node = _create_node(make_node)
+        exit_code = _spin(node, received)
+    except Exception as error:
+        exit_code = _report_error(error)
+    finally:
+        # Python restores the default action of its own handlers while it exits, and a second
+        # SIGINT would then kill it; an ignored signal stays ignored.
+        _handle_signals(signal.SIG_IGN)
+    try:
+        if node is not None:
+            node.close()
+            node.destroy_node()
+    except Exception as error:
+        exit_code = max(exit_code, _report_error(error))
+    finally:
+        rclpy.try_shutdown()
+    return exit_code
+
+
+def _handle_signals(action: Callable[[int, object], None] | signal.Handlers) -> None:
+    signal.signal(signal.SIGINT, action)
+    signal.signal(signal.SIGTERM, action)
+
+
+def _create_node(make_node: Callable[[], PaintNode]) -> PaintNode:
+    try:
+        rclpy.init(signal_handler_options=SignalHandlerOptions.NO)
+    except RuntimeError as error:
+        raise PaintError(f'ROS arguments: {_reason(error)}') from None
+    try:
+        return make_node()
+    except RuntimeError as error:
+        # RCLError is not public. Causes: security without keys or libraries, an invalid name.
+        if type(error).__name__ != 'RCLError':
+            raise
+        raise PaintError(f'ROS cannot make the node: {_reason(error)}') from None
+
+
+def _reason(error: RuntimeError) -> str:
+    return ' '.join(str(error).split(', at /')[0].split())
+
+
+def _spin(node: PaintNode, signals: list[int]) -> int:
+    executor = SingleThreadedExecutor(context=node.context)
+    executor.add_node(node)
+    if not signals:
+        node.get_logger().info('ready')
+    while not (signals or node.finished.done()):
+        # Signals do not reach the main thread while it waits in the middleware.
+        executor.spin_once(timeout_sec=0.1)
+    executor.remove_node(node)
+    executor.shutdown(timeout_sec=5.0)
+    return (node.finished.result() or 0) if node.finished.done() else 0
+
+
+def _report_error(error: Exception) -> int:
+    if isinstance(error, PaintError | MemoryError):
+        sys.stderr.write(f'error: {str(error) or "not enough memory"}\n')
+        return 2
+    traceback.print_exception(error)
+    return 1

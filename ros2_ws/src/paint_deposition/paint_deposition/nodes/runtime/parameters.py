@@ -6,33 +6,19 @@ import os
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Annotated, Any, Literal, get_args
+from typing import Annotated, Any, Literal, get_args, get_origin
 
 from pydantic import AfterValidator, BaseModel, Field, TypeAdapter, ValidationError
-from rcl_interfaces.msg import (
-    FloatingPointRange,
-    IntegerRange,
-    ParameterDescriptor,
-)
+from rcl_interfaces.msg import FloatingPointRange, IntegerRange, ParameterDescriptor
 from rclpy.node import Node
 from rclpy.parameter import Parameter
 
 from paint_deposition.errors import PaintError, did_you_mean, quoted
 from paint_deposition.film.statistics import DEFAULT_PAINTED_ABOVE_UM, require_band
 
-# How bounds are said.
-BOUNDS = {
-    'greater than or equal to': 'at least',
-    'less than or equal to': 'at most',
-    'greater than': 'a number above',
-    'less than': 'a number below',
-}
 # By the endings of names.
 UNITS = {'_m_per_s': 'm/s', '_m_per_s2': 'm/s2', '_um': 'µm', '_rad': 'rad', '_m': 'm'}
-GUN_NAME = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
-LONGEST_SHOWN = 40  # letters of a name that is refused
-RUNS = 'runs'  # `fixed_while`: in every state
+RUNS, CONFIGURED = 'runs', 'is configured'  # `fixed_while`; a node that runs is in any state
 # Room is left for what is appended: a date, the number of a coat, the ending of a file.
 FILE_NAME = re.compile(r'[A-Za-z0-9_][A-Za-z0-9._-]{0,199}')
 FILE_NAME_RULE = (
@@ -94,9 +80,13 @@ class NodeParameter:
             descriptor.floating_point_range = [FloatingPointRange(from_value=low, to_value=high)]
         return descriptor
 
-    @cached_property
-    def _adapter(self) -> TypeAdapter[Any]:
-        """What checks a value: the same as checks the requests of commands."""
+    def checked(self, name: str, value: Any) -> Any:
+        """A value for the parameter of this name, in its type, as requests are checked.
+
+        YAML may have 2 for 2.0, and ROS None for []. Raises PaintError.
+        """
+        if self.element and not isinstance(value, (str, int, float)):
+            value = list(value or [])
         kind: Any = self.element or type(self.default)
         limits: dict[str, Any] = {'strict': True}
         if kind is float:
@@ -108,21 +98,15 @@ class NodeParameter:
         if self.is_path:
             # No shell expands a leading ~ in parameter files or after :=.
             kind = Annotated[kind, AfterValidator(os.path.expanduser)]
-        return TypeAdapter(list[kind] if self.element else kind)
-
-    def checked(self, name: str, value: Any) -> Any:
-        """A value for the parameter of this name, in its type.
-
-        YAML may have 2 for 2.0, and ROS None for []. Raises PaintError.
-        """
-        if self.element and not isinstance(value, (str, int, float)):
-            value = list(value or [])
         try:
-            value = self._adapter.validate_python(value)
+            value = TypeAdapter(list[kind] if self.element else kind).validate_python(value)
         except ValidationError as error:
             first = error.errors()[0]
             value, remedy = first['input'], first['msg'].removeprefix('Input should be ')
-            for long, short in BOUNDS.items():
+            for long, short in (
+                ('greater than or equal to', 'at least'), ('greater than', 'a number above'),
+                ('less than or equal to', 'at most'), ('less than', 'a number below'),
+            ):  # fmt: skip
                 remedy = remedy.replace(long, short)
             shown = f'{value:g}' if isinstance(value, float) else quoted(value)
             raise PaintError(f'{name} is {shown}; give {remedy}') from None
@@ -147,7 +131,10 @@ def requested(
     if isinstance(default, bool):
         return NodeParameter(default, f'{text.replace("default:", "false:")} [true/false]')
     if isinstance(default, str):
-        return NodeParameter(default, f'{text} [name]', choices=get_args(field.annotation))
+        choices = get_args(field.annotation) if get_origin(field.annotation) is Literal else ()
+        return NodeParameter(
+            default, f'{text.replace("default:", "empty:")} [name]', None, choices
+        )
     unit = next(unit for ending, unit in UNITS.items() if name.endswith(ending))
     text = text.replace(f' [{unit}]', '').replace('default:', '0:')
     low, high = -math.inf, math.inf
@@ -160,25 +147,19 @@ def requested(
     return NodeParameter(default, f'{text} [{unit}]', bounds)
 
 
-def thickness_parameter(description: str, default: float = 0.0) -> NodeParameter:
-    """A row for a film or a difference of films [um]."""
-    return NodeParameter(default, description, (0.0, 10_000.0))
-
-
 def display_parameters() -> dict[str, NodeParameter]:
     """The rows that say how a film is shown, and what film is wanted."""
+    described = {
+        'color_min_um': 'Film at the lower end of the colours; both ends 0: automatic',
+        'color_max_um': 'Film at the upper end of the colours; both ends 0: automatic',
+        'painted_above_um': 'Thinner film counts, and is shown, as bare metal',
+        'target_um': 'Film wanted; 0: none',
+        'target_tolerance_um': 'Allowed difference from the target',
+    }
+    defaults = {'painted_above_um': DEFAULT_PAINTED_ABOVE_UM}
     return {
-        'color_min_um': thickness_parameter(
-            'Film at the lower end of the colours; both ends 0: automatic [µm]'
-        ),
-        'color_max_um': thickness_parameter(
-            'Film at the upper end of the colours; both ends 0: automatic [µm]'
-        ),
-        'painted_above_um': thickness_parameter(
-            'Thinner film counts, and is shown, as bare metal [µm]', DEFAULT_PAINTED_ABOVE_UM
-        ),
-        'target_um': thickness_parameter('Film wanted; 0: none [µm]'),
-        'target_tolerance_um': thickness_parameter('Allowed difference from the target [µm]'),
+        name: NodeParameter(defaults.get(name, 0.0), f'{text} [µm]', (0.0, 10_000.0))
+        for name, text in described.items()
     }
 
 
@@ -205,13 +186,14 @@ def direction_parameter(description: str) -> NodeParameter:
 
 def atomizers_parameter(what_they_do: str) -> NodeParameter:
     """A row for the names of several guns; empty: the cell has one gun."""
+    name = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*)*', re.ASCII)
     return NodeParameter(
         [],
         f'Names of the guns {what_they_do}, which precede their topics, as in '
         'robot_1/atomizer/pose; empty: one gun on atomizer/pose [names]',
         constraints='different names of letters, digits, _ and /, such as robot_1',
         allows=lambda names: (
-            not names or (len(set(names)) == len(names) and all(map(GUN_NAME.fullmatch, names)))
+            not names or (len(set(names)) == len(names) and all(map(name.fullmatch, names)))
         ),
         element=str,
     )
@@ -244,19 +226,12 @@ def mesh_parameters(max_edge_length_m: float) -> ParameterTable:
     }
 
 
-def fixed_while_running(
-    because: str, fixed_while: str = RUNS, /, **rows: NodeParameter
-) -> ParameterTable:
-    """The rows, fixed for this reason while the node runs."""
+def fixed(because: str, fixed_while: str = RUNS, /, **rows: NodeParameter) -> ParameterTable:
+    """The rows, fixed for this reason while the node runs, or `CONFIGURED`."""
     return {
         name: replace(row, fixed_because=because, fixed_while=fixed_while)
         for name, row in rows.items()
     }
-
-
-def fixed_while_configured(because: str, **rows: NodeParameter) -> ParameterTable:
-    """The rows, fixed for this reason while a managed node is configured."""
-    return fixed_while_running(because, 'is configured', **rows)
 
 
 def declare_parameters(node: Node, table: ParameterTable) -> dict[str, Any]:
@@ -303,5 +278,4 @@ def _typed(row: NodeParameter | None, change: Parameter) -> Parameter:
 def require_file_name(what: str, name: str) -> None:
     """Raise PaintError for a name that is empty or could lead to another folder."""
     if not FILE_NAME.fullmatch(name):
-        shown = name if len(name) <= LONGEST_SHOWN else f'{name[:LONGEST_SHOWN]}...'
-        raise PaintError(f"{what} '{shown}': use {FILE_NAME_RULE}")
+        raise PaintError(f'{what} {quoted(name)}: use {FILE_NAME_RULE}')

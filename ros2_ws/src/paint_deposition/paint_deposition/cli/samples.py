@@ -1,0 +1,266 @@
+"""Commands on the samples: `demo`, from a recording to a better door; `doctor`, a self-test."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import shlex
+import subprocess
+import sys
+import time
+import webbrowser
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from importlib import metadata
+from itertools import groupby
+from pathlib import Path
+from textwrap import TextWrapper
+from typing import Any
+
+import click
+
+import paint_deposition as pd
+from paint_deposition.cli.options import FOLDER, JSON
+from paint_deposition.cli.results import python, results_in
+
+
+@click.command('demo')
+@click.option(
+    '-o', '--output', type=FOLDER, default=Path('paint_demo'), show_default=True,
+    help='Folder for demo.html and the results that it tells of.',
+)  # fmt: skip
+@click.option(
+    '--open/--no-open', 'opens', default=True, show_default=True,
+    help='Open the page in the browser, where there is a display.',
+)  # fmt: skip
+def demo_command(output: Path, opens: bool) -> None:
+    """Paint a sample door, find what the model lacks by its readings, plan a better door.
+
+    The page that opens at the end tells it with pictures.
+    """
+    samples = pd.sample_folder() / 'measured_door'
+    mesh, recording, unseen = (samples / name for name in ('door.stl', 'door', 'unseen.yaml'))
+    campaign = samples / 'campaign.yaml'
+    state = '/atomizer/state'
+    motion = ('--mesh', mesh, '--trajectory', recording, '--state-topic', state)
+    models = [output / 'diagnosis' / f'{name}.yaml' for name in ('model_before', 'model')]
+    told = _Told(output)
+
+    told.begin('Painting a door', 'film', 'simulate', *motion)
+    from paint_deposition.files.model_file import read_model_file
+    from paint_deposition.report import page
+    from paint_deposition.report.data import ReportData
+
+    told.step('reading mesh and recording; the first run also compiles')
+    trajectory = pd.read_recording(recording, state_topic=state)
+    film = pd.simulate(pd.read_mesh(mesh, max_edge_length_m=0.01), trajectory, progress=told.step)
+    told.end(film, page.film_figures(film))
+
+    told.begin('Diagnosing its readings', 'diagnosis', 'diagnose', campaign)
+    found = pd.diagnose(pd.read_campaign(campaign), progress=told.step)
+    told.end(found, page.key_figures(ReportData.of(found)))
+
+    given = [word for model in models for word in ('--model', model)]
+    told.begin('Comparing with readings that no fit has seen', 'unseen', 'compare', unseen, *given)
+    beside = pd.compare_models(
+        pd.read_campaign(unseen), {path.stem: pd.read_model(path) for path in models},
+        progress=told.step,
+    )  # fmt: skip
+    told.end(beside, page.unseen_figures(beside))
+
+    told.begin('Planning the next door', 'improved', 'improve', *motion, '--model', models[1])
+    better = read_model_file(models[1])
+    improved = pd.improve(
+        pd.read_mesh(mesh, max_edge_length_m=0.02), trajectory, better.model,
+        posterior=better.posterior, progress=told.step,
+    )  # fmt: skip
+    told.end(improved, page.improvement_figures(improved))
+
+    # What the simulator that made the samples has hidden in them: their campaign.yaml says how.
+    hidden, to = 'incidence_attraction', output / 'demo.html'
+    path = page.write_story(to, film, found, beside, improved, hidden, told.commands)
+    click.echo(f'\nThe story with pictures: {path}')
+    # Where a browser has somewhere to show a page.
+    desktop = sys.platform in ('darwin', 'win32')
+    if opens and (desktop or any(os.environ.get(n) for n in ('DISPLAY', 'WAYLAND_DISPLAY'))):
+        webbrowser.open(path.resolve().as_uri())
+
+
+class _Told:
+    """What is being done, on the terminal, piped or not.
+
+    Attributes:
+        commands: that do the same by hand, by their names.
+    """
+
+    def __init__(self, output: Path) -> None:
+        self.commands: dict[str, str] = {}
+        self._output, self._folder, self._step = output, output, ''
+        self._began_s = time.monotonic()
+
+    def begin(self, what: str, folder: str, *command: object) -> None:
+        """Say what comes next, and the command that writes the same to its folder."""
+        self._folder = self._output / folder
+        words = shlex.join(map(str, [*command, '-o', self._folder]))
+        self.commands[str(command[0])] = f'paint {words}'
+        click.echo(f'\n{what}\n  $ paint {words}')
+
+    def step(self, what: str, share: float | None = None) -> None:
+        """Say what is being done, once."""
+        if what != self._step:
+            self._step = what
+            click.echo(f'  {time.monotonic() - self._began_s:3.0f} s  {what}')
+
+    def end(self, result: Any, figures: list[tuple[str, str, str, str]]) -> None:
+        """Write a result, and say its figures."""
+        self.step('writing and drawing')
+        with results_in(self._folder) as folder:
+            pd.write(result, folder)
+        for label, before, after, unit in figures:
+            click.echo(f'  {label + ":":32} {before + " -> " if before else ""}{after} {unit}')
+
+
+# Mean film on the painted share of the sample panel [µm].
+KNOWN_FILM_UM = 19.2131
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What was looked at and found; ``ok`` is None where the films do not depend on it."""
+
+    name: str
+    found: str
+    ok: bool | None = None
+    remedy: str = ''
+
+
+@click.command('doctor')
+@JSON
+def doctor_command(as_json: bool) -> None:
+    """Say what is installed, and whether it computes what it should.
+
+    The self-test paints the sample panel: its mean film is known, and a live film from the same
+    poses must equal it to the last bit. Exit code 1 if something essential is missing or wrong.
+    """
+    findings = [
+        Finding(
+            'paint',
+            f'{pd.__version__} in {Path(pd.__file__).parent}; Python {platform.python_version()}, '
+            f'{platform.platform(terse=True)} {platform.machine()}',
+        )
+    ]
+    for look in (_libraries, _ros, _processor, _rapid, _known_film):
+        try:
+            findings += look()
+        except Exception as error:  # noqa: PERF203 (whatever a broken installation raises)
+            name = look.__name__.strip('_').replace('_', ' ')
+            remedy = (
+                'install it again: pip install --force-reinstall ./ros2_ws/src/paint_deposition'
+            )
+            if 'cannot cache' in str(error):
+                remedy = 'set NUMBA_CACHE_DIR to a folder that can be written'
+            findings.append(Finding(name, f'{type(error).__name__}: {error}', False, remedy))
+    well = all(finding.ok is not False for finding in findings)
+    if as_json:
+        found = {'well': well, 'findings': [asdict(one) for one in findings]}
+        click.echo(json.dumps(found, indent=2))
+    else:
+        lines = TextWrapper(99, subsequent_indent=' ' * 20, break_on_hyphens=False)
+        for one in findings:
+            mark = {True: 'ok  ', False: 'BAD ', None: '    '}[one.ok]
+            heads = f'{mark}{one.name:<16}', ' ' * 17 + '-> '
+            for head, words in zip(heads, (one.found, one.remedy), strict=True):
+                if words:
+                    click.echo(lines.fill(head + words))
+        click.echo('all is well' if well else 'paint does not work as it should')
+    click.get_current_context().exit(not well)
+
+
+def _libraries() -> Iterator[Finding]:
+    """Versions of what the package and its extras ask for, and which are missing or too old."""
+    from packaging.requirements import Requirement
+
+    wanted = map(Requirement, metadata.requires('paint_deposition') or [])
+    for marker, needed in groupby(wanted, lambda one: str(one.marker or '')):
+        if 'test' in marker:
+            continue
+        found, unfit = [], []
+        for one in needed:
+            version = next((d.version for d in metadata.distributions(name=one.name)), 'missing')
+            found.append(f'{one.name} {version}')
+            if version == 'missing' or not one.specifier.contains(version, prereleases=True):
+                unfit.append(f"'{one.name}{one.specifier}'")
+        remedy = f'pip install {" ".join(unfit)}' if unfit else ''
+        # A marker is that of an extra: extra == "many".
+        name, ok = (f'extra {marker[10:-1]}', None) if marker else ('libraries', not unfit)
+        yield Finding(name, ', '.join(found), ok, remedy)
+
+
+def _ros() -> Iterator[Finding]:
+    # In a process of its own: libraries of a ROS that does not fit this Python may end it.
+    ask = 'import rclpy, paint_msgs.msg; print(rclpy.get_rmw_implementation_identifier())'
+    asked = subprocess.run(python(ask), capture_output=True, text=True, timeout=60)
+    if asked.returncode:
+        said = asked.stderr.strip().splitlines() or [f'ended with exit code {asked.returncode}']
+        remedy = (
+            'for nodes source ROS 2 Jazzy or newer and the built workspace, or run `make build`'
+        )
+        yield Finding('ROS 2', said[-1], None, remedy)
+        return
+    origin = os.environ.get('ROS_DISTRO') or 'from wheels'
+    domain = os.environ.get('ROS_DOMAIN_ID', '0')
+    reach = os.environ.get('ROS_AUTOMATIC_DISCOVERY_RANGE', 'SUBNET')
+    yield Finding('ROS 2', f'{origin}: {asked.stdout.strip()}; domain {domain}, reach {reach}')
+
+
+def _processor() -> Iterator[Finding]:
+    import llvmlite.binding as llvm
+    import numba
+
+    from paint_deposition.kernel.compiler import KIND
+    from paint_deposition.part.face_tree import box_distance
+
+    has = llvm.get_host_cpu_features()
+    named = ('sse4.2', 'avx', 'avx2', 'fma', 'avx512f', 'neon', 'sve')
+    features = ' '.join(name for name in named if has.get(name))
+    threads = f'{numba.get_num_threads()} threads on {os.cpu_count()} processors'
+    yield Finding('processor', f'{llvm.get_host_cpu_name()}, {features}; {threads}')
+    folder = Path(box_distance.stats.cache_path)
+    folder = Path(pd.__file__).parent if folder.name == '__pycache__' else folder.parent
+    sizes = [file.stat().st_size for file in folder.rglob('*.nb[ic]')]
+    yield Finding(
+        'compiled code', f'for {KIND}: {len(sizes)} files, {sum(sizes) / 1e6:.1f} MB in {folder}'
+    )
+
+
+def _rapid() -> Iterator[Finding]:
+    from paint_deposition.files.rapid.parser import parse_modules
+
+    # The package lark-parser puts another lark in the place of the one that is asked for.
+    parse_modules('MODULE Try\n  PROC main()\n    PaintL p1, v100;\n  ENDPROC\nENDMODULE', 'Try')
+    yield Finding('RAPID', 'a program is read', True)
+
+
+def _known_film() -> Iterator[Finding]:
+    from paint_deposition.film.live_film import LiveFilm
+    from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
+
+    started, samples = time.perf_counter(), pd.sample_folder()
+    surface = pd.read_mesh(samples / 'panel.stl', max_edge_length_m=0.1)
+    motion = pd.read_recording(samples / 'panel_577', state_topic='/atomizer/state')
+    film = pd.simulate(surface, motion)
+    mean_um, seconds = film.statistics.mean_um, time.perf_counter() - started
+    words = f'{mean_um:.4f} µm, known {KNOWN_FILM_UM} µm, in {seconds:.1f} s'
+    remedy = 'this processor or a library computes otherwise: report it with `paint doctor --json`'
+    close = abs(mean_um / KNOWN_FILM_UM - 1.0) < 1e-4  # rounding moves it less
+    yield Finding('samples', str(samples))
+    yield Finding('known film', words, close, '' if close else remedy)
+    live = LiveFilm(film.surface.points(), pd.DepositionModel())
+    live.replay(TriggerChange(*told) for told in motion.triggers)
+    columns = motion.stamps_ns, motion.positions_m, motion.quaternions_xyzw
+    for row in range(0, len(motion), 100):
+        live.add_poses(PoseBatch(*(column[row : row + 100] for column in columns)))
+    apart = int((live.snapshot().film_um != film.film_um).sum())
+    words = f'live film differs from the offline film at {apart} of {len(film.film_um)} vertices'
+    yield Finding('live = offline', words, not apart, remedy if apart else '')
