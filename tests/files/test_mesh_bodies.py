@@ -11,7 +11,7 @@ from trimesh.transformations import translation_matrix
 
 from files.step_panels import step_panels
 from paint_deposition.errors import MeshError
-from paint_deposition.files import mesh_bodies
+from paint_deposition.files import meshes
 from paint_deposition.files.meshes import read_mesh
 
 DOOR_M, FLANGE_M = (1.2, 0.04, 0.8), (1.2, 0.1, 0.02)
@@ -118,6 +118,6 @@ def test_a_part_of_a_step_file_is_taken_by_its_name(tmp_path):
 
 def test_without_its_reader_step_is_refused_with_what_to_install(tmp_path, monkeypatch):
     (tmp_path / 'door.step').write_text(step_panels(1.0, 1.0))
-    monkeypatch.setattr(mesh_bodies, 'STEP_READER', 'a_reader_that_is_not_there')
+    monkeypatch.setattr(meshes, 'STEP_READER', 'a_reader_that_is_not_there')
     with pytest.raises(MeshError, match='run: pip install a_reader_that_is_not_there, or export'):
         read_mesh(tmp_path / 'door.step')

@@ -13,7 +13,7 @@ from rosbags.rosbag2 import Reader
 
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import standard
+from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
 TRUE_CDR, FALSE_CDR = b'\0\1\0\0\1', b'\0\1\0\0\0'

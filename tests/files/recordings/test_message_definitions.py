@@ -5,7 +5,7 @@ from mcap.records import Schema
 from mcap.stream_reader import StreamReader
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings import messages as definitions
 
 
 def test_text_is_what_rosbag2_wrote(shared_data):

@@ -7,8 +7,7 @@ import pytest
 
 from nodes.cell import Robot, offline_um, two_passes
 from paint_deposition.api.simulation import simulate
-from paint_deposition.files.motion_files import read_gun_motions
-from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.motion_files import MotionSource, read_gun_motions
 
 GUNS = ['robot_1', 'robot_2']
 HIGH, OTHER = two_passes(poses=400), two_passes(poses=320)

@@ -28,8 +28,7 @@ from paint_deposition.errors import BatchError, PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.motion_files import MotionSource, read_motion
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.readings.readings import Readings

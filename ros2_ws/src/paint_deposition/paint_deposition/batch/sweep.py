@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +19,7 @@ from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.batch.variations import DRAW
 from paint_deposition.errors import BatchError
-from paint_deposition.files.atomic import require_pyarrow, write_json, write_parquet
+from paint_deposition.files.atomic import write_json, write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
 from paint_deposition.report.writers.write import written
@@ -66,7 +67,8 @@ def sweep(
         PaintError: a file that cannot be used, values that do not go together, or no case has a
             result.
     """
-    require_pyarrow('a sweep')
+    if find_spec('pyarrow') is None:
+        raise BatchError('a sweep needs pyarrow, which is not installed; run: pip install pyarrow')
     import pyarrow as pa
 
     path = Path(path)

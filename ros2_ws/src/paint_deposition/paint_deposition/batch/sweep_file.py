@@ -7,9 +7,9 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, BaseModel, Field
 
 from paint_deposition.errors import BatchError
-from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.files.strict_yaml import read_yaml
-from paint_deposition.request import validate
+from paint_deposition.request import Number, Text, validate
 
 MOST_CASES = 1_000_000
 LIST_WORDS = 'a list of at least one value, or {first: A, last: B, steps: N}'

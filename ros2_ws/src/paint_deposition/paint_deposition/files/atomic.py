@@ -11,14 +11,13 @@ import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from pydantic_core import to_json, to_jsonable_python
 
-from paint_deposition.errors import BatchError, PaintError
+from paint_deposition.errors import PaintError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -88,7 +87,7 @@ def replacing(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def locked(lock: Path) -> Iterator[None]:
-    """Wait until no other process holds the lock of this path, and hold it; its file goes again."""
+    """Wait until no other process holds the lock of this path; its file goes with the lock."""
     if sys.platform == 'win32':
         from filelock import FileLock  # there it removes its file itself
 
@@ -134,12 +133,6 @@ def filled(template: Path, **values: Any) -> str:
         keep_trailing_newline=True,
     )  # fmt: skip
     return made.render(values)
-
-
-def require_pyarrow(what: str) -> None:
-    """Refuse to begin what needs the library of the extra, where it is not installed."""
-    if find_spec('pyarrow') is None:
-        raise BatchError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

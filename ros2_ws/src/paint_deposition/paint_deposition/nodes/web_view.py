@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import (
+from paint_deposition.files.recordings.messages import (
     stamp_ns,
     transforms_of,
     trigger_change,

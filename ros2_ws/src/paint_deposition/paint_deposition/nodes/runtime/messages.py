@@ -15,7 +15,7 @@ from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
-from paint_deposition.files.recordings.headers import nanoseconds
+from paint_deposition.files.recordings.messages import nanoseconds
 
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
