@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paint_deposition.part.facing import facing, toward_the_gun
+from paint_deposition.part.surface import facing, toward_the_gun
 
 EYES = np.array([[0.0, -0.25, 0.0], [0.1, -0.25, 0.1], [-0.1, -0.25, 0.0], [3.0, -0.25, 0.0]])
 AHEAD = np.tile([0.0, 1.0, 0.0], (4, 1))

@@ -18,7 +18,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
-from paint_deposition.part.facing import toward_the_gun
+from paint_deposition.part.surface import toward_the_gun
 
 MOTION = two_passes()
 

@@ -28,7 +28,7 @@ from paint_deposition.film.common_film import TOTAL
 from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.interruptions import checked_path
-from paint_deposition.part.facing import toward_the_guns
+from paint_deposition.part.surface import toward_the_guns
 from paint_deposition.request import Number, OnePart, Text, validate
 
 Quantity = Literal[

@@ -31,9 +31,8 @@ from paint_deposition.nodes.runtime.parameters import (
     fixed_while_configured,
     thickness_parameter,
 )
-from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, turned
 
 
 class ModelComparison(PaintingNode):

@@ -44,7 +44,7 @@ from paint_deposition.nodes.runtime.parameters import (
     require_display,
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
-from paint_deposition.part.facing import turned
+from paint_deposition.part.surface import turned
 from paint_deposition.report.live.scene import Scene
 from paint_deposition.report.live.server import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 

@@ -29,9 +29,8 @@ from paint_deposition.nodes.painting.painting_parameters import (
 from paint_deposition.nodes.painting.repainting import OutwardSide, Repainting
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.topics import gun_topic
-from paint_deposition.part.facing import facing
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, facing
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
 

@@ -6,8 +6,7 @@ from concurrent.futures import Future
 
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm
-from paint_deposition.part.facing import facing, toward_the_gun
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, facing, toward_the_gun
 
 POSES_CONSIDERED = 2000
 
