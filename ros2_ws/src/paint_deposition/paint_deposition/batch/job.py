@@ -9,11 +9,11 @@ from typing import Any
 from paint_deposition.api.planning import plan
 from paint_deposition.api.simulation import simulate
 from paint_deposition.batch.cases import Case, code_digest, digest_of
-from paint_deposition.batch.sweep_file import SweepFile
-from paint_deposition.batch.variations import (
+from paint_deposition.batch.sweep_file import (
     DRAW,
     MOTION_KEYS,
     PASS_KEYS,
+    SweepFile,
     Values,
     effects_of,
     named_models,

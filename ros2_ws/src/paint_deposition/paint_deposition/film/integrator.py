@@ -23,8 +23,8 @@ from paint_deposition.film.layout import (
     term_constants,
 )
 from paint_deposition.film.statistics import PaintUsed
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
-from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder

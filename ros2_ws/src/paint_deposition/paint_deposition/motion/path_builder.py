@@ -3,10 +3,15 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paint_deposition.motion.passes import first_pass, follow_passes
 from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
-from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
+from paint_deposition.motion.strokes import (
+    first_pass,
+    first_stroke,
+    follow_passes,
+    follow_strokes,
+    look_ahead,
+)
 from paint_deposition.motion.trajectory import (
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import scipy
 
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import njit
-from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals

@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paint_deposition.kernel.blocks import neighbours_together
-from paint_deposition.kernel.threads import shared_among_threads
+from paint_deposition.kernel.blocks import neighbours_together, shared_among_threads
 from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
 from paint_deposition.part.derivatives import surface_normals

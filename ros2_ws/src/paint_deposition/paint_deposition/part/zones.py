@@ -140,8 +140,8 @@ class Zones:
             boxes = ' and '.join(box_words(region.box_m) for region in zone.regions)
             raise PaintError(
                 f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the "
-                f'part within {box_words(surface.vertices_m)}; give it in the frame and unit of the '
-                'mesh, or refine the mesh for a small zone'
+                f'part within {box_words(surface.vertices_m)}; give it in the frame and unit of '
+                'the mesh, or refine the mesh for a small zone'
             )
         return found
 
