@@ -16,7 +16,6 @@ from paint_deposition.batch.sweep_file import (
     SweepFile,
     Values,
     effects_of,
-    named_models,
     variations,
     varied_model,
     varied_motion,
@@ -67,22 +66,21 @@ class Job:
             PaintError: a file that cannot be used, or values that do not go together.
         """
         job = Job(file, folder)
-        models = [job._model_file(folder / name).model for name in named_models(file)]
+        varied = [*file.grid.get('model', ()), *(case.get('model') for case in file.cases)]
+        named = [n for n in dict.fromkeys((file.model, *varied)) if isinstance(n, str)]
+        models = [job._model_file(folder / name).model for name in named]
         job.effects = effects_of(models)
         job.values = variations(file, models)
         for number, values in enumerate(job.values):
             if number % 100 == 0:
                 progress(f'preparing case {number + 1} of {len(job.values)}')
-            job.cases.append(job._case(values))
+            inputs = job._inputs(values)
+            options = job._options(values, planned=inputs[1] == NOTHING)
+            model = job._model(values)
+            own = [effect.file_content.decode() for effect in model.effects]
+            digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
+            job.cases.append(Case(digest, {'model': model, **options}, inputs))
         return job
-
-    def _case(self, values: Values) -> Case:
-        inputs = self._inputs(values)
-        options = self._options(values, planned=inputs[1] == NOTHING)
-        model = self._model(values)
-        own = [effect.file_content.decode() for effect in model.effects]
-        digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
-        return Case(digest, {'model': model, **options}, inputs)
 
     def _named(self, key: str, values: Values) -> Path | None:
         name = values.get(key, getattr(self.file, key))

@@ -29,9 +29,8 @@ if TYPE_CHECKING:
 
 # Shown for a case that leaves a value, or all of them, as in the sweep's file.
 UNCHANGED = 'unchanged'
-# The figure by which cases are ranked, less being better; all charted figures with their labels.
+# The figure by which cases are ranked, less being better, and its label.
 SCORE, LABEL = 'sigma_n', 'unevenness σ_N'
-CHARTED = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
 
 
 def sweep(
@@ -111,7 +110,8 @@ class Sweep:
     @property
     def drawn(self) -> dict[str, str]:
         """The figures that some case has, with their labels."""
-        return {n: label for n, label in CHARTED.items() if n in self.table.column_names}
+        charted = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
+        return {n: label for n, label in charted.items() if n in self.table.column_names}
 
     @property
     def varied(self) -> tuple[str, ...]:

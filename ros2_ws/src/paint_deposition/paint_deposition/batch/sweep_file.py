@@ -151,15 +151,6 @@ def effects_of(models: Iterable[DepositionModel]) -> dict[str, type[Effect]]:
     return {**EFFECTS, **own}
 
 
-def named_models(file: SweepFile) -> list[str]:
-    """Model files that a sweep names, each once."""
-    varied = (
-        *file.grid.get('model', ()),
-        *(case['model'] for case in file.cases if 'model' in case),
-    )
-    return [n for n in dict.fromkeys((file.model, *varied)) if isinstance(n, str)]
-
-
 def variations(file: SweepFile, models: Sequence[DepositionModel] = ()) -> list[Values]:
     """The values of each case, in the order grid, cases, draws, the last one running fastest.
 

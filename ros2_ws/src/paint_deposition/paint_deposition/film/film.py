@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from html import escape
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,6 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.film.statistics import (
-    NO_PAINT,
     FilmStatistics,
     PaintUsed,
     impossible_brushes,
@@ -148,7 +147,7 @@ class Film(Tabular):
     statistics: FilmStatistics
     readings: Readings | None = None
     predicted_um: np.ndarray | None = None
-    paint: PaintUsed = NO_PAINT
+    paint: PaintUsed = field(default_factory=PaintUsed)
     doubts: tuple[str, ...] = ()
     coats: tuple[CoatFilm, ...] = ()
     zones: PointZones | None = None

@@ -31,6 +31,11 @@ class GunView:
     """What the gun has before it, at poses that stand for equal shares of the paint.
 
     The part is turned to the gun; of the model, pattern and projection count, effects do not.
+
+    Attributes:
+        distance_m: (N,) distance of the TCP from the nearest surface [m].
+        way: (N, 3) unit vectors from the TCP to it.
+        normals: (N, 3) its outward unit normals.
     """
 
     def __init__(self, surface: Surface, path: SprayPath, model: DepositionModel) -> None:
@@ -38,27 +43,10 @@ class GunView:
         paint = np.cumsum(path.flow * path.dwell_s)
         shares = (np.arange(POSES) + 0.5) / POSES
         self.path = path.select(np.searchsorted(paint, shares * paint[-1]))
-
-    @cached_property
-    def _nearest(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        place = self.surface.locate(self.path.position_m)
+        place = surface.locate(self.path.position_m)
+        self.distance_m, self.normals = place.distance_m, place.normals
         way = place.positions_m - self.path.position_m
-        return place.distance_m, way / np.maximum(place.distance_m, 1e-9)[:, None], place.normals
-
-    @property
-    def distance_m(self) -> np.ndarray:
-        """(N,) distance of the TCP from the nearest surface [m]."""
-        return self._nearest[0]
-
-    @property
-    def way(self) -> np.ndarray:
-        """(N, 3) unit vectors from the TCP to the nearest surface."""
-        return self._nearest[1]
-
-    @property
-    def normals(self) -> np.ndarray:
-        """(N, 3) outward unit normals of the nearest surface."""
-        return self._nearest[2]
+        self.way = way / np.maximum(place.distance_m, 1e-9)[:, None]
 
     @cached_property
     def over(self) -> np.ndarray:

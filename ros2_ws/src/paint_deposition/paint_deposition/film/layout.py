@@ -127,12 +127,6 @@ RAYS_AT_ONCE = 200_000
 Sight = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def free_sight(steps: int, blocks: int) -> Sight:
-    """Everything is seen on all sub-steps."""
-    run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
-    return run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64)
-
-
 class LinesOfSight:
     """Traces rays from the gun to those points, also given as the kernel's blocks, that it paints.
 

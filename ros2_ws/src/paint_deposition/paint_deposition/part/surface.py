@@ -127,13 +127,6 @@ class Surface:
         content = self.vertices_m.astype('<f8').tobytes() + self.faces.astype('<i8').tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
 
-    def seen_from(self, gun_side: np.ndarray) -> 'Surface':
-        """The part with the gun (3,) on that side; what rays and searches need is shared."""
-        known = replace(self, gun_side=gun_side)
-        made = vars(self).items()
-        vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
-        return known
-
     @property
     def area_m2(self) -> float:
         """Area of the surface [m^2]."""
@@ -305,7 +298,10 @@ def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surfa
     gun_side = -axes.mean(axis=0)
     if np.linalg.norm(gun_side) < CANCELLED:
         return surface
-    known = surface.seen_from(gun_side)
+    known = replace(surface, gun_side=gun_side)
+    # What rays and searches need is shared.
+    made = vars(surface).items()
+    vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
     settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
     return surface if settled else known
 
