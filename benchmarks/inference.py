@@ -30,7 +30,7 @@ from paint_deposition.inference.diagnosis.search import Search
 from paint_deposition.inference.diagnosis.state import DiagnosisState
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.inference.readings.campaign import Campaign
-from paint_deposition.kernel.threads import THREADS
+from paint_deposition.kernel.blocks import THREADS
 
 READINGS_A_PART, REPEATS = 79, 12
 MODEL = DepositionModel()

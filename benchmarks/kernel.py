@@ -31,7 +31,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.film.integrator import FilmIntegrator
-from paint_deposition.kernel import threads
+from paint_deposition.kernel import blocks
 from paint_deposition.kernel.compiler import KIND, kinds_at_hand
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
@@ -158,7 +158,7 @@ def kernel_um(case: Case, integrator: FilmIntegrator) -> np.ndarray:
 
 def single_threaded(run: Callable[[], np.ndarray]) -> np.ndarray:
     """Run on one thread."""
-    with patch.object(threads, 'THREADS', 1):
+    with patch.object(blocks, 'THREADS', 1):
         return run()
 
 
@@ -168,7 +168,7 @@ def measure(case: Case, rounds: int) -> dict[str, float]:
     double = FilmIntegrator(case.points, MODEL, 'double')
     step = max(1, len(case.path) // NUMPY_STEPS)
     some = slice(0, None, step)
-    count = threads.THREADS
+    count = blocks.THREADS
     runs = {
         'NumPy, double, 1 thread': lambda: numpy_um(case, some),
         f'plain loop, double, {count} threads': lambda: plain_um(case),

@@ -10,7 +10,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.campaign_file import _Band, _Entry, _File, read_campaign
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.model_file import read_model
-from paint_deposition.files.motion_source import MOTION_KINDS
+from paint_deposition.files.motion_files import MOTION_KINDS
 from paint_deposition.files.zones_file import ZoneEntry
 
 REQUIRED = ('x_m', 'y_m', 'z_m', 'thickness_um')

@@ -14,8 +14,7 @@ from booth import SAMPLES
 from cli.command import assert_refused, paint
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import Job, computed
-from paint_deposition.batch.sweep_file import SweepFile
-from paint_deposition.batch.variations import varied_motion
+from paint_deposition.batch.sweep_file import SweepFile, varied_motion
 from paint_deposition.effects.catalogue import effects_allowed
 
 DOOR = SAMPLES / 'measured_door'

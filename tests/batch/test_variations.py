@@ -5,8 +5,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from booth import spot
-from paint_deposition.batch.sweep_file import SweepFile, read_sweep
-from paint_deposition.batch.variations import variations, varied_model, varied_motion
+from paint_deposition.batch.sweep_file import (
+    SweepFile,
+    read_sweep,
+    variations,
+    varied_model,
+    varied_motion,
+)
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern

@@ -168,10 +168,13 @@ for _ in range(40):
             (work / f'{sys.argv[2]}{k}').write_text(sys.argv[2])
 """
     words = [sys.executable, '-c', code, str(tmp_path / 'out')]
-    running = [subprocess.Popen([*words, name]) for name in 'ab']
-    assert [one.wait() for one in running] == [0, 0]
+    (tmp_path / 'temporary').mkdir()
+    system = {**os.environ, 'TMPDIR': str(tmp_path / 'temporary')}
+    running = [subprocess.Popen([*words, name], env=system) for name in 'abc']
+    assert [one.wait() for one in running] == [0, 0, 0]
     held = names_in(tmp_path / 'out')
-    assert held in ([f'{name}{k}' for k in range(5)] for name in 'ab')
+    assert held in ([f'{name}{k}' for k in range(5)] for name in 'abc')
+    assert names_in(tmp_path / 'temporary') == []
 
 
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])

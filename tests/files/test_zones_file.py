@@ -7,7 +7,7 @@ import trimesh
 from paint_deposition.errors import PaintError
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.zones_file import read_zones
-from paint_deposition.part.facing import turned
+from paint_deposition.part.surface import turned
 
 BAND = 'target_um: 30, tolerance_um: 5'
 

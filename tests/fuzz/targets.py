@@ -22,9 +22,9 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import planned_model
-from paint_deposition.files.recordings.bag_summary import summarise
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
+from paint_deposition.files.recordings.pose_topics import summarise
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
 from robot_arm import urdf

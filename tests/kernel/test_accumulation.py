@@ -6,7 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.film.integrator import FEW_RAYS, FilmIntegrator
-from paint_deposition.kernel import threads
+from paint_deposition.kernel import blocks
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.motion.path_builder import spray_path
@@ -94,7 +94,7 @@ def test_the_number_of_threads_changes_no_bit(monkeypatch):
     assert len(points) * len(path) > FEW_RAYS  # fewer are painted by one thread
     films = []
     for count in (1, 2, 3):
-        monkeypatch.setattr(threads, 'THREADS', count)
+        monkeypatch.setattr(blocks, 'THREADS', count)
         films.append(film_um(points, path, model))
     assert films[0].max() > 1.0
     assert np.array_equal(films[0], films[1])

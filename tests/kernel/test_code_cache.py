@@ -48,7 +48,7 @@ LOOK_ON_DISK = """
 import sys
 import numpy as np
 np.__file__ = sys.argv[1]
-from paint_deposition.part.locating import _find
+from paint_deposition.part.face_tree import _find
 from paint_deposition.part.face_tree import box_distance
 
 box_distance(np.zeros(3), np.zeros(11))

@@ -1,10 +1,11 @@
-"""Poses brought to the part: the transform itself, and that it is a rigid one."""
+"""The part in the frame of the poses, also by points that were touched."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
+from paint_deposition.errors import RecordingError
+from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose, locate
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -60,3 +61,68 @@ def test_frames_are_the_same_with_or_without_a_slash():
     assert is_frame('part', '/part')
     assert is_frame('', 'part')
     assert not is_frame('base_link', 'part')
+
+
+POSE = Rigid.of([2.1, -0.4, 0.9, *Rotation.from_euler('ZYX', [1.9, 0.3, -0.2]).as_quat()])
+POINTS = {
+    'P1': np.array([0.0, 0.0, 0.0]), 'P2': np.array([1.1, 0.0, 0.02]),
+    'P3': np.array([1.05, 0.1, 0.7]), 'P4': np.array([0.1, 0.08, 0.65]),
+    'P5': np.array([0.5, -0.05, 0.3]),
+}  # fmt: skip
+
+
+def touched(noise_m: float = 0.0, *names: str) -> dict[str, np.ndarray]:
+    rng = np.random.default_rng(2)
+    at = {name: POINTS[name] for name in names or POINTS}
+    moved = POSE.applied(np.array(list(at.values())), np.tile([0.0, 0, 0, 1], (len(at), 1)))[0]
+    return dict(zip(at, moved + noise_m * rng.normal(size=moved.shape), strict=True))
+
+
+def apart(pose: Rigid) -> tuple[float, float]:
+    """How far from where the part stands [m, rad]."""
+    off = POSE.inverse() @ pose
+    turned = Rotation.from_quat(off.quaternion_xyzw).magnitude()
+    return float(np.linalg.norm(off.translation_m)), float(turned)
+
+
+@pytest.mark.parametrize('names', [(), ('P1', 'P2', 'P4')])
+def test_exact_points_give_the_pose(names):
+    place = locate(touched(0.0, *names), POINTS)
+    assert max(apart(place.pose)) < 1e-12
+    assert place.rms_m < 1e-12
+    assert list(place.residuals_m) == list(names or POINTS)
+    assert place.warnings == ()
+
+
+def test_noise_of_a_probe_shows_in_the_residuals():
+    """0.3 mm on each axis: about 0.3 mm times the root of 3, less what the fit takes."""
+    place = locate(touched(0.3e-3), POINTS)
+    assert apart(place.pose)[0] < 1e-3
+    assert 0.2e-3 < place.rms_m < 0.6e-3
+    assert place.rms_m**2 == pytest.approx(np.mean(np.square([*place.residuals_m.values()])))
+    assert place.warnings == ()
+
+
+@pytest.mark.parametrize(
+    'spoilt',
+    [
+        lambda name, at: at + np.array([0.0, 0.03 * (name == 'P3'), 0.0]),
+        lambda name, at: at * [1.0, -1.0, 1.0],
+        lambda name, at: 1000.0 * at,
+    ],
+)
+def test_points_that_do_not_fit_are_warned_of(spoilt):
+    """A point off by 30 mm, a mirrored frame, millimetres among metres."""
+    points = {name: spoilt(name, at) for name, at in touched(0.1e-3).items()}
+    place = locate(points, POINTS)
+    (warning,) = place.warnings
+    worst = max(place.residuals_m, key=place.residuals_m.get)
+    assert warning.startswith(f'the points do not fit, {worst} is off by')
+
+
+def test_points_that_fix_no_pose_are_refused():
+    with pytest.raises(RecordingError, match='2 points in common'):
+        locate({'P1': POINTS['P1'], 'P2': POINTS['P2'], 'Q': POINTS['P3']}, POINTS)
+    line = {f'L{k}': np.array([0.3 * k, 0.1 * k, 0.001 * (k == 1)]) for k in range(4)}
+    with pytest.raises(RecordingError, match='lie on a line'):
+        locate(line, line)

@@ -13,7 +13,7 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.regions import radius_of_readings_m

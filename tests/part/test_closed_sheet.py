@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from paint_deposition.part.facing import toward_the_gun
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, toward_the_gun
 from surfaces import hemmed, solid, triangulated
 
 pytestmark = pytest.mark.slow

@@ -13,7 +13,7 @@ from pydantic import BaseModel
 from generated.markdown import table
 from paint_deposition.batch.sweep_file import Passes, Sample, SweepFile
 from paint_deposition.files import campaign_coats, campaign_file, model_file
-from paint_deposition.files.motion_source import MotionSource, OnePart
+from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.files.tables.gauge_formats import (
     ALIASES,
     FOLDERS,
@@ -24,6 +24,7 @@ from paint_deposition.files.tables.gauge_formats import (
 )
 from paint_deposition.files.zones_file import ZoneEntry
 from paint_deposition.model.eq1_pattern import PlanarPattern, SetPoints
+from paint_deposition.request import OnePart
 
 MOTION = set(MotionSource.model_fields)
 PART = set(OnePart.model_fields)

@@ -1,4 +1,4 @@
-"""RAPID programs: the real one, what programs are made of, and what cannot be followed."""
+"""RAPID programs: what they are made of, their motion, and what cannot be followed."""
 
 from dataclasses import replace
 
@@ -7,7 +7,13 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import PlanError, RecordingError
-from paint_deposition.files.rapid.program import RapidProgram, module_text, read_program
+from paint_deposition.files.rapid.program import (
+    RapidProgram,
+    module_text,
+    program_trajectory,
+    read_program,
+)
+from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import GunSwitch, Move
 
 AXES = '[0,0,0,0],[9E9,9E9,9E9,9E9,9E9,9E9]'
@@ -289,3 +295,83 @@ AT_W = f'MoveL {target(0)},v100,z10,tool0\\WObj:=w;'
 )  # fmt: skip
 def test_values_of_the_wrong_shape_are_refused_in_a_line(read, body, data, message):
     assert message in refusal(read, body, data)
+
+
+def down(x, y=0.0, wxyz='0,1,0,0') -> str:
+    return target(x, y, 250.0, wxyz)
+
+
+@pytest.fixture
+def motion(read):
+    """`motion(body)`: the trajectory of a module with this `main`."""
+    return lambda body: program_trajectory(read(body))
+
+
+def at(trajectory, time_s):
+    """Place at a time after the start."""
+    times_s = (trajectory.stamps_ns - trajectory.stamps_ns[0]) * 1e-9
+    return [np.interp(time_s, times_s, trajectory.positions_m[:, k]) for k in range(3)]
+
+
+def test_speeds_are_the_programmed_ones(motion):
+    trajectory = motion(
+        f'MoveJ {down(0)},v1000,fine,tool0;'
+        f'MoveL {down(300)},v500,z10,tool0;'
+        f'MoveL {down(300, 200)},v100,fine,tool0;'
+    )
+    assert trajectory.duration_s == pytest.approx(0.6 + 2.0, abs=1e-9)
+    np.testing.assert_allclose(at(trajectory, 0.3), [0.15, 0.0, 0.25], atol=1e-9)
+    np.testing.assert_allclose(at(trajectory, 1.6), [0.3, 0.1, 0.25], atol=1e-9)
+    assert 'zones are not followed: corners are sharp' in trajectory.notes
+
+
+def test_a_program_without_a_gun_sprays_all_the_way_and_says_so(motion, shared_data):
+    program = read_program(shared_data / 'rapid/ECL_Grey_T_ROB1.mod')
+    trajectory = program_trajectory(program)
+    legs = np.diff([move.position_m for move in program.moves], axis=0)
+    expected_s = np.linalg.norm(legs, axis=1).sum() / 0.1
+    path, counts = spray_path(trajectory)
+    assert path.spraying_time_s == pytest.approx(expected_s, rel=1e-9)
+    assert counts.rejected == counts.gaps == 0
+    assert (
+        'nothing in the program switches the gun: it is taken as spraying throughout'
+        in trajectory.notes
+    )
+    assert 'joint moves are taken as straight' in trajectory.notes
+
+
+@pytest.mark.parametrize('sweep_deg', [30.0, 180.0, 300.0])
+def test_circular_moves_are_arcs(motion, sweep_deg):
+    middle, end = np.radians([0.4 * sweep_deg, sweep_deg])
+    via, last = ((200 * np.cos(a), 200 * np.sin(a)) for a in (middle, end))
+    trajectory = motion(
+        f'MoveL {down(200)},v100,fine,tool0;'
+        f'MoveC {down(*np.round(via, 9))},{down(*np.round(last, 9))},v100,fine,tool0;'
+    )
+    radius_m = np.linalg.norm(trajectory.positions_m[:, :2], axis=1)
+    np.testing.assert_allclose(radius_m, 0.2, atol=1e-9)
+    assert trajectory.duration_s == pytest.approx(0.2 * end / 0.1, abs=1e-6)
+
+
+def test_a_tool_that_only_turns_takes_its_time(motion):
+    w, x, y, z = Rotation.from_euler('z', 90.0, degrees=True).as_quat()[[3, 0, 1, 2]]
+    trajectory = motion(
+        f'MoveL {down(0, wxyz="1,0,0,0")},v500,fine,tool0;'
+        f'MoveL {down(0, wxyz=f"{w},{x},{y},{z}")},v500,fine,tool0;'
+    )
+    assert trajectory.duration_s == pytest.approx(90.0 / 500.0, abs=1e-6)
+    assert np.all(np.ptp(trajectory.positions_m, axis=0) == 0.0)
+
+
+@pytest.mark.parametrize(
+    ('end', 'speed', 'words'),
+    [
+        ('', '', 'a single move'),
+        (down(1), '[0,500,0,0]', 'speed 0 m/s'),
+        (down('1e12'), 'v100', r'line 5: a move of 1e\+09 m at 0.1 m/s takes .* h'),
+    ],
+)
+def test_what_is_no_motion_is_refused(motion, end, speed, words):
+    second = f'MoveL {end},{speed},fine,tool0;' if end else ''
+    with pytest.raises(RecordingError, match=words):
+        motion(f'MoveL {down(0)},v500,fine,tool0;\n{second}')

@@ -16,7 +16,7 @@ from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import standard
+from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
 

@@ -1,4 +1,4 @@
-"""The layout of a run on disk, and what a killed process or a full disk leaves of it."""
+"""Runs in the MCAP layout of rosbag2, and the definitions of their messages."""
 
 import os
 import signal
@@ -7,13 +7,15 @@ import sys
 
 import pytest
 import yaml
-from mcap.records import Channel, Header, Metadata, Statistics
+from mcap.records import Channel, Header, Metadata, Schema, Statistics
 from mcap.stream_reader import StreamReader
 from rosbags.rosbag2 import Reader
 
+from paint_deposition.errors import RecordingError
+from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import standard
+from paint_deposition.files.recordings.messages import standard
 
 BOOL = 'std_msgs/msg/Bool'
 TRUE_CDR, FALSE_CDR = b'\0\1\0\0\1', b'\0\1\0\0\0'
@@ -164,3 +166,36 @@ def test_the_first_refused_write_is_the_last(tmp_path, repository):
     recovery = recover(run, tmp_path / 'recovered')
     # What the failing chunk held is lost: 64 KiB of messages of 36 bytes.
     assert 0 <= int(number) - recovery.message_count <= 64 * 1024 / 36 + 1
+
+
+def test_text_is_what_rosbag2_wrote(shared_data):
+    """rosbag2's own recorder made this file; its texts have not changed since."""
+    pytest.importorskip('rcl_interfaces')
+    with (shared_data / 'bags/rosbag2_topics_and_services.mcap').open('rb') as stream:
+        schemas = {r.name: r for r in StreamReader(stream).records if isinstance(r, Schema)}
+    for name in ('rcl_interfaces/msg/ParameterEvent', 'rcl_interfaces/msg/Log'):
+        assert definitions.installed(name).text.encode() == schemas[name].data
+
+
+@pytest.mark.parametrize(
+    'name', ['geometry_msgs/msg/PoseStamped', 'std_msgs/msg/Bool', 'sensor_msgs/msg/PointCloud2']
+)
+def test_standard_and_installed_types_have_one_hash(name):
+    pytest.importorskip('rclpy')
+    assert definitions.standard(name).type_hash == definitions.installed(name).type_hash
+    assert definitions.standard(name).type_hash.startswith('RIHS01_')
+
+
+def test_own_messages_bring_all_they_use():
+    pytest.importorskip('paint_msgs')
+    text = definitions.installed('paint_msgs/msg/ComparisonStats').text
+    for used in ('std_msgs/Header', 'builtin_interfaces/Time', 'geometry_msgs/Point'):
+        assert text.count(f'{definitions.SEPARATOR}\nMSG: {used}\n') == 1
+
+
+def test_a_type_that_is_not_installed_is_named():
+    pytest.importorskip('ament_index_python')
+    with pytest.raises(RecordingError, match='no_msgs/msg/Nothing is not installed'):
+        definitions.installed('no_msgs/msg/Nothing')
+    with pytest.raises(RecordingError, match='std_msgs/msg/Nothing is not installed'):
+        definitions.installed('std_msgs/msg/Nothing')

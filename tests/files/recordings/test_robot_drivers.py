@@ -9,7 +9,7 @@ import pytest
 from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.recordings.bag_summary import summarise
+from paint_deposition.files.recordings.pose_topics import summarise
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import JOINTS, sweep, tip_poses, urdf

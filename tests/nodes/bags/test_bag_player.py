@@ -12,7 +12,7 @@ from nodes.processes import NodeProcess
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.messages import stamp_ns
 from robot_arm import JOINTS, sweep, urdf
 
 

@@ -21,7 +21,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.painting.film_display import ACKNOWLEDGE_TIMEOUT_S
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.topics import header_stamp_ns
-from paint_deposition.part.facing import toward_the_gun
+from paint_deposition.part.surface import toward_the_gun
 
 MOTION = two_passes()
 STREAM = """

@@ -13,8 +13,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import PaintError
 from paint_deposition.files.model_file import write_model
-from paint_deposition.files.motion_files import read_gun_motions
-from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.motion_files import MotionSource, read_gun_motions
 from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.nodes.runtime import topics
 

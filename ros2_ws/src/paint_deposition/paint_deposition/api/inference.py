@@ -9,8 +9,7 @@ from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS, effect_class, load_unnamed_effect_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.files.model_file import read_model, read_model_file
-from paint_deposition.files.model_text import require_file
+from paint_deposition.files.model_file import read_model, read_model_file, require_file
 from paint_deposition.film.live_film import without_refused_states
 from paint_deposition.inference.comparison.comparison import Comparison, SideBySide
 from paint_deposition.inference.comparison.comparison import compare as compared

@@ -21,9 +21,8 @@ from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.motion.interruptions import checked_path
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, PoseCounts, Trajectory
-from paint_deposition.part.facing import toward_the_guns
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, toward_the_guns
 from paint_deposition.part.zones import Zones
 
 Progress = Callable[[str, float], None]

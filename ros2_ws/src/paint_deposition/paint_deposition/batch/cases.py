@@ -36,8 +36,6 @@ if TYPE_CHECKING:
 Columns = Mapping[str, Any]
 # How long a scheduler may take to answer, and to have a worker.
 CONNECT_S = 30
-# Inputs that a worker keeps in memory.
-INPUTS_KEPT = 8
 
 
 @dataclass(frozen=True)
@@ -246,7 +244,7 @@ def _run_case(
     return work(pickle.loads(parameters), *map(_deserialised, inputs))
 
 
-@lru_cache(maxsize=INPUTS_KEPT)
+@lru_cache(maxsize=8)  # inputs that a worker keeps in memory
 def _deserialised(content: bytes) -> Any:
     """An input; what it caches, such as a search tree, serves the next case too."""
     return pickle.loads(content)

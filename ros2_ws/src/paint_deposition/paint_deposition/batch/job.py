@@ -9,14 +9,13 @@ from typing import Any
 from paint_deposition.api.planning import plan
 from paint_deposition.api.simulation import simulate
 from paint_deposition.batch.cases import Case, code_digest, digest_of
-from paint_deposition.batch.sweep_file import SweepFile
-from paint_deposition.batch.variations import (
+from paint_deposition.batch.sweep_file import (
     DRAW,
     MOTION_KEYS,
     PASS_KEYS,
+    SweepFile,
     Values,
     effects_of,
-    named_models,
     variations,
     varied_model,
     varied_motion,
@@ -28,8 +27,7 @@ from paint_deposition.errors import BatchError, PaintError
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import ModelFile, read_model_file
-from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import MotionSource
+from paint_deposition.files.motion_files import MotionSource, read_motion
 from paint_deposition.files.provenance import model_digest, sha256
 from paint_deposition.inference.fitting.posterior import draw_models
 from paint_deposition.inference.readings.readings import Readings
@@ -68,22 +66,21 @@ class Job:
             PaintError: a file that cannot be used, or values that do not go together.
         """
         job = Job(file, folder)
-        models = [job._model_file(folder / name).model for name in named_models(file)]
+        varied = [*file.grid.get('model', ()), *(case.get('model') for case in file.cases)]
+        named = [n for n in dict.fromkeys((file.model, *varied)) if isinstance(n, str)]
+        models = [job._model_file(folder / name).model for name in named]
         job.effects = effects_of(models)
         job.values = variations(file, models)
         for number, values in enumerate(job.values):
             if number % 100 == 0:
                 progress(f'preparing case {number + 1} of {len(job.values)}')
-            job.cases.append(job._case(values))
+            inputs = job._inputs(values)
+            options = job._options(values, planned=inputs[1] == NOTHING)
+            model = job._model(values)
+            own = [effect.file_content.decode() for effect in model.effects]
+            digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
+            job.cases.append(Case(digest, {'model': model, **options}, inputs))
         return job
-
-    def _case(self, values: Values) -> Case:
-        inputs = self._inputs(values)
-        options = self._options(values, planned=inputs[1] == NOTHING)
-        model = self._model(values)
-        own = [effect.file_content.decode() for effect in model.effects]
-        digest = digest_of(code_digest(), model_digest(model), own, options, inputs)
-        return Case(digest, {'model': model, **options}, inputs)
 
     def _named(self, key: str, values: Values) -> Path | None:
         name = values.get(key, getattr(self.file, key))

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import Executor
 from contextlib import nullcontext
 from dataclasses import dataclass
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,10 +16,9 @@ from matplotlib.axes import Axes
 
 from paint_deposition.batch.cases import compute, workers
 from paint_deposition.batch.job import PREDICTED, WARNINGS, Job, computed
-from paint_deposition.batch.sweep_file import read_sweep
-from paint_deposition.batch.variations import DRAW
+from paint_deposition.batch.sweep_file import DRAW, read_sweep
 from paint_deposition.errors import BatchError
-from paint_deposition.files.atomic import require_pyarrow, write_json, write_parquet
+from paint_deposition.files.atomic import write_json, write_parquet
 from paint_deposition.files.provenance import origin
 from paint_deposition.report.style import ACCENT, INK, new_figure, quiet, save_picture
 from paint_deposition.report.writers.write import written
@@ -27,16 +27,10 @@ if TYPE_CHECKING:
     import pyarrow as pa
     from distributed import Client
 
-# With no more values than this a line is drawn through their medians.
-FEW_VALUES = 12
-MOST_COLUMNS = 6
-# Narrowest range of a chart, as a share of its values.
-LEAST_SPAN = 0.01
 # Shown for a case that leaves a value, or all of them, as in the sweep's file.
 UNCHANGED = 'unchanged'
-# The figure by which cases are ranked, less being better; all charted figures with their labels.
+# The figure by which cases are ranked, less being better, and its label.
 SCORE, LABEL = 'sigma_n', 'unevenness σ_N'
-CHARTED = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
 
 
 def sweep(
@@ -66,7 +60,8 @@ def sweep(
         PaintError: a file that cannot be used, values that do not go together, or no case has a
             result.
     """
-    require_pyarrow('a sweep')
+    if find_spec('pyarrow') is None:
+        raise BatchError('a sweep needs pyarrow, which is not installed; run: pip install pyarrow')
     import pyarrow as pa
 
     path = Path(path)
@@ -78,7 +73,11 @@ def sweep(
     )
     columns: dict[str, Any] = {'case': pa.array(range(1, len(job.cases) + 1))}
     for name in dict.fromkeys(name for values in job.values for name in values):
-        columns[name] = _column([values.get(name) for values in job.values])
+        column = [values.get(name) for values in job.values]
+        if any(isinstance(value, list) for value in column):  # numbers and texts as they are
+            column = [None if value is None else json.dumps(value) for value in column]
+        real = any(isinstance(value, float) for value in column)
+        columns[name] = pa.array(column, pa.float64() if real else None)
     columns |= {name: figures[name] for name in figures.column_names}
     if 'error' not in columns:
         columns['error'] = pa.nulls(len(job.cases), pa.string())
@@ -111,7 +110,8 @@ class Sweep:
     @property
     def drawn(self) -> dict[str, str]:
         """The figures that some case has, with their labels."""
-        return {n: label for n, label in CHARTED.items() if n in self.table.column_names}
+        charted = {SCORE: LABEL, 'mean_um': 'mean film [µm]'}
+        return {n: label for n, label in charted.items() if n in self.table.column_names}
 
     @property
     def varied(self) -> tuple[str, ...]:
@@ -210,15 +210,6 @@ def _points(sweep: Sweep) -> pa.Table:
     return pa.Table.from_pylist(rows)
 
 
-def _column(values: Sequence[Any]) -> pa.Array:
-    """Numbers and texts as they are, lists as JSON."""
-    import pyarrow as pa
-
-    if any(isinstance(value, list) for value in values):
-        return pa.array([None if value is None else json.dumps(value) for value in values])
-    return pa.array(values, pa.float64() if any(isinstance(v, float) for v in values) else None)
-
-
 def _axis_values(sweep: Sweep, name: str) -> np.ndarray:
     """(n,) numbers that varied, or texts: what files are called, which effects act."""
     default = getattr(sweep.job.file, name, None)
@@ -238,7 +229,7 @@ def _write_picture(
     path: Path, varied: Mapping[str, np.ndarray], results: Mapping[str, np.ndarray], title: str
 ) -> Path:
     """Draw each result (n,), a row of charts, over each number or text that varied, a column."""
-    names = list(varied)[:MOST_COLUMNS]
+    names = list(varied)[:6]  # that fit side by side
     figure = new_figure(max(5.5, 3.4 * len(names)), 2.9 * len(results) + 0.4)
     charts = figure.subplots(len(results), len(names), squeeze=False, sharex='col', sharey='row')
     for axes, name in zip(charts[-1], names, strict=True):
@@ -259,10 +250,11 @@ def _draw(axes: Axes, values: np.ndarray, result: np.ndarray, in_order: bool) ->
     values, result = values[there], result[there]
     axes.scatter(values, result, s=14, color=ACCENT, alpha=0.55, linewidths=0)
     places = np.unique(values)
-    if in_order and not is_text and 1 < len(places) <= FEW_VALUES and len(values) > len(places):
+    # A line through the medians of few values.
+    if in_order and not is_text and 1 < len(places) <= 12 and len(values) > len(places):
         medians = [np.median(result[values == place]) for place in places]
         axes.plot(places, medians, color=ACCENT, linewidth=1.4)
     # Rounding alone is no result: the chart does not magnify it.
-    middle, span = np.median(result), LEAST_SPAN * np.abs(np.median(result))
+    middle, span = np.median(result), 0.01 * np.abs(np.median(result))
     if np.ptp(result) < span:
         axes.set_ylim(middle - span, middle + span)

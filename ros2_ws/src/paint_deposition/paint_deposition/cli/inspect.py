@@ -18,7 +18,7 @@ from paint_deposition.files.provenance import origin
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.bag_files import BagTopic
-    from paint_deposition.files.recordings.bag_summary import PoseSource
+    from paint_deposition.files.recordings.pose_topics import PoseSource
     from paint_deposition.motion.stream_quality import StreamQuality
 
 # Figures, and the same in words.
@@ -80,12 +80,11 @@ def _contents(
 ) -> Contents:
     """What a module, table, mesh or bag holds."""
     from paint_deposition.errors import RecordingError
-    from paint_deposition.files.mesh_bodies import SUFFIXES
-    from paint_deposition.files.motion_files import read_table
-    from paint_deposition.files.motion_source import MotionSource
+    from paint_deposition.files.meshes import SUFFIXES
+    from paint_deposition.files.motion_files import MotionSource, read_table
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
-    from paint_deposition.files.recordings.bag_summary import summarise
-    from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+    from paint_deposition.files.recordings.messages import STATE_TYPE
+    from paint_deposition.files.recordings.pose_topics import summarise
     from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
     from paint_deposition.files.tables.readings import holds_readings
@@ -124,8 +123,7 @@ def _mesh_contents(path: Path) -> Contents:
     """A mesh: its size in the unit that it has, or seems to have, and its bodies."""
     import numpy as np
 
-    from paint_deposition.files.mesh_bodies import WITH_UNIT, read_bodies
-    from paint_deposition.files.meshes import LARGEST_M
+    from paint_deposition.files.meshes import LARGEST_M, WITH_UNIT, read_bodies
 
     ((vertices, faces), *_), scale, unit = read_bodies(path), 1.0, ''
     if path.suffix.lower() not in WITH_UNIT:
@@ -218,7 +216,7 @@ def _box(points_m: Any) -> tuple[dict[str, list[float]], str]:
 def _bag_lines(
     path: Path, topics: list[BagTopic], sources: list[PoseSource], triggers: list[str]
 ) -> list[str]:
-    from paint_deposition.files.recordings.message_definitions import JOINT_TYPE, TF_TYPES
+    from paint_deposition.files.recordings.messages import JOINT_TYPE, TF_TYPES
 
     width = max((len(topic.name) for topic in topics), default=0)
     lines = [str(path), *(f'  {t.name:{width}}  {t.message_count:8d}  {t.type}' for t in topics)]

@@ -14,13 +14,12 @@ from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 import click
-from filelock import FileLock
 from tqdm import tqdm
 
 import paint_deposition as pd
 from paint_deposition.cli.options import FOLDER, JSON, Decorator, option_group
 from paint_deposition.errors import PaintError
-from paint_deposition.files.atomic import write_text
+from paint_deposition.files.atomic import locked, write_text
 
 if TYPE_CHECKING:
     from paint_deposition.film.statistics import FilmStatistics
@@ -175,7 +174,7 @@ def results_in(folder: Path) -> Iterator[Path]:
     folder = folder.resolve()
     # The temporary folder of this machine: a lock beside the results would stay there.
     key = hashlib.sha256(f'{Path.home()} {folder}'.encode()).hexdigest()[:16]
-    with FileLock(Path(tempfile.gettempdir()) / f'paint-{key}.lock'):
+    with locked(Path(tempfile.gettempdir()) / f'paint-{key}.lock'):
         place = _Place(folder)
         place.put_right()
         made = [parent for parent in folder.parents if not parent.exists()]

@@ -100,8 +100,7 @@ def _replay(
 ) -> Replay:  # fmt: skip
     show('loading')
     from paint_deposition.api.replaying import Replay
-    from paint_deposition.files.motion_files import read_gun_motions
-    from paint_deposition.files.motion_source import MotionSource
+    from paint_deposition.files.motion_files import MotionSource, read_gun_motions
     from paint_deposition.files.recordings.bag_files import custom_data, open_bag
     from paint_deposition.files.recordings.bags import STATE_TOPIC
     from paint_deposition.request import validate

@@ -80,8 +80,7 @@ def simulate_command(
         raise click.UsageError('--wet-on-wet has no --coat; name the coats, one for each motion')
     with Progress('simulate') as show:
         show('loading')
-        from paint_deposition.files.motion_files import read_gun_motions
-        from paint_deposition.files.motion_source import MotionSource
+        from paint_deposition.files.motion_files import MotionSource, read_gun_motions
         from paint_deposition.request import validate
 
         show('reading')

@@ -36,18 +36,14 @@ FAMILIES = (
 )  # fmt: skip
 
 
-def _of_the_library(name: str) -> type[Effect]:
-    module = importlib.import_module(f'{library.__name__}.{name}')
-    (effect,) = (c for c in Effect.__subclasses__() if c.__module__ == module.__name__)
-    return effect
-
-
 # Effect classes by id, family by family: one a file of the library.
+for module in pkgutil.iter_modules(library.__path__, f'{library.__name__}.'):
+    importlib.import_module(module.name)
 EFFECTS: Mapping[str, type[Effect]] = MappingProxyType(
     {
         effect.id: effect
         for effect in sorted(
-            (_of_the_library(module.name) for module in pkgutil.iter_modules(library.__path__)),
+            (c for c in Effect.__subclasses__() if c.__module__.startswith(library.__name__)),
             key=lambda effect: (FAMILIES.index(effect.family), effect.id),
         )
     }
@@ -142,8 +138,24 @@ def effect_of(path: Path, source: bytes) -> type[Effect]:
     """``read_effect_file`` for the content of a file, wherever it may be."""
     key = (path.resolve(), hashlib.sha256(source).hexdigest())
     if key not in _loaded:
-        _loaded[key] = _checked(_run(path, source, key[1]), path)
-        _loaded[key].file, _loaded[key].file_content = key[0], source
+        module = _run(path, source, key[1])
+        classes = [
+            value
+            for value in vars(module).values()
+            if inspect.isclass(value)
+            and issubclass(value, Effect)
+            and value.__module__ == module.__name__
+        ]
+        if len(classes) > 1:
+            names = ', '.join(c.__name__ for c in classes)
+            raise ModelError(f'{path}: has several effects ({names}); keep one a file')
+        if not classes:
+            raise ModelError(f'{path}: has no effect; define one class that derives from Effect')
+        (effect,) = classes
+        if problem := _problem_with(effect):
+            raise ModelError(f'{path}: {effect.__name__} {problem}')
+        effect.file, effect.file_content = key[0], source
+        _loaded[key] = effect
     effect = _loaded[key]
     if effect.id in EFFECTS:
         raise ModelError(
@@ -192,25 +204,6 @@ def _one_line(error: BaseException) -> str:
     lines = [line.strip() for line in text.splitlines() if line.strip()]
     telling = [line for line in lines if not line.startswith('Failed in ')]
     return (telling or lines or [type(error).__name__])[0]
-
-
-def _checked(module: ModuleType, path: Path) -> type[Effect]:
-    classes = [
-        value
-        for value in vars(module).values()
-        if inspect.isclass(value)
-        and issubclass(value, Effect)
-        and value.__module__ == module.__name__
-    ]
-    if len(classes) != 1:
-        names = ', '.join(c.__name__ for c in classes)
-        what = f'has several effects ({names}); keep one a file' if classes else (
-            'has no effect; define one class that derives from Effect')  # fmt: skip
-        raise ModelError(f'{path}: {what}')
-    (effect,) = classes
-    if problem := _problem_with(effect):
-        raise ModelError(f'{path}: {effect.__name__} {problem}')
-    return effect
 
 
 def _problem_with(effect: type[Effect]) -> str | None:

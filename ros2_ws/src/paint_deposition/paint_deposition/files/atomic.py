@@ -6,18 +6,18 @@ Texts, JSON that every reader takes (no NaN), Parquet tables, and texts by a tem
 from __future__ import annotations
 
 import os
+import sys
 import zipfile
 import zlib
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from pydantic_core import to_json, to_jsonable_python
 
-from paint_deposition.errors import BatchError, PaintError
+from paint_deposition.errors import PaintError
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -85,6 +85,29 @@ def replacing(path: str | Path) -> Iterator[Path]:
         temporary.unlink(missing_ok=True)
 
 
+@contextmanager
+def locked(lock: Path) -> Iterator[None]:
+    """Wait until no other process holds the lock of this path; its file goes with the lock."""
+    if sys.platform == 'win32':
+        from filelock import FileLock  # there it removes its file itself
+
+        with FileLock(lock):
+            yield
+        return
+    import fcntl
+
+    while True:
+        with open(lock, 'a', opener=lambda f, how: os.open(f, how | os.O_NOFOLLOW, 0o600)) as file:
+            fcntl.flock(file, fcntl.LOCK_EX)
+            if not os.fstat(file.fileno()).st_nlink:  # its last holder has removed it meanwhile
+                continue
+            try:
+                yield
+            finally:
+                lock.unlink(missing_ok=True)  # while it is held: who waits for it makes another
+            return
+
+
 def write_text(path: str | Path, text: str) -> None:
     """Write a text file, replacing an older one at once."""
     with replacing(path) as temporary:
@@ -110,12 +133,6 @@ def filled(template: Path, **values: Any) -> str:
         keep_trailing_newline=True,
     )  # fmt: skip
     return made.render(values)
-
-
-def require_pyarrow(what: str) -> None:
-    """Refuse to begin what needs the library of the extra, where it is not installed."""
-    if find_spec('pyarrow') is None:
-        raise BatchError(f'{what} needs pyarrow, which is not installed; run: pip install pyarrow')
 
 
 def write_parquet(path: Path, table: pa.Table) -> Path:

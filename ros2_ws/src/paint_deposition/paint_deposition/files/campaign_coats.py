@@ -9,16 +9,14 @@ import numpy as np
 from pydantic import BeforeValidator, Field
 
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.motion_source import MotionSource, Number, Text
+from paint_deposition.files.motion_files import MotionSource
 from paint_deposition.film.common_film import TOTAL, Coats, WetFilms
 from paint_deposition.inference.readings.readings import Readings
 from paint_deposition.model.eq1_pattern import MOST, listed
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.trajectory import ONLY_BRUSH
-from paint_deposition.request import validate
+from paint_deposition.request import Number, Text, validate
 
-# Teeth of a comb for wet film stand in steps of 5 um or more; so few may be so by chance.
-TOOTH_UM, FEWEST_TEETH = 5.0, 3
 # A name or number, read as text.
 Name = Annotated[str, BeforeValidator(str)]
 
@@ -146,7 +144,8 @@ def dried(readings: Readings, share: float) -> Readings:
     """
     wet_um, sigma_um, words = readings.thickness_um, readings.sigma_um, ''
     teeth = np.unique(wet_um)
-    is_comb = len(teeth) >= FEWEST_TEETH and not np.any(teeth % TOOTH_UM)
+    # The teeth stand in steps of 5 um or more; two may do so by chance.
+    is_comb = len(teeth) >= 3 and not np.any(teeth % 5.0)
     if is_comb and np.isnan(sigma_um).all():
         step_um = float(np.diff(teeth).min())
         wet_um, sigma_um = wet_um + 0.5 * step_um, np.full(len(wet_um), step_um / 12**0.5)

@@ -20,7 +20,6 @@ from paint_deposition.files.campaign_coats import (
 from paint_deposition.files.gauge_readings import read_readings
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.motion_files import read_motion
-from paint_deposition.files.motion_source import Number, OnePart, Text
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.files.tables.headings import length_of
 from paint_deposition.files.tables.reading_columns import Layout
@@ -29,8 +28,8 @@ from paint_deposition.film.common_film import TOTAL
 from paint_deposition.film.statistics import require_band
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
 from paint_deposition.motion.interruptions import checked_path
-from paint_deposition.part.facing import toward_the_guns
-from paint_deposition.request import validate
+from paint_deposition.part.surface import toward_the_guns
+from paint_deposition.request import Number, OnePart, Text, validate
 
 Quantity = Literal[
     'x', 'y', 'z', 'from_left', 'height', 'thickness', 'point', 'group', 'session', 'layer',

@@ -1,19 +1,37 @@
 """Part meshes in, and painted meshes out (PLY)."""
 
-from dataclasses import dataclass
+from __future__ import annotations
+
+import importlib.util
+import zipfile
+from io import BytesIO
 from itertools import repeat
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paint_deposition.errors import MeshError
-from paint_deposition.files.atomic import replacing
-from paint_deposition.files.mesh_bodies import SUFFIXES, read_bodies
+from paint_deposition.errors import MeshError, did_you_mean, some
+from paint_deposition.files.atomic import replacing, require_file, require_small_package
 from paint_deposition.part.edges import Edges, weld
 from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_areas_m2, longest_edges_m
 from paint_deposition.part.surface import Surface
 
+if TYPE_CHECKING:
+    from trimesh import Scene
+
+# Suffixes by kind. Of those in the second row the unit is known.
+PLAIN = ('.stl', '.ply', '.obj')
+WITH_UNIT = ('.gltf', '.glb', '.3mf', '.step', '.stp')
+SUFFIXES = (*PLAIN, *WITH_UNIT)
+METRES = {'micron': 1e-6, 'millimeter': 1e-3, 'centimeter': 1e-2, 'inch': 0.0254, 'foot': 0.3048}
+STEP_READER = 'cascadio'
+# A binary STL: 80 bytes of anything, the number of triangles, and each with its normal.
+STL_HEAD = 84
+STL_TRIANGLE = np.dtype([('normal', '<f4', 3), ('corners', '<f4', (3, 3)), ('colour', '<u2')])
+# Vertices (V, 3) in the file's own unit and precision, and faces (F, 3).
+Body = tuple[np.ndarray, np.ndarray]
 LARGEST_M = 50.0
 # Types of a PLY, little-endian.
 PLY = {'float': '<f4', 'uchar': 'u1', 'int': '<i4'}
@@ -47,24 +65,18 @@ def read_mesh(
     if down is not None and not (np.isfinite(down).all() and np.any(down)):
         given = np.asarray(down, dtype=float).tolist()
         raise MeshError(f'down = {given}; give the direction of gravity, [0, 0, -1] usually')
-    read = read_triangles(path, scale, body)
-    return Surface.from_triangles(
-        read.vertices_m, read.faces, max_edge_length_m, down, tuple(read.notes)
-    )
+    vertices_m, faces, _, notes = read_triangles(path, scale, body)
+    return Surface.from_triangles(vertices_m, faces, max_edge_length_m, down, tuple(notes))
 
 
-@dataclass(frozen=True)
-class Triangles:
-    """The triangles of a file, ready to be refined."""
+def read_triangles(
+    path: str | Path, scale: float = 1.0, body: str | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[str]]:
+    """Read the triangles of a part, all of one winding where they join; see ``read_mesh``.
 
-    vertices_m: np.ndarray  # (V, 3) [m]
-    faces: np.ndarray  # (F, 3) wound alike
-    rows: np.ndarray  # (F,) number of each in the file, or in the body taken of it, from 0
-    notes: list[str]  # what was put right, for the user
-
-
-def read_triangles(path: str | Path, scale: float = 1.0, body: str | None = None) -> Triangles:
-    """Read the triangles of a part, all of one winding where they join; see ``read_mesh``."""
+    They are vertices (V, 3) [m], faces (F, 3), the number (F,) of each in the file or in the body
+    taken of it, from 0, and what was put right, for the user.
+    """
     path = Path(path)
     meaning = 'metres per unit of the file, 0.001 for millimetres'
     _require_above_zero('mesh_scale', scale, meaning)
@@ -76,19 +88,202 @@ def read_triangles(path: str | Path, scale: float = 1.0, body: str | None = None
     if not path.exists() or path.is_dir():
         raise MeshError(f'{path}: no such mesh file; check the path')
     (vertices, faces), unit_m, notes = read_bodies(path, body)
-    _require_whole(path, vertices, faces)
+    if not len(faces):
+        raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise MeshError(
+            f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
+            'export it again'
+        )
+    if not np.isfinite(vertices).all():
+        wrong = np.sum(~np.isfinite(vertices).all(axis=1))
+        raise MeshError(
+            f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
+        )
     if unit_m * scale != 1.0:
         vertices = vertices.astype(np.float64) * (unit_m * scale)
     _check_extent(path, vertices, faces)
     vertices, faces = weld(vertices, faces)
-    rows = np.flatnonzero(_with_area(path, vertices, faces, notes))
+    # Triangles lower than this have no direction that could be trusted.
+    heights_wanted = 1e-7 * longest_edges_m(vertices, faces)
+    rows = np.flatnonzero(2.0 * face_areas_m2(vertices, faces) > heights_wanted)
+    if not len(rows):
+        raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
+    if left_out := len(faces) - len(rows):
+        notes.append(f'{left_out} of {len(faces)} triangles without area were left out')
     faces = faces[rows] if len(rows) < len(faces) else faces
-    return Triangles(vertices, _oriented(vertices, faces, notes), rows, notes)
+    return vertices, _oriented(vertices, faces, notes), rows, notes
 
 
 def _require_above_zero(name: str, value: float, meaning: str) -> None:
     if not (np.isfinite(value) and value > 0.0):
         raise MeshError(f'{name} = {value:g}; give a number above 0: {meaning}')
+
+
+def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
+    used = np.zeros(len(vertices_m), dtype=bool)
+    used[faces] = True
+    corners_m = vertices_m if used.all() else vertices_m[used]
+    extent = float(box_extent_m(corners_m).max())
+    if not 0.005 <= extent <= LARGEST_M:
+        found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
+        remedy = '--mesh-scale, or mesh_scale'
+        if extent > LARGEST_M:
+            found = f'{extent:.4g} m large, it looks like millimetres; use '
+            remedy = '--mesh-scale 0.001, or mesh_scale: 0.001'
+        raise MeshError(
+            f"{path}: the part would be {found}{remedy} in a campaign or as the node's parameter"
+        )
+
+
+def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:
+    """Each connected surface wound alike, as most of its area was; a closed body outward."""
+    edges = Edges.of(faces)
+    if len(edges.clashing):
+        from trimesh import Trimesh
+        from trimesh.graph import connected_component_labels
+        from trimesh.repair import fix_winding
+
+        mesh = Trimesh(vertices_m, faces, process=False, validate=False)
+        fix_winding(mesh)
+        turned = (np.asarray(mesh.faces) != faces).any(axis=1)
+        pairs = np.concatenate([edges.paired, edges.clashing]) // 3
+        sheet = connected_component_labels(pairs, len(faces))
+        areas = face_areas_m2(vertices_m, faces)
+        turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
+        turned ^= (turned_share > 0.5)[sheet]
+        notes.append(f'{turned.sum()} triangles wound against their neighbours were turned round')
+        faces = np.where(turned[:, None], faces[:, ::-1], faces)
+        edges = Edges.of(faces)
+    if not len(edges.single) and not len(edges.clashing):
+        a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
+        if np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times its volume
+            notes.append('the closed body was inside out and was turned round')
+            faces = faces[:, ::-1]
+    return np.ascontiguousarray(faces)
+
+
+def read_bodies(path: Path, body: str | None = None) -> tuple[Body, float, list[str]]:
+    """All bodies of a file as one mesh, or the one of a name (object, solid, node or part).
+
+    With the metres of its unit, 1 where the file has none, and what was understood, for the user.
+    Raises MeshError, saying what to do, for what is no mesh or has no such body.
+    """
+    require_file(path, MeshError)
+    kind = path.suffix.lower()
+    if kind == '.stl':
+        with path.open('rb') as file:
+            head = file.read(STL_HEAD)
+        count = int.from_bytes(head[80:], 'little')
+        # A complete binary STL; trimesh takes five times the memory of the file.
+        if count and path.stat().st_size == STL_HEAD + STL_TRIANGLE.itemsize * count:
+            if body not in (None, path.stem):
+                raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, [path.stem])}')
+            corners = np.fromfile(path, STL_TRIANGLE, offset=STL_HEAD)['corners']
+            return (corners.reshape(-1, 3), np.arange(3 * count).reshape(-1, 3)), 1.0, []
+    scene = _scene(path, kind)
+    found = _by_name(path, scene)
+    if len(found) == 1 and not {*found} & {body}:  # the only one also has the name of its file
+        found = {path.stem: next(iter(found.values()))}
+    notes, unit_m = [], 1.0
+    if kind in WITH_UNIT:
+        unit_m, unit_words = _unit(path, kind, scene)
+        notes.append(f'{path.name}: {unit_words}')
+    if body is not None:
+        if body not in found:
+            raise MeshError(f'{path} has no body {body!r}; {did_you_mean(body, found)}')
+        if len(found) > 1:
+            notes.append(f'{path.name}: of its {len(found)} bodies {body!r} was taken')
+        found = {body: found[body]}
+    elif len(found) > 1:
+        names = some([*found], 8)
+        notes.append(
+            f'{path.name}: its {len(found)} bodies were taken as one part: {names}; --body NAME '
+            'takes one of them'
+        )
+    bodies = [*found.values()] or [(np.empty((0, 3)), np.empty((0, 3), dtype=np.int64))]
+    first = np.cumsum([0, *(len(vertices) for vertices, _ in bodies)])
+    faces = [faces + start for (_, faces), start in zip(bodies, first, strict=False)]
+    whole = np.concatenate([vertices for vertices, _ in bodies]), np.concatenate(faces)
+    return whole, unit_m, notes
+
+
+def _scene(path: Path, kind: str) -> Scene:
+    import trimesh
+
+    options: dict[str, Any] = {'process': False, 'skip_materials': True}
+    if kind in PLAIN:
+        content = path.read_bytes()
+        if kind == '.stl' and content and b'facet' not in content:
+            raise MeshError(
+                f'{path}: not readable as a mesh, neither a text STL nor, with its {len(content)} '
+                'bytes, a complete binary one; export it again'
+            )
+        if kind != '.ply':  # a text with letters of any encoding
+            content = content.decode('utf-8', errors='replace').encode()
+        options |= {'validate': False, 'split_objects': True} if kind == '.obj' else {}
+        source: Any = BytesIO(content)
+    elif kind == '.glb':
+        # A file would be read for as many bytes at once as its head claims.
+        source = BytesIO(path.read_bytes())
+        options['resolver'] = trimesh.resolvers.FilePathResolver(str(path))
+    else:
+        source = str(path)
+    if kind == '.3mf':
+        try:
+            with zipfile.ZipFile(path) as package:
+                require_small_package(package)
+        except zipfile.BadZipFile as error:
+            raise MeshError(f'{path}: not readable as a mesh ({error}); export it again') from None
+    if kind in ('.step', '.stp'):
+        if importlib.util.find_spec(STEP_READER) is None:
+            raise MeshError(
+                f'{path}: STEP files are read by {STEP_READER}, which is not installed; run: pip '
+                f'install {STEP_READER}, or export the part as one of {", ".join(PLAIN)}'
+            )
+        # How finely its surfaces are cut [mm, rad]: the film is then off by less than 1 % on folds
+        # of 10 mm and more.
+        options |= {'tol_linear': 0.1, 'tol_angular': 0.15}
+    try:
+        return trimesh.load_scene(source, file_type=kind[1:], **options)
+    except Exception as error:  # trimesh's readers raise whatever the broken bytes provoke
+        reason = (str(error).strip() or type(error).__name__).splitlines()[0][:120]
+        raise MeshError(f'{path}: not readable as a mesh ({reason}); export it again') from error
+
+
+def _by_name(path: Path, scene: Scene) -> dict[str, Body]:
+    """Each body with triangles, placed as in the file."""
+    found: dict[str, Body] = {}
+    for node in scene.graph.nodes_geometry:
+        pose, name = scene.graph[node]
+        faces = getattr(scene.geometry[name], 'faces', None)
+        if faces is None or not len(faces):
+            continue
+        vertices: np.ndarray = np.asarray(scene.geometry[name].vertices, dtype=np.float64)
+        if vertices.shape[1:] != (3,):
+            raise MeshError(f'{path}: the vertices of {name!r} have no x, y, z; export it again')
+        faces = np.asarray(faces, dtype=np.int64).reshape(-1, 3)
+        if np.linalg.det(pose[:3, :3]) < 0.0:
+            faces = faces[:, ::-1]
+        if not np.array_equal(pose, np.eye(4)):
+            vertices = vertices @ pose[:3, :3].T + pose[:3, 3]
+        found[str(node)] = vertices, faces
+    return dict(sorted(found.items()))  # the library gives them in any order
+
+
+def _unit(path: Path, kind: str, scene: Scene) -> tuple[float, str]:
+    """Metres to the unit of a file that has one, and how that was understood."""
+    if kind in ('.gltf', '.glb'):
+        return 1.0, 'glTF, in metres by its standard'
+    if kind in ('.step', '.stp'):
+        return 1.0, 'STEP, its unit converted to metres'
+    name = str(scene.metadata.get('units') or scene.units or 'millimeter').lower()
+    singular = name.removesuffix('s').replace('inche', 'inch').replace('feet', 'foot')
+    if singular in ('meter', 'm'):
+        return 1.0, '3MF, in metres'
+    if singular not in METRES:
+        raise MeshError(f'{path}: its unit is {name!r}; export it in millimetres')
+    return METRES[singular], f'3MF in {singular}, converted to metres'
 
 
 def write_mesh_ply(
@@ -118,80 +313,3 @@ def write_mesh_ply(
         file.write('\n'.join(head).encode())
         vertices.tofile(file)
         faces.tofile(file)
-
-
-def _require_whole(path: Path, vertices: np.ndarray, faces: np.ndarray) -> None:
-    if not len(faces):
-        raise MeshError(f'{path}: holds no triangles; export the surface as a triangle mesh')
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise MeshError(
-            f'{path}: a triangle names vertex {int(faces.max())} of {len(vertices)}; '
-            'export it again'
-        )
-    if not np.isfinite(vertices).all():
-        wrong = np.sum(~np.isfinite(vertices).all(axis=1))
-        raise MeshError(
-            f'{path}: {wrong} of {len(vertices)} vertices are not finite; export it again'
-        )
-
-
-def _check_extent(path: Path, vertices_m: np.ndarray, faces: np.ndarray) -> None:
-    used = np.zeros(len(vertices_m), dtype=bool)
-    used[faces] = True
-    corners_m = vertices_m if used.all() else vertices_m[used]
-    extent = float(box_extent_m(corners_m).max())
-    if not 0.005 <= extent <= LARGEST_M:
-        found = f'only {extent * 1e3:.3g} mm large, it looks scaled down; use a larger '
-        remedy = '--mesh-scale, or mesh_scale'
-        if extent > LARGEST_M:
-            found = f'{extent:.4g} m large, it looks like millimetres; use '
-            remedy = '--mesh-scale 0.001, or mesh_scale: 0.001'
-        raise MeshError(
-            f"{path}: the part would be {found}{remedy} in a campaign or as the node's parameter"
-        )
-
-
-def _with_area(
-    path: Path, vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]
-) -> np.ndarray:
-    """(F,) bool, which of the triangles have an area."""
-    # Triangles lower than this have no direction that could be trusted.
-    heights_wanted = 1e-7 * longest_edges_m(vertices_m, faces)
-    good = 2.0 * face_areas_m2(vertices_m, faces) > heights_wanted
-    if not good.any():
-        raise MeshError(f'{path}: none of its {len(faces)} triangles has an area; export it again')
-    if not good.all():
-        notes.append(f'{np.sum(~good)} of {len(faces)} triangles without area were left out')
-    return good
-
-
-def _oriented(vertices_m: np.ndarray, faces: np.ndarray, notes: list[str]) -> np.ndarray:
-    edges = Edges.of(faces)
-    if len(edges.clashing):
-        turned = _turned_to_majority(vertices_m, faces, edges)
-        count = np.sum((turned != faces).any(axis=1))
-        notes.append(f'{count} triangles wound against their neighbours were turned round')
-        faces, edges = turned, Edges.of(turned)
-    if not len(edges.single) and not len(edges.clashing):
-        a, b, c = (vertices_m - vertices_m.mean(axis=0))[faces].transpose(1, 0, 2)
-        if np.einsum('ij,ij->', a, np.cross(b, c)) < 0.0:  # six times its volume
-            notes.append('the closed body was inside out and was turned round')
-            faces = faces[:, ::-1]
-    return np.ascontiguousarray(faces)
-
-
-def _turned_to_majority(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
-    """Wind each connected surface alike, as most of its area was."""
-    from trimesh import Trimesh
-    from trimesh.graph import connected_component_labels
-    from trimesh.repair import fix_winding
-
-    mesh = Trimesh(vertices_m, faces, process=False, validate=False)
-    fix_winding(mesh)
-    turned = (np.asarray(mesh.faces) != faces).any(axis=1)
-    pairs = np.concatenate([edges.paired, edges.clashing]) // 3
-    sheet = connected_component_labels(pairs, len(faces))
-    areas = face_areas_m2(vertices_m, faces)
-    turned_share = np.bincount(sheet, areas * turned) / np.bincount(sheet, areas)
-    turned ^= (turned_share > 0.5)[sheet]
-    return np.where(turned[:, None], faces[:, ::-1], faces)

@@ -1,5 +1,6 @@
 """Reading the motion of guns from files of any kind, in the frame of the part."""
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -7,18 +8,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from pydantic import field_validator
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_source import MotionSource
 from paint_deposition.files.rapid.program import is_rapid, program_trajectory, read_program
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
-from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
+from paint_deposition.files.recordings.messages import JOINT_TYPE
+from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
-from paint_deposition.motion.part_frame import Rigid, is_frame, moved
+from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_frame, is_pose, moved
 from paint_deposition.motion.trajectory import Trajectory
-from paint_deposition.request import validate
+from paint_deposition.request import MotionOptions, validate
 
 if TYPE_CHECKING:
     from paint_deposition.files.recordings.joint_states import Robot
@@ -31,6 +33,42 @@ OTHER_PROGRAMS = {
     **dict.fromkeys(('.ls', '.tp'), ('FANUC', 'fanuc')),
     **dict.fromkeys(('.urp', '.script'), ('Universal Robots', 'rotvec')),
 }
+# The fields that only some kinds of files have.
+MOTION_KINDS = {
+    'pose_topic': 'bags', 'tf': 'bags', 'state_topic': 'bags and tables', 'rotation': 'tables',
+    **dict.fromkeys(('gun_signal', 'procedure'), 'RAPID modules'),
+    **dict.fromkeys(
+        ('urdf', 'tip_link', 'base_link', 'joint_prefix', 'pose_unit', 'angle_unit'),
+        'bags and tables',
+    ),
+}  # fmt: skip
+
+
+class MotionSource(MotionOptions):
+    """What to read of a motion file, and the pose of the part; None: not given."""
+
+    @field_validator('part_pose')
+    @classmethod
+    def _is_pose(cls, values: list[float] | None) -> list[float] | None:
+        if values is not None and not is_pose(values):
+            raise ValueError(f'{values} is no pose; give {POSE_FORMAT}')
+        return values
+
+    @field_validator('rotation')
+    @classmethod
+    def _is_rotation(cls, name: str | None) -> str | None:
+        known = name is None or name.lower() in ('rotvec', *CONVENTIONS)
+        if not (known or re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name or '')):
+            raise ValueError(f'{name!r} is no convention; give {ROTATION_WORDS}')
+        return name
+
+    def require_kind(self, path: Path, kind: str) -> None:
+        """Refuse fields that do not apply to a kind of file, such as 'a bag'."""
+        plural = {'a bag': 'bags', 'a table of poses': 'tables', 'a RAPID module': 'RAPID modules'}
+        for name, kinds in MOTION_KINDS.items():
+            if plural[kind] not in kinds and getattr(self, name) is not None:
+                option = f'--{name.replace("_", "-")}'
+                raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
 
 
 @dataclass(frozen=True)

@@ -105,8 +105,6 @@ PLAN_FILE = 'plan.json'
 IMPROVEMENT_FILE = 'improvement.json'
 # The key of the digest in a bag's custom data and in plan.json.
 DIGEST = 'model_sha256'
-IN_JSON = re.compile(rf'"{DIGEST}":\s*"([0-9a-f]{{64}})"')
-IN_RAPID = re.compile(r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})', re.IGNORECASE)
 
 
 def planned_model(motion: Path) -> tuple[Path, str] | None:
@@ -118,12 +116,13 @@ def planned_model(motion: Path) -> tuple[Path, str] | None:
     if not is_rapid(motion) and motion.suffix != '.csv':
         digest = custom_data(folder).get(DIGEST, '')
         return (folder / MODEL_FILE, digest) if digest else None
-    files, pattern = [motion], IN_RAPID
+    files, pattern = [motion], r'!.*\bmodel\b.*\bsha256 ([0-9a-f]{64})'
     if not is_rapid(motion):
         plans = (PLAN_FILE, IMPROVEMENT_FILE) if motion.name == 'passes.csv' else ()
-        files, pattern = [folder / name for name in plans], IN_JSON
+        files, pattern = [folder / name for name in plans], rf'"{DIGEST}":\s*"([0-9a-f]{{64}})"'
     for file in filter(Path.is_file, files):
-        found = pattern.search(read_file(file, ModelError).decode('utf-8', errors='replace'))
+        text = read_file(file, ModelError).decode('utf-8', errors='replace')
+        found = re.search(pattern, text, re.IGNORECASE)
         return (folder / MODEL_FILE, found[1]) if found else None
     return None
 

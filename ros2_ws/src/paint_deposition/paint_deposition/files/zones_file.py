@@ -8,13 +8,11 @@ from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from paint_deposition.errors import PaintError, quoted
 from paint_deposition.files.meshes import read_triangles
-from paint_deposition.files.motion_source import Number, Text
 from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
-from paint_deposition.request import validate
+from paint_deposition.request import Number, Text, validate
 
-Corner = Annotated[list[Number], Field(min_length=3, max_length=3)]
 FACES = 'a list of numbers of triangles from 0, as 7, or of ranges, as 0-119'
 
 
@@ -35,7 +33,13 @@ class ZoneEntry(BaseModel, extra='forbid'):
     name: Annotated[str, BeforeValidator(str), Field(min_length=1, description='what to call it')]
     target_um: Number = Field(gt=0.0, description='the film wanted, above 0 [um]')
     tolerance_um: Number = Field(gt=0.0, description='what the film may differ, above 0 [um]')
-    box: Annotated[list[Corner], Field(min_length=2, max_length=2)] | None = Field(
+    box: (
+        Annotated[
+            list[Annotated[list[Number], Field(min_length=3, max_length=3)]],
+            Field(min_length=2, max_length=2),
+        ]
+        | None
+    ) = Field(
         None, description='two corners, [[x, y, z], [x, y, z]], in the frame of the mesh [m]'
     )
     mesh: Text | None = Field(None, description='the name of a mesh file')
@@ -105,13 +109,12 @@ def _regions(
     if entry.has_triangles:
         mesh = folder / entry.mesh if entry.mesh else part
         of_mesh = entry.body or (None if entry.mesh else body)
-        found = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
-        chosen = np.ones(len(found.rows), dtype=bool)
+        vertices_m, faces, rows, _ = read_triangles(mesh, entry.mesh_scale or scale, of_mesh)
         if entry.faces:
-            highest, most = int(found.rows[-1]), max(last for _, last in entry.faces)
+            highest, most = int(rows[-1]), max(last for _, last in entry.faces)
             if most > highest:
                 raise PaintError(f'faces: {mesh} has no triangle {most}, its last is {highest}')
-            within = [(found.rows >= a) & (found.rows <= b) for a, b in entry.faces]
-            chosen = np.logical_or.reduce(within)
-        regions.append(Patch(found.vertices_m[found.faces[chosen]]))
+            within = [(rows >= a) & (rows <= b) for a, b in entry.faces]
+            faces = faces[np.logical_or.reduce(within)]
+        regions.append(Patch(vertices_m[faces]))
     return tuple(regions)

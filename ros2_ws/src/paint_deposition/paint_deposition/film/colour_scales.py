@@ -16,9 +16,6 @@ UNDER, OVER, BARE = TABLE, TABLE + 1, TABLE + 2
 UNDER_RGB = (250, 153, 191)
 OVER_RGB = (214, 38, 41)
 BARE_RGB = (158, 158, 158)
-NICE_STEPS = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
-# A scale that does not begin at 0 ends at multiples of one of these, about so many of them apart.
-STEPS, FEWEST_STEPS = (1.0, 2.0, 5.0, 10.0), 8
 
 
 def _palette(
@@ -70,7 +67,8 @@ def film_scale(film_um: np.ndarray, low_um: float = 0.0, high_um: float = 0.0) -
         least, most = float(film_um.min(initial=np.inf)), float(film_um.max(initial=0.0))
         if least <= 0.25 * most or not len(film_um):
             return ColourScale(0.0, round_up(most), FILM_PALETTE)
-        step = round_up(max(most - least, 0.01 * most) / FEWEST_STEPS, STEPS)
+        # Its ends are multiples of one of these, about eight of them apart.
+        step = round_up(max(most - least, 0.01 * most) / 8, (1.0, 2.0, 5.0, 10.0))
         first = math.floor(least / step)
         low_um, high_um = step * first, step * max(math.ceil(most / step), first + 1)
     return ColourScale(low_um, high_um, FILM_PALETTE)
@@ -83,7 +81,9 @@ def residual_scale(residual_um: np.ndarray, largest_um: float = 0.0) -> ColourSc
     return ColourScale(-largest_um, largest_um, RESIDUAL_PALETTE)
 
 
-def round_up(value: float, figures: tuple[float, ...] = NICE_STEPS) -> float:
+def round_up(
+    value: float, figures: tuple[float, ...] = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0)
+) -> float:
     """The next round figure; 1 for 0, so that a scale has a width."""
     if value <= 0.0:
         return 1.0

@@ -94,7 +94,11 @@ class Coats:
         """
         if self.names == ('',):
             return {TOTAL: np.ones(len(layers), dtype=bool)}
-        called = {layer: self._called(layer) for layer in dict.fromkeys(layers.tolist())}
+        called = {}
+        for layer in dict.fromkeys(layers.tolist()):
+            coats = self._coats_of(layer)
+            one_of_many = len(coats) < len(self.names)
+            called[layer] = '+'.join(self.names[k] for k in coats) if one_of_many else TOTAL
         names = np.array([called[layer] for layer in layers.tolist()])
         return {name: names == name for name in dict.fromkeys(called.values())}
 
@@ -129,11 +133,6 @@ class Coats:
                     f'{", ".join(self.names)}; base+clear names a sum, {TOTAL} all of them'
                 )
         return sorted({small.index(coat.casefold()) for coat in coats})
-
-    def _called(self, layer: str) -> str:
-        coats = self._coats_of(layer)
-        one_of_many = len(coats) < len(self.names)
-        return '+'.join(self.names[k] for k in coats) if one_of_many else TOTAL
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,6 @@ from paint_deposition.part.surface import Surface
 
 # Poses that stand for the whole path, and rays that stand for the spray of each.
 POSES, RAYS = 240, 160
-# What is shorter is the end of another pass.
-SHORTEST_PASS_M = 0.05
 # No gun paints from so far away.
 FAR_M = 1.0
 # Part and path that differ so much in size are in different units.
@@ -25,8 +23,6 @@ OTHER_UNIT = 100.0
 LEANING_DEG, REVERSED_DEG, ALONG_COSINE = 35.0, 135.0, 0.8
 # Standoffs further from the model plane than this share of its distance are odd.
 OFF_PLANE = 0.4
-# Passes lie aside if their middle is this far from the part's, and they run past its edge.
-ASIDE_M, PAST_EDGE_M = 0.2, 0.05
 # A pass with less of its paint over the part misses it.
 LEAST_LANDING = 0.02
 
@@ -35,6 +31,11 @@ class GunView:
     """What the gun has before it, at poses that stand for equal shares of the paint.
 
     The part is turned to the gun; of the model, pattern and projection count, effects do not.
+
+    Attributes:
+        distance_m: (N,) distance of the TCP from the nearest surface [m].
+        way: (N, 3) unit vectors from the TCP to it.
+        normals: (N, 3) its outward unit normals.
     """
 
     def __init__(self, surface: Surface, path: SprayPath, model: DepositionModel) -> None:
@@ -42,36 +43,19 @@ class GunView:
         paint = np.cumsum(path.flow * path.dwell_s)
         shares = (np.arange(POSES) + 0.5) / POSES
         self.path = path.select(np.searchsorted(paint, shares * paint[-1]))
-
-    @cached_property
-    def _nearest(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        place = self.surface.locate(self.path.position_m)
+        place = surface.locate(self.path.position_m)
+        self.distance_m, self.normals = place.distance_m, place.normals
         way = place.positions_m - self.path.position_m
-        return place.distance_m, way / np.maximum(place.distance_m, 1e-9)[:, None], place.normals
-
-    @property
-    def distance_m(self) -> np.ndarray:
-        """(N,) distance of the TCP from the nearest surface [m]."""
-        return self._nearest[0]
-
-    @property
-    def way(self) -> np.ndarray:
-        """(N, 3) unit vectors from the TCP to the nearest surface."""
-        return self._nearest[1]
+        self.way = way / np.maximum(place.distance_m, 1e-9)[:, None]
 
     @cached_property
     def over(self) -> np.ndarray:
         """(N,) bool, whether the gun is over the part, on whichever side; none if on few poses."""
         # The gun is over the part where the nearest surface looks at it within 25 degrees: beside
         # the part its edge is nearest.
-        over = np.abs(self._incidence) > math.cos(math.radians(25.0))
+        over = np.abs(np.einsum('ij,ij->i', self.way, self.normals)) > math.cos(math.radians(25.0))
         # With fewer poses over the part, distance and lean say nothing.
         return over if over.mean() >= 0.05 else np.zeros_like(over)
-
-    @property
-    def is_behind(self) -> bool:
-        """Whether the gun, where it is over the part, is mostly on the side that looks inward."""
-        return bool(np.median(self._incidence[self.over]) > 0.0)
 
     @cached_property
     def off_normal_deg(self) -> np.ndarray:
@@ -100,20 +84,16 @@ class GunView:
 
     @cached_property
     def passes(self) -> list[SprayPath]:
-        """The passes that spray for 50 mm or more."""
+        """The passes that spray for 50 mm or more: what is shorter is the end of another."""
         spraying = self.whole.select(self.whole.flow > 0.0)
         each = [spraying.select(spraying.spray_pass == n) for n in np.unique(spraying.spray_pass)]
-        return [one for one in each if one.dwell_s @ one.speed_m_per_s >= SHORTEST_PASS_M]
+        return [one for one in each if one.dwell_s @ one.speed_m_per_s >= 0.05]
 
     @cached_property
     def landing_of_passes(self) -> list[float]:
         """Share of the rays of each pass that land on the part; 1 where it is too short."""
         number, seen = self.path.spray_pass, [one.spray_pass[0] for one in self.passes]
         return [float(self.landing[number == n].mean()) if n in number else 1.0 for n in seen]
-
-    @cached_property
-    def _incidence(self) -> np.ndarray:
-        return np.einsum('ij,ij->i', self.way, self._nearest[2])
 
 
 def pattern_rays(planar: PlanarPattern) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -221,7 +201,8 @@ def _wrong_axis(view: GunView, boxes: str) -> str:
         remedy += f', where tool {points} points now; say --tool-axis {points.lstrip("+")}'
     if along > ALONG_COSINE:
         return f'tool z runs along the travel, {lean:.0f} degrees off the surface normal; {remedy}'
-    if lean > REVERSED_DEG and view.is_behind:
+    behind = np.median(np.einsum('ij,ij->i', view.way, view.normals)[view.over]) > 0.0
+    if lean > REVERSED_DEG and behind:
         return (
             'the gun is behind the part and looks away from it, as if the poses were shifted '
             f'through the part, or tool z reversed and the mesh inside out: {boxes}'
@@ -265,7 +246,8 @@ def _aside(view: GunView, passes: list[SprayPath]) -> str:
     for way, low, high in ((across, min(lines), max(lines)), (along, *ends)):
         part = view.surface.vertices_m @ way
         before, behind = part.min() - low, high - part.max()
-        if abs(behind - before) > 2.0 * ASIDE_M and max(before, behind) > PAST_EDGE_M:
+        # Their middle is 0.2 m from the part's, and they run past its edge.
+        if abs(behind - before) > 0.4 and max(before, behind) > 0.05:
             shift += 0.5 * (behind - before) * way
             past = max(past, before, behind)
     if not past:

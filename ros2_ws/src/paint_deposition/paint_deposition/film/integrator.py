@@ -17,14 +17,13 @@ from paint_deposition.film.layout import (
     LinesOfSight,
     compiled_laws,
     emission_points_m,
-    free_sight,
     model_constants,
     step_rows,
     term_constants,
 )
 from paint_deposition.film.statistics import PaintUsed
+from paint_deposition.kernel.blocks import LARGEST_BLOCK, shared_among_threads
 from paint_deposition.kernel.eq2_flux import REACH, TERMS, compile_kernel
-from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
@@ -169,7 +168,9 @@ class FilmIntegrator:
         rows = step_rows(self.model, path, self._blocks.origin_m).astype(self._real)
         brush = self.model.pattern_rows(path.brush)
         if not (self._lines_of_sight and self._shadowed):
-            return Steps(rows, brush, *free_sight(len(rows), len(self._blocks.spheres)))
+            run = np.ones(LARGEST_BLOCK, dtype=np.uint8)  # everything is seen
+            first = np.zeros((1, len(self._blocks.spheres)), np.int64)
+            return Steps(rows, brush, run, first, np.zeros(len(rows), np.int64))
         constants = model_constants(self.model)
         if reach is not None:
             constants[:, REACH] = reach

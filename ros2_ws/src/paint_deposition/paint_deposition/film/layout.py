@@ -9,11 +9,10 @@ import numpy as np
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.kernel import eq2_flux as kernel
-from paint_deposition.kernel.blocks import LARGEST_BLOCK, Blocks
+from paint_deposition.kernel.blocks import LARGEST_BLOCK, THREADS, Blocks
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.eq2_flux import AXIS_Z, NEAREST, ORIGIN, within_reach
 from paint_deposition.kernel.laws import Law
-from paint_deposition.kernel.threads import THREADS
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path import SprayPath
 from paint_deposition.part.points import SurfacePoints
@@ -24,26 +23,22 @@ Laws = tuple[tuple[Law, int], ...]
 
 def model_constants(model: DepositionModel) -> np.ndarray:
     """(B, 11) constants of eqs. (1) and (2), a row a brush, as the kernel uses them."""
-    return np.stack([_constants(model, planar) for planar in model.patterns])
-
-
-def _constants(model: DepositionModel, planar: PlanarPattern) -> np.ndarray:
-    projection = model.projection
-    ring = planar.K1_cm3_per_s * (1.0 - planar.K2) / planar.gamma_m2
-    centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
-    c = np.empty(kernel.MODEL_CONSTANTS)
-    c[kernel.OMEGA] = projection.model_plane_m
-    # Stands for a gain of nothing, which has no logarithm [um/s].
-    c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
-    c[kernel.RADIUS] = planar.r_m
-    c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
-    c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2
-    c[kernel.COS] = planar.K3 * np.cos(planar.phi_rad)
-    c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
-    c[kernel.NEAREST] = projection.nearest_m
-    c[kernel.REACH] = model.reach_of_m(planar)
-    c[kernel.SHADOW] = model.shadow
-    return c
+    constants = np.empty((len(model.patterns), kernel.MODEL_CONSTANTS))
+    for c, planar in zip(constants, model.patterns, strict=True):
+        ring = planar.K1_cm3_per_s * (1.0 - planar.K2) / planar.gamma_m2
+        centre = planar.K1_cm3_per_s * planar.K2 / (2.0 * np.pi * planar.sigma2_m**2)
+        c[kernel.OMEGA] = model.projection.model_plane_m
+        # Stands for a gain of nothing, which has no logarithm [um/s].
+        c[kernel.RING], c[kernel.CENTRE] = np.log2(np.maximum([ring, centre], 1e-30))
+        c[kernel.RADIUS] = planar.r_m
+        c[kernel.NARROW1] = 0.5 * np.log2(np.e) / planar.sigma1_m**2
+        c[kernel.NARROW2] = 0.5 * np.log2(np.e) / planar.sigma2_m**2
+        c[kernel.COS] = planar.K3 * np.cos(planar.phi_rad)
+        c[kernel.SIN] = planar.K3 * np.sin(planar.phi_rad)
+        c[kernel.NEAREST] = model.projection.nearest_m
+        c[kernel.REACH] = model.reach_of_m(planar)
+        c[kernel.SHADOW] = model.shadow
+    return constants
 
 
 def compiled_laws(effects: Sequence[Effect]) -> tuple[Laws, Laws, np.ndarray]:
@@ -132,12 +127,6 @@ RAYS_AT_ONCE = 200_000
 Sight = tuple[np.ndarray, np.ndarray, np.ndarray]
 
 
-def free_sight(steps: int, blocks: int) -> Sight:
-    """Everything is seen on all sub-steps."""
-    run = np.ones(LARGEST_BLOCK, dtype=np.uint8)
-    return run, np.zeros((1, blocks), np.int64), np.zeros(steps, np.int64)
-
-
 class LinesOfSight:
     """Traces rays from the gun to those points, also given as the kernel's blocks, that it paints.
 
@@ -166,7 +155,14 @@ class LinesOfSight:
         of the tracing that held on the sub-step before. Returned are what is seen, and the origin
         of the last tracing.
         """
-        traced, tracing = _tracings(origins_m, last_m)
+        # (S, 3) origins from which to trace, and (M,) the row of them that holds.
+        places_m = [] if last_m is None else [last_m]
+        tracing = np.empty(len(origins_m), dtype=np.int64)
+        for step, origin in enumerate(origins_m):
+            if not places_m or np.linalg.norm(origin - places_m[-1]) > SIGHT_STEP_M:
+                places_m.append(origin)
+            tracing[step] = len(places_m) - 1
+        traced = np.reshape(places_m, (-1, 3))
         blocks = self._blocks
         lit = _within_reach(blocks.spheres, rows, tracing, brush, constants, len(traced))
         which, block = np.nonzero(lit)
@@ -189,17 +185,6 @@ class LinesOfSight:
         with ThreadPoolExecutor(THREADS) as threads:
             list(threads.map(trace, _parts(sizes)))
         return (seen, first, tracing), traced[-1] if len(traced) else last_m
-
-
-def _tracings(origins_m: np.ndarray, last_m: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
-    """(S, 3) origins from which to trace [m], and (M,) the row of them that holds."""
-    traced = [] if last_m is None else [last_m]
-    tracing = np.empty(len(origins_m), dtype=np.int64)
-    for step, origin in enumerate(origins_m):
-        if not traced or np.linalg.norm(origin - traced[-1]) > SIGHT_STEP_M:
-            traced.append(origin)
-        tracing[step] = len(traced) - 1
-    return np.reshape(traced, (-1, 3)), tracing
 
 
 def _parts(sizes: np.ndarray) -> Iterator[slice]:

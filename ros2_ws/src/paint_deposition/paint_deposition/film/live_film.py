@@ -29,7 +29,6 @@ from paint_deposition.motion.trajectory import (
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.part.visibility import Occluder
 
-DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change that is older than the newest pose by more is from a restarted stream, and none
 # is told so long ahead of its pose [ns].
 STREAM_RESTART_NS = 1_000_000_000
@@ -66,7 +65,7 @@ class LiveFilm:
         precision: Precision = 'single',
         occluder: Occluder | None = None,
         max_pose_gap_s: float = DEFAULT_MAX_POSE_GAP_S,
-        trigger_latency_s: float = DEFAULT_TRIGGER_LATENCY_S,
+        trigger_latency_s: float = 0.1,
         pose_memory: int = DEFAULT_POSE_MEMORY,
     ) -> None:
         self.max_pose_gap_s = max_pose_gap_s

@@ -22,11 +22,6 @@ ACROSS = np.array([0.0, 0.0, 1.0])
 OUTWARD = np.array([0.0, 1.0, 0.0])
 # Sub-steps grow from this length at the line's middle, where eq. (1) is not smooth [m].
 FINEST_STEP_M = 2e-5
-STEPS_PER_SIGMA = 5.0
-SAMPLES_PER_SIGMA = 16.0
-FEWEST_SAMPLES, MOST_SAMPLES = 257, 4097
-# Where the asymmetry f turns over, at the centre, samples close in by halves this many times.
-HALVINGS = 16
 
 
 def collapse_um(
@@ -86,10 +81,10 @@ def sampled_collapse(
     widening = max(_widening(model, standoff), 1e-6)
     reach = model.planar.radius_of_flux_m(NEGLIGIBLE) * model.widening * widening
     finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
-    count = math.ceil(2.0 * reach / finest * SAMPLES_PER_SIGMA)
-    count = round(fineness * min(max(count, FEWEST_SAMPLES), MOST_SAMPLES))
+    count = round(fineness * min(max(math.ceil(2.0 * reach / finest * 16.0), 257), 4097))
     x = np.linspace(-reach, reach, count | 1)
-    close = (x[1] - x[0]) * 0.5 ** np.arange(1, HALVINGS)
+    # Where the asymmetry f turns over, at the centre, samples close in by halves.
+    close = (x[1] - x[0]) * 0.5 ** np.arange(1, 16)
     x = np.sort(np.concatenate([x, close, -close]))
     film_um = collapse_um(model, x, speed_m_per_s, fineness=fineness, **options)
     return SampledCollapse(x, film_um, finest)
@@ -107,7 +102,14 @@ def pass_film_um(
 
     ``velocity_m_per_s`` is negative backwards, ``roll_rad`` the direction of travel in the tool.
     """
-    along, length = _graded_steps(model, standoff_m, fineness)
+    # Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u).
+    widening = _widening(model, standoff_m)
+    far = 1.5 * model.reach_m * widening
+    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
+    u_far = math.asinh(far / FINEST_STEP_M)
+    half = math.ceil(u_far * fineness * 5.0 * far / finest)
+    u, step = np.linspace(-u_far, u_far, 2 * half, retstep=True)
+    along, length = FINEST_STEP_M * np.sinh(u), FINEST_STEP_M * np.cosh(u) * step
     speed, way = abs(velocity_m_per_s), math.copysign(1.0, velocity_m_per_s)
     cos, sin = math.cos(roll_rad), math.sin(roll_rad)
     tool = np.stack([cos * TRAVEL - sin * ACROSS, sin * TRAVEL + cos * ACROSS, -OUTWARD], axis=1)
@@ -129,16 +131,3 @@ def _widening(model: DepositionModel, standoff_m: float) -> float:
     """How many times wider the pattern is at the standoff than on the model plane."""
     distance = standoff_m + model.projection.emission_offset_m
     return distance / model.projection.model_plane_m
-
-
-def _graded_steps(
-    model: DepositionModel, standoff_m: float, fineness: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Middles and lengths of sub-steps, even in u with distance = FINEST_STEP_M sinh(u)."""
-    widening = _widening(model, standoff_m)
-    far = 1.5 * model.reach_m * widening
-    finest = min(model.planar.sigma1_m, model.planar.sigma2_m) * widening
-    u_far = math.asinh(far / FINEST_STEP_M)
-    half = math.ceil(u_far * fineness * STEPS_PER_SIGMA * far / finest)
-    u, step = np.linspace(-u_far, u_far, 2 * half, retstep=True)
-    return FINEST_STEP_M * np.sinh(u), FINEST_STEP_M * np.cosh(u) * step

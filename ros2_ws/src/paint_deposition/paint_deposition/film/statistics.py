@@ -231,9 +231,6 @@ class PaintUsed:
         }
 
 
-NO_PAINT = PaintUsed()
-
-
 def paint_figures(
     model: DepositionModel, paint: PaintUsed, film: FilmStatistics
 ) -> dict[str, Any] | None:

@@ -151,22 +151,17 @@ def line_integral_um_m_per_s(
     lopsided = p.K3 * math.cos(travel_rad - p.phi_rad)
     if lopsided:
         side = np.sign(across_m).reshape(across.shape) * lopsided
-        ring = ring + side * _ring_over_radius(p, across, far)
+        # |across| times the line integral of g1 over the radius; it vanishes at the centre.
+        step = p.sigma1_m / NODES_PER_SIGMA / far
+        u = step * np.arange(math.ceil(math.asinh(1e12) / step) + 1)
+        over_radius = np.empty(len(across))
+        for row, distance in enumerate(np.maximum(across, 1e-12 * far)):
+            used = u[: math.ceil(math.asinh(far / distance) / step) + 1]
+            over_radius[row] = distance * _even_sum(p.g1(distance * np.cosh(used), 0.0), step)
+        ring = ring + side * over_radius
     centre = np.exp(-0.5 * (across / p.sigma2_m) ** 2) / (p.sigma2_m * math.sqrt(2.0 * math.pi))
     film = p.K1_cm3_per_s * ((1.0 - p.K2) * ring + p.K2 * centre)
     return film.reshape(np.shape(across_m))
-
-
-def _ring_over_radius(p: PlanarPattern, across: np.ndarray, far: float) -> np.ndarray:
-    """|across| times the line integral of g1 over the radius; it vanishes at the centre."""
-    off_centre = np.maximum(across, 1e-12 * far)
-    step = p.sigma1_m / NODES_PER_SIGMA / far
-    u = step * np.arange(math.ceil(math.asinh(1e12) / step) + 1)
-    result = np.empty(len(across))
-    for row, distance in enumerate(off_centre):
-        used = u[: math.ceil(math.asinh(far / distance) / step) + 1]
-        result[row] = distance * _even_sum(p.g1(distance * np.cosh(used), 0.0), step)
-    return result
 
 
 def _even_sum(values: np.ndarray, step: float) -> np.ndarray:

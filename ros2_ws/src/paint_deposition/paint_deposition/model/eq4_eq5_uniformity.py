@@ -7,10 +7,6 @@ import numpy as np
 
 from paint_deposition.model.eq3_collapse import Collapse
 
-# Points of the period in the collapse's finest scale; the rule converges faster than any power.
-POINTS_PER_SCALE = 8.0
-FEWEST_POINTS = 32
-
 
 @dataclass(frozen=True)
 class ParallelPasses:
@@ -61,7 +57,8 @@ class ParallelPasses:
         """
         period = np.array([self.period_m(value) for value in index_m.tolist()])
         finest = min(self.first.finest_m, self.second.finest_m)
-        points = np.maximum(FEWEST_POINTS, POINTS_PER_SCALE * period / finest)
+        # So many in the collapse's finest scale: the rule converges faster than any power.
+        points = np.maximum(32, 8.0 * period / finest)
         # Powers of two, so that many indexes have as many and are computed together.
         points = 2 ** np.ceil(np.log2(points)).astype(np.int64)
         found = np.empty(len(index_m))

@@ -68,13 +68,9 @@ class Arm:
             if self.slides[j]:
                 position = position + value[..., np.newaxis] * along[..., j, :]
             else:
-                turn = turn @ _turns(self.axes[j], value)
+                # (..., 3, 3) rotations about the axis (Rodrigues).
+                x, y, z = self.axes[j]
+                cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+                sin, cos = np.sin(value)[..., None, None], np.cos(value)[..., None, None]
+                turn = turn @ (np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross))
         return position, turn, along, origin
-
-
-def _turns(axis: np.ndarray, angle_rad: np.ndarray) -> np.ndarray:
-    """(..., 3, 3) rotations about a unit axis (3,) (Rodrigues)."""
-    x, y, z = axis
-    cross = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    sin, cos = np.sin(angle_rad)[..., None, None], np.cos(angle_rad)[..., None, None]
-    return np.eye(3) + sin * cross + (1.0 - cos) * (cross @ cross)

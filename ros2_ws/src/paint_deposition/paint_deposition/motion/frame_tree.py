@@ -13,8 +13,6 @@ from paint_deposition.motion.part_frame import Rigid
 # Where a frame was between two transforms that are further apart is not known. A live pose waits
 # as long for its transform, so that a recording has the same poses as the nodes had.
 LONGEST_GAP_NS = 2_000_000_000
-# Frames and poses of a frame that are remembered, more than any cell has.
-MOST_FRAMES, MOST_POSES = 1000, 100_000
 STAMP = itemgetter(0)
 
 
@@ -24,16 +22,6 @@ class NoTransform(Exception):
     def __init__(self, reason: str, may_come: bool = False) -> None:
         super().__init__(reason)
         self.may_come = may_come
-
-
-def _between(before: np.ndarray, after: np.ndarray, share: float) -> Rigid:
-    """The pose (7,) at a share of the way between two."""
-    from pytransform3d.rotations import quaternion_slerp
-
-    pose = (1.0 - share) * before + share * after
-    if not np.array_equal(before[3:], after[3:]):
-        pose[3:] = quaternion_slerp(before[3:], after[3:], share, shortest_path=True)
-    return Rigid.of(pose)
 
 
 class FrameTree:
@@ -97,14 +85,14 @@ class FrameTree:
         is_known = row < len(motion) and motion[row][0] == stamp_ns
         motion[row : row + is_known] = [(stamp_ns, _name(parent), np.array(pose, dtype=float))]
         if self._live:
-            # As in tf2 [ns].
+            # As in tf2 [ns], and no more poses than any cell has.
             old = bisect_left(motion, motion[-1][0] - 10_000_000_000, key=STAMP)
-            del motion[: max(old, len(motion) - MOST_POSES)]
+            del motion[: max(old, len(motion) - 100_000)]
         return restarted
 
     def _has_room(self, child: str) -> bool:
         known = self._fixed.keys() | self._moving.keys()
-        return _name(child) in known or len(known) < MOST_FRAMES
+        return _name(child) in known or len(known) < 1000
 
     def placed(self, child: str) -> tuple[str, Rigid] | None:
         """Parent and pose of a frame that does not move, None if it does or is not known."""
@@ -191,6 +179,8 @@ class FrameTree:
 
     def _pose_at(self, frame: str, stamp_ns: int) -> Rigid:
         """In its parent, interpolated between the transforms before and after."""
+        from pytransform3d.rotations import quaternion_slerp
+
         motion = self._moving[frame]
         row = bisect_left(motion, stamp_ns, key=STAMP)
         if row < len(motion) and motion[row][0] == stamp_ns:
@@ -205,7 +195,11 @@ class FrameTree:
             raise NoTransform(f'{of}: tf has none for {1e-9 * (end_ns - begin_ns):.2f} s')
         if parent != next_parent:
             return Rigid.of(before)
-        return _between(before, after, (stamp_ns - begin_ns) / (end_ns - begin_ns))
+        share = (stamp_ns - begin_ns) / (end_ns - begin_ns)
+        pose = (1.0 - share) * before + share * after
+        if not np.array_equal(before[3:], after[3:]):
+            pose[3:] = quaternion_slerp(before[3:], after[3:], share, shortest_path=True)
+        return Rigid.of(pose)
 
     def longest_gap_s(self, child: str) -> float:
         """Between two poses of a frame over time."""

@@ -99,9 +99,6 @@ def moved(trajectory: Trajectory, transform: Rigid, frame_id: str) -> Trajectory
     )
 
 
-FEWEST_POINTS = 3
-
-
 @dataclass(frozen=True)
 class PartPlace:
     """The pose of a part in the frame of the robot, and how well it is known.
@@ -128,7 +125,7 @@ def locate(touched_m: Mapping[str, np.ndarray], points_m: Mapping[str, np.ndarra
     left out. Raises RecordingError for fewer than three in common, or points on a line.
     """
     names = [name for name in touched_m if name in points_m]
-    if len(names) < FEWEST_POINTS:
+    if len(names) < 3:
         raise RecordingError(
             f'{len(names)} points in common ({" ".join(names) or "none"}); touched are '
             f'{" ".join(touched_m)}, listed are {" ".join(points_m)}; give three or more that '

@@ -65,19 +65,6 @@ def spray_travel_m(p0, p1, q0, q1):
 
 
 @njit(cache=True)
-def count_sub_steps(p0, p1, q0, q1, max_step_m):
-    """How many sub-steps keep the spray's travel in each below the limit."""
-    travel = spray_travel_m(p0, p1, q0, q1)
-    return int(math.ceil(min(max(travel / max_step_m, 1.0), MOST_SUB_STEPS)))
-
-
-@njit(cache=True)
-def _detour_m(p0, p1, p2):
-    """By how much the way from p0 to p2 is longer by p1 [m]."""
-    return _distance(p0, p1) + _distance(p1, p2) - _distance(p0, p2)
-
-
-@njit(cache=True)
 def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     """Rows (K,) of the poses that are followed, the first among them; those behind the last wait.
 
@@ -92,7 +79,9 @@ def thin_poses(stamps_ns, positions, quaternions, max_gap_ns, max_step_m):
     longest_ns, least_m = min(50_000_000, max_gap_ns), LEAST_SHARE * max_step_m
     for i in range(1, len(stamps_ns)):
         if last < i - 1:
-            detour_m = _detour_m(positions[last], positions[i - 1], positions[i])
+            by_it = _distance(positions[last], positions[i - 1])
+            by_it += _distance(positions[i - 1], positions[i])
+            detour_m = by_it - _distance(positions[last], positions[i])
             # A pose by which the way is longer than past it, by a tenth of such a travel, is a
             # corner and followed.
             if detour_m > 0.1 * least_m or stamps_ns[i] - stamps_ns[last] > max_gap_ns:
@@ -126,9 +115,10 @@ def split_segments(stamps_ns, positions, quaternions, cuts_ns, max_gap_ns, max_s
     whole = np.zeros(segments, np.int64)
     for i in range(segments):
         if stamps_ns[i + 1] - stamps_ns[i] <= max_gap_ns:
-            whole[i] = count_sub_steps(
-                positions[i], positions[i + 1], quaternions[i], quaternions[i + 1], max_step_m
+            travel = spray_travel_m(
+                positions[i], positions[i + 1], quaternions[i], quaternions[i + 1]
             )
+            whole[i] = int(math.ceil(min(max(travel / max_step_m, 1.0), MOST_SUB_STEPS)))
             most += whole[i]
     stamp, dwell, after_gap = np.empty(most, np.int64), np.empty(most), np.zeros(most, np.bool_)
     position, rotation, velocity = np.empty((most, 3)), np.empty((most, 3, 3)), np.empty((most, 3))

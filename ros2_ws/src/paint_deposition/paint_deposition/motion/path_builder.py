@@ -3,10 +3,15 @@
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paint_deposition.motion.passes import first_pass, follow_passes
 from paint_deposition.motion.path import SprayPath, split_segments, thin_poses
 from paint_deposition.motion.pose_stream import PoseBatch, PoseScreen, TriggerChange, events_of
-from paint_deposition.motion.strokes import first_stroke, follow_strokes, look_ahead
+from paint_deposition.motion.strokes import (
+    first_pass,
+    first_stroke,
+    follow_passes,
+    follow_strokes,
+    look_ahead,
+)
 from paint_deposition.motion.trajectory import (
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
@@ -122,7 +127,18 @@ class PathBuilder:
             self._flow.forget(self._integrated_ns)
         path = SprayPath.joined([SprayPath.empty(), *self._finished])
         self._finished = []
-        return self._whole_strokes(path, finish) if self.whole_strokes and len(path) else path
+        if not (self.whole_strokes and len(path)):
+            return path
+        stroke = path.stroke
+        ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
+        # The last stroke's end shows with the first row of the next, which the look ahead needs.
+        until_on, until_off, to_turn = look_ahead(
+            stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s,
+            path.from_turn_m,
+        )  # fmt: skip
+        complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
+        self._finished = [path.select(slice(ready, None))]
+        return complete.select(slice(0, ready))
 
     def _go_on(self) -> None:
         """The stream has not restarted: changes that waited for that are of this one."""
@@ -193,18 +209,6 @@ class PathBuilder:
             passes_before=np.maximum(spray_pass, 0), open_flow=open_flow, since_on_s=since_on,
             since_off_s=since_off, from_turn_m=from_turn, brush=open_brush,
         )  # fmt: skip
-
-    def _whole_strokes(self, path: SprayPath, finish: bool) -> SprayPath:
-        stroke = path.stroke
-        ready = len(path) if finish else int(np.searchsorted(stroke, stroke[-1], side='left'))
-        # The last stroke's end shows with the first row of the next, which the look ahead needs.
-        until_on, until_off, to_turn = look_ahead(
-            stroke, path.velocity_m_per_s, path.dwell_s, path.flow, path.since_on_s,
-            path.from_turn_m,
-        )  # fmt: skip
-        complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
-        self._finished = [path.select(slice(ready, None))]
-        return complete.select(slice(0, ready))
 
 
 def spray_path(

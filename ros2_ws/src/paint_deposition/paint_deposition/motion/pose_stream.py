@@ -122,7 +122,12 @@ class MotionLog:
             self._changes.append((self.poses, event))
             return
         else:
-            self._pack(event)
+            end = self.poses + len(event)
+            if end > len(self._kept):  # readers go on with the old one
+                rows = np.arange(2 * end) % max(len(self._kept), 1)
+                self._kept = (self._kept if self.poses else event).select(rows)
+            for kept, new in zip(vars(self._kept).values(), vars(event).values(), strict=True):
+                kept[self.poses : end] = new
         self.poses += len(event) if isinstance(event, PoseBatch) else 0
 
     def events(self, poses: int = 0, changes: int = 0) -> Iterator[TriggerChange | PoseBatch]:
@@ -143,14 +148,6 @@ class MotionLog:
         batches = list(_rows(self._kept, 0, min(count, self.poses if self.complete else 0)))
         return PoseBatch.joined(batches) if batches else None
 
-    def _pack(self, batch: PoseBatch) -> None:
-        end = self.poses + len(batch)
-        if end > len(self._kept):  # readers go on with the old one
-            rows = np.arange(2 * end) % max(len(self._kept), 1)
-            self._kept = (self._kept if self.poses else batch).select(rows)
-        for kept, new in zip(vars(self._kept).values(), vars(batch).values(), strict=True):
-            kept[self.poses : end] = new
-
 
 def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
     """The poses of this range."""
@@ -162,8 +159,6 @@ def _rows(kept: PoseBatch, start: int, stop: int) -> Iterator[PoseBatch]:
 QUATERNION_TOLERANCE = 0.01
 # A number beyond this is damage too, and its square must be one in single precision [m].
 FARTHEST_M = 1e6
-# So many within a gap are no stream.
-MOST_BEHIND = 10_000
 
 
 class PoseScreen:
@@ -199,7 +194,8 @@ class PoseScreen:
                 streams[-1].append(row)
             elif stamp == self.newest_ns or (behind and stamp == stamps[behind[-1]]):
                 self.counts.repeated_stamps += 1
-            elif (behind and stamp < stamps[behind[-1]]) or len(behind) >= MOST_BEHIND:
+            # 10,000 within a gap are no stream.
+            elif (behind and stamp < stamps[behind[-1]]) or len(behind) >= 10_000:
                 self.counts.backward_stamps += len(behind)
                 behind = [row]
             else:

@@ -12,7 +12,6 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.motion.trajectory import ONLY_BRUSH, Trajectory, numbered
 
 PROGRAMMED = 'this is the motion as programmed, not as recorded'
-POSE_PERIOD_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,7 @@ def timed(moves: Sequence[Move], gun_known: bool) -> Trajectory:
             (times_s[-1] + at * duration_s, on * move.flow, brush)
             for at, on, brush in [(0.0, move.spraying, move.brush), *_switches(move, length_m)]
         ]
-        count = math.ceil(duration_s / POSE_PERIOD_S)
+        count = math.ceil(duration_s / 0.02)  # a pose every 20 ms
         share = np.arange(1, count + 1) / max(count, 1)
         positions += list(place_at(share))
         quaternions += list(Slerp([0.0, 1.0], turn)(share).as_quat()) if count else []

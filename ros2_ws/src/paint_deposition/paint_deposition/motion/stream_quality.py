@@ -9,13 +9,8 @@ import numpy as np
 
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, gap_ns
 
-# Intervals whose median is the stream's rhythm, and how much longer a long one is.
+# Intervals whose median is the stream's rhythm.
 REMEMBERED = 250
-LONG = 1.5
-# Stamps that tremble make any shorter step of a slow gun look fast [m].
-LEAST_STEP_M = 0.05
-# Single steps between poses carry the noise of the encoders and the jitter of the stamps.
-WINDOW_NS, MOST_IN_WINDOW = 200_000_000, 2000
 # Equal values over a longer time are a robot that stands still [ns].
 LONGEST_REPEAT_NS = 50_000_000
 # Such a share of repeats is the habit of a driver; fewer are chance.
@@ -48,7 +43,7 @@ class Intervals:
             if step_ns > 0:
                 self.longest_ns = max(self.longest_ns, step_ns)
                 typical_ns = typical_ns or step_ns
-                self.long += step_ns > LONG * typical_ns
+                self.long += step_ns > 1.5 * typical_ns
                 self._recent.append(step_ns)
 
 
@@ -72,8 +67,8 @@ class Jumps:
         step_s = np.diff(stamps_ns) * 1e-9
         step_m = np.linalg.norm(np.diff(positions_m, axis=0), axis=1)
         # Painting robots move their TCP at 3 m/s at most; stamps that tremble make any step of a
-        # slow gun look fast.
-        far = (step_s > 0.0) & (step_m > np.fmax(LEAST_STEP_M, 10.0 * step_s))
+        # slow gun of less than 50 mm look fast.
+        far = (step_s > 0.0) & (step_m > np.fmax(0.05, 10.0 * step_s))
         self.count += int(np.count_nonzero(far))
         fastest = step_m[far] / step_s[far]
         self.fastest_m_per_s = float(np.max(fastest, initial=self.fastest_m_per_s))
@@ -91,7 +86,8 @@ class SpeedNow:
         if not len(self._stamps_ns) or stamps_ns[0] > self._stamps_ns[-1]:
             stamps_ns = np.concatenate([self._stamps_ns, stamps_ns])
             positions_m = np.concatenate([self._positions_m, positions_m])
-        recent = np.flatnonzero(stamps_ns >= stamps_ns[-1] - WINDOW_NS)[-MOST_IN_WINDOW:]
+        # Single steps carry the noise of the encoders and the jitter of the stamps.
+        recent = np.flatnonzero(stamps_ns >= stamps_ns[-1] - 200_000_000)[-2000:]
         self._stamps_ns, self._positions_m = stamps_ns[recent], positions_m[recent]
 
     @property

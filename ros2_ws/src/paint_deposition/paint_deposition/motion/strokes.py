@@ -1,4 +1,6 @@
-"""Strokes: the straight or gently curved stretches between the turns of the tool path.
+"""Strokes and passes, numbered over the sub-steps of a path.
+
+Strokes are the straight or gently curved stretches between the turns of the tool path.
 
 The state machine runs over the sub-steps in order. Its state is carried from call to call, so that
 a live stream and an offline run number their strokes alike. A turn is a heading more than 60
@@ -11,13 +13,35 @@ the first heading step is its mean, and each that keeps to the mean is taken in.
 begins the next stroke: the turn is where the two legs meet, behind there.
 
 A stroke is new while its ``length_m`` is zero.
+
+Passes are the stretches along one line of the part on which the gun sprays. A pass continues over
+openings and closings of the gun along its line; links between passes are no passes. Their state
+machine, too, runs over the sub-steps in order. Each raises these events in the order of the table.
+
+=======  ======================================  =======  ====================================
+state    event                                   next     what happens
+=======  ======================================  =======  ====================================
+runs     a gap                                   ended *
+runs     a heading step that leaves the mean     ended *
+runs     another heading step, the gun was open  runs     the mean takes it in
+runs     the gun opens on another track          ended *
+awaited  the gun is open, no heading is known    awaited  the number is 0
+awaited  the gun is open                         runs     the number is 0; the heading is the
+                                                          pass's mean
+ended    the gun is open on the line of the      runs     the number goes up; the heading is the
+         last pass, either way                            pass's mean
+ended    the gun is open off that line: a link   ended
+=======  ======================================  =======  ====================================
+
+``*`` Pass 0 is awaited once more if it ends after less than 40 mm: the gun opened at a turn that
+shows only now, and the heading was that of the approach.
 """
 
 import math
 
 import numpy as np
 
-from paint_deposition.kernel.compiler import njit
+from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 # The path's heading is judged over this travel, so that jitter at rest is no turn [m].
 HEADING_STEP_M = 0.01
@@ -78,30 +102,16 @@ def take_in(heading, step_m, length_m, mean, carried):
         carried[k] += gain * (heading[k] - carried[k])
 
 
-# anchor and earlier are where the last two heading steps began, with the path since then: a turn
-# that shows now lies behind the earlier one.
-_LENGTHS = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
-_VECTORS = ('position', 'normal', 'anchor', 'earlier', 'heading', 'mean', 'carried')
-STROKE_STATE = np.dtype(
-    [('number', 'i8'), *((n, 'f8') for n in _LENGTHS), *((n, 'f8', 3) for n in _VECTORS)]
-)
-
-
 def first_stroke() -> np.ndarray:
     """State before the first sub-step: (1,) record."""
-    state = np.zeros(1, STROKE_STATE)
+    # anchor and earlier are where the last two heading steps began, with the path since then: a
+    # turn that shows now lies behind the earlier one.
+    lengths = ('from_turn_m', 'length_m', 'since_anchor_m', 'since_earlier_m')
+    vectors = ('position', 'normal', 'anchor', 'earlier', 'heading', 'mean', 'carried')
+    fields = [('number', 'i8'), *((name, 'f8') for name in lengths)]
+    state = np.zeros(1, np.dtype([*fields, *((name, 'f8', 3) for name in vectors)]))
     state['number'] = -1
     return state
-
-
-@njit
-def _begin_anew(state, position):
-    """Begin a stroke of unknown heading, as at the start and behind a gap."""
-    state.number += 1
-    state.from_turn_m = state.length_m = state.since_anchor_m = state.since_earlier_m = 0.0
-    for k in range(3):
-        state.anchor[k] = state.earlier[k] = state.position[k] = position[k]
-        state.heading[k] = state.mean[k] = state.carried[k] = 0.0
 
 
 @njit
@@ -126,26 +136,21 @@ def _take_step(state, length):
     turns = state.length_m > 0.0 and leaves(state.heading, state.mean, state.carried)
     if turns:
         state.number += 1
-        state.from_turn_m = _behind_turn_m(state)
         state.length_m = 0.0
+        # How far back the stroke turned, if straight up to there and straight since: legs
+        # a + b = path and a + b cos = along, b sin = across, solved for b.
+        chord = difference(state.position, state.earlier)
+        square = dot(chord, chord)
+        along = math.sqrt(square) * cosine(chord, state.mean)
+        detour = state.since_earlier_m - along
+        behind = (square - along**2 + detour**2) / (2.0 * detour) if detour > 0.0 else 0.0
+        state.from_turn_m = min(behind, state.since_earlier_m, LATEST_NOTICE_M)
     state.length_m += length
     take_in(state.heading, length, state.length_m, state.mean, state.carried)
     state.since_earlier_m, state.since_anchor_m = state.since_anchor_m, 0.0
     for k in range(3):
         state.earlier[k], state.anchor[k] = state.anchor[k], state.position[k]
     return turns
-
-
-@njit
-def _behind_turn_m(state):
-    """How far back the stroke turned, if straight up to there and straight since."""
-    chord = difference(state.position, state.earlier)
-    square = dot(chord, chord)
-    along = math.sqrt(square) * cosine(chord, state.mean)
-    detour = state.since_earlier_m - along
-    # Legs a + b = path and a + b cos = along, b sin = across, solved for b.
-    behind = (square - along**2 + detour**2) / (2.0 * detour) if detour > 0.0 else 0.0
-    return min(behind, state.since_earlier_m, LATEST_NOTICE_M)
 
 
 @njit(cache=True)
@@ -168,7 +173,13 @@ def follow_strokes(states, position, normal, velocity, dwell, after_gap):
         half_step = 0.5 * dwell[i] * math.sqrt(v[0] ** 2 + v[1] ** 2 + v[2] ** 2)
         carry(state.carried, state.normal, normal[i])
         if state.number < 0 or after_gap[i]:
-            _begin_anew(state, position[i])
+            # A stroke of unknown heading, as at the start and behind a gap.
+            state.number += 1
+            state.from_turn_m = state.length_m = 0.0
+            state.since_anchor_m = state.since_earlier_m = 0.0
+            for k in range(3):
+                state.anchor[k] = state.earlier[k] = state.position[k] = position[i, k]
+                state.heading[k] = state.mean[k] = state.carried[k] = 0.0
         else:
             step[i] = _advance(state, position[i])
             if step[i] > 0.0 and _take_step(state, step[i]):
@@ -208,3 +219,89 @@ def look_ahead(stroke, velocity, dwell, flow, since_on, from_turn):
         to_turn[i] = abs(turn + 0.5 * step)
         on, off, turn, behind_m = on + dwell[i], off + dwell[i], turn + step, step
     return until_on, until_off, to_turn
+
+
+AWAITED, RUNS, ENDED = 0, 1, 2
+
+
+def first_pass(flow_before: float) -> np.ndarray:
+    """State before the first sub-step: (1,) record, from the flow that was on until then."""
+    vectors = ('position', 'normal', 'mean', 'carried', 'closed_at')
+    numbers = [('number', 'i8'), ('state', 'i8'), ('length_m', 'f8'), ('flow', 'f8')]
+    state = np.zeros(1, np.dtype([*numbers, *((name, 'f8', 3) for name in vectors)]))
+    state['number'] = -1
+    state['flow'] = flow_before
+    return state
+
+
+@njit
+def _end(state):
+    state.state = ENDED
+    if state.number == 0 and state.length_m < LATEST_NOTICE_M:
+        state.state = AWAITED
+        for k in range(3):
+            state.mean[k] = state.carried[k] = 0.0
+
+
+@njit
+def _spray(state, heading):
+    """Begin a pass here, where the gun is open, if none runs and this is no link."""
+    if state.state == RUNS and state.flow == 0.0 and _on_another_track(state):
+        _end(state)
+    if state.state == RUNS:
+        return
+    if dot(heading, heading) == 0.0:
+        state.number = max(state.number, 0)
+        return
+    along = max(abs(cosine(heading, state.mean)), abs(cosine(heading, state.carried)))
+    # A pass lies within 45 degrees of the heading of the last one, either way; others are links.
+    if state.state == AWAITED or along > math.sqrt(0.5):
+        state.number = 0 if state.state == AWAITED else state.number + 1
+        state.state = RUNS
+        state.length_m = 0.0
+        take_in(heading, 1.0, 1.0, state.mean, state.carried)
+
+
+@njit
+def _on_another_track(state):
+    """Whether the gun has left the line on which it closed, seen along the tool axis."""
+    x, y, z = difference(state.position, state.closed_at)
+    off = dot((x, y, z), state.normal)
+    between = x - off * state.normal[0], y - off * state.normal[1], z - off * state.normal[2]
+    if dot(between, between) < HEADING_STEP_M**2:
+        return False
+    # A gun that opens more than 30 degrees off the line on which it closed is on another track.
+    return cosine(between, state.carried) < math.sqrt(0.75)
+
+
+@njit(cache=True)
+@named_for_its_code
+def follow_passes(states, position, normal, heading, step, flow, after_gap):
+    """Number the spraying passes: (M,) int64, the one that runs or ran last, -1 before the first.
+
+    ``states`` (1,) is updated in place; position and normal (M, 3) are TCP [m] and tool z, heading
+    (M, 3) and step (M,) are from ``follow_strokes``, flow (M,) is relative, 0 gun off, and
+    after_gap (M,) bool.
+    """
+    spray_pass = np.empty(len(flow), np.int64)
+    state = states[0]
+    for i in range(len(flow)):
+        carry(state.carried, state.normal, normal[i])
+        for k in range(3):
+            state.normal[k] = normal[i, k]
+            if state.flow > 0.0:
+                state.closed_at[k] = state.position[k]
+            state.position[k] = position[i, k]
+        if state.state == RUNS:
+            turns = step[i] > 0.0 and leaves(heading[i], state.mean, state.carried)
+            if after_gap[i] or turns:
+                _end(state)
+            elif step[i] > 0.0 and state.flow > 0.0:
+                state.length_m += step[i]
+                take_in(heading[i], step[i], state.length_m, state.mean, state.carried)
+        if after_gap[i]:
+            state.flow = 0.0
+        if flow[i] > 0.0:
+            _spray(state, heading[i])
+        spray_pass[i], state.flow = state.number, flow[i]
+    return spray_pass

@@ -15,10 +15,6 @@ from paint_deposition.kernel.compiler import njit
 ONLY_BRUSH = 0
 # Earlier than any stamp [ns].
 BEFORE_ALL_NS = -(2**62)
-_TIMES = ('dwell_s', 'since_on_s', 'since_off_s')
-TRIGGER_STATE = np.dtype(
-    [(name, 'f8') for name in ('flow', 'open_flow', *_TIMES)] + [('open_brush', 'i8')]
-)
 
 SPRAYS_NOTHING = (
     'says spraying with flow 0, which lays no paint: give 1 for the calibrated flow, or NaN where '
@@ -42,7 +38,9 @@ def relative_flow(spraying: bool, flow: float = math.nan) -> float:
 
 def first_trigger(flow_before: float) -> np.ndarray:
     """State before the first sub-step: (1,) record, from the flow that was on until then."""
-    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH)], TRIGGER_STATE)
+    numbers = ('flow', 'open_flow', 'dwell_s', 'since_on_s', 'since_off_s')
+    fields = [*((name, 'f8') for name in numbers), ('open_brush', 'i8')]
+    return np.array([(flow_before, 1.0, 0.0, np.inf, np.inf, ONLY_BRUSH)], np.dtype(fields))
 
 
 @njit(cache=True)

@@ -26,9 +26,8 @@ from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN, Status, Task
 from paint_deposition.nodes.runtime.parameters import CONFIGURED, NodeParameter, fixed
 from paint_deposition.nodes.runtime.topics import ColouredMesh, header
-from paint_deposition.part.facing import turned
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, turned
 
 
 class ModelComparison(PaintingNode):

@@ -17,7 +17,7 @@ from geometry_msgs.msg import PoseStamped, TransformStamped
 from paint_msgs.msg import AtomizerState, ComparisonStats, Part, ThicknessField, ThicknessStats
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns, transforms_of, trigger_change
+from paint_deposition.files.recordings.messages import stamp_ns, transforms_of, trigger_change
 from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.part_frame import PART_POSE_TOPIC
@@ -36,7 +36,7 @@ from paint_deposition.nodes.runtime.parameters import (
     require_display,
 )
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
-from paint_deposition.part.facing import turned
+from paint_deposition.part.surface import turned
 from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
 
 

@@ -18,7 +18,7 @@ from paint_deposition.part.edges import (
     patch_of_vertex,
     without_seams,
 )
-from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2
 
 # Facets that meet at a larger angle are taken for a crease of the part, not for a coarse curve.
 CREASE_RAD = np.radians(30.0)
@@ -27,26 +27,13 @@ CREASE_RAD = np.radians(30.0)
 RIM_FOLD_RAD = np.radians(60.0)
 # A turn counts as that of a rim if it is made within this distance [m].
 REACH_M = 0.01
-# Folds of less are none, and a strip between two folds of a hem is no wider.
-LEAST_FOLD_RAD = np.radians(4.0)
-WIDEST_STRIP_M = 0.02
-# Pieces of folds that are compared [m]; they lie beside each other if they are this parallel.
-PIECE_M = 0.005
-PARALLEL_COSINE = 0.8
 # Edges with less of both, in radians and as a share of a gun's distance, cost next to nothing.
 LEAST_ERROR = 5e-4
-GUN_M = 0.3
-# Those that cost the most are kept.
-MOST_EDGES = 5_000
-
-
-def folds_rad(vertices_m: np.ndarray, faces: np.ndarray, edges: Edges) -> np.ndarray:
-    """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
-    return _folds_rad(vertices_m, faces, face_normals(vertices_m, faces), edges.paired)
 
 
 @njit(cache=True, nogil=True)
-def _folds_rad(vertices, faces, normals, paired):
+def folds_rad(vertices, faces, normals, paired):
+    """(E,) angle between the two triangles of each paired edge, positive if convex [rad]."""
     folds = np.empty(len(paired))
     for e in range(len(paired)):
         f, k = paired[e, 0] // 3, paired[e, 0] % 3
@@ -68,7 +55,7 @@ def rim_folds(
     A hem is a row of folds that together turn convexly by as much as a rim.
     """
     rim = folds >= RIM_FOLD_RAD
-    rows = np.flatnonzero(folds > LEAST_FOLD_RAD)
+    rows = np.flatnonzero(folds > np.radians(4.0))  # less is no fold
     ends_m = half_edges_m(vertices_m, faces, edges.paired[rows, 0])
     beside = faces[edges.paired[rows] // 3].reshape(-1, 3)
     area = face_areas_m2(vertices_m, beside).reshape(-1, 2).min(axis=1)
@@ -81,7 +68,7 @@ def rim_folds(
     along = ends_m[:, 1] - ends_m[:, 0]
     length = np.maximum(np.linalg.norm(along, axis=1), 1e-12)
     along = along / length[:, None]
-    pieces, whose = cut_segments(ends_m, PIECE_M)
+    pieces, whose = cut_segments(ends_m, 0.005)
     half = 0.5 * (length / np.bincount(whose))[whose]
     middle = pieces.mean(axis=1)
     fold = folds[rows]
@@ -89,7 +76,7 @@ def rim_folds(
     for block, i, j, _ in near_pairs(middle, middle, REACH_M):
         i = i + block.start
         parallel = np.abs(np.einsum('ij,ij->i', along[whose[i]], along[whose[j]]))
-        beside = (whose[i] != whose[j]) & (parallel > PARALLEL_COSINE)
+        beside = (whose[i] != whose[j]) & (parallel > 0.8)
         i, j = i[beside], j[beside]
         ahead = np.abs(np.einsum('ij,ij->i', middle[j] - middle[i], along[whose[i]]))
         # Of a fold beside it in several pieces each counts as far as it lies abreast.
@@ -150,8 +137,8 @@ def strip_vertices(
     of_face = patch[patches[:, 0]]
     border = np.bincount(of_face[hem_half_edges // 3], length_m, minlength=patch.max() + 1)
     area = np.bincount(of_face, face_areas_m2(vertices_m, patches), minlength=patch.max() + 1)
-    # A strip has a fold on both its sides.
-    return (2.0 * area < WIDEST_STRIP_M * border)[patch]
+    # A strip has a fold on both its sides, and is no wider than this between them [m].
+    return (2.0 * area < 0.02 * border)[patch]
 
 
 def carried_over(flagged: np.ndarray, fine: np.ndarray, count: int) -> np.ndarray:
@@ -232,7 +219,7 @@ class CurvedEdges:
             bent.append(edges[_bends(vertices_m, normals, edges)[0] > LEAST_ERROR])
         edges = np.unique(np.sort(np.concatenate(bent), axis=1), axis=0)
         worst_first = np.argsort(-_bends(vertices_m, normals, edges)[0], kind='stable')
-        edges = edges[worst_first[:MOST_EDGES]]
+        edges = edges[worst_first[:5000]]
         _, lengths, lean, sagitta = _bends(vertices_m, normals, edges)
         start, end = edges.T
         along = (vertices_m[end] - vertices_m[start]) / lengths[:, None]
@@ -258,7 +245,7 @@ def _bends(
     along /= np.maximum(length, 1e-12)[:, None]
     at_start, at_end = (np.einsum('ij,ij->i', normals[v], along) for v in (start, end))
     lean, sagitta = 0.5 * (at_start + at_end), length * (at_end - at_start) / 8.0
-    cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / GUN_M
+    cost = 1.5 * np.abs(lean) + 2.0 * np.abs(sagitta) / 0.3  # a gun's distance [m]
     # What a shorter edge costs lies within the spot of a gauge: fillets and hems.
     return np.where(length < 0.004, 0.0, cost), length, lean, sagitta
 

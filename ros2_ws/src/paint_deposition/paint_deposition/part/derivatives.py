@@ -5,8 +5,8 @@ import math
 import numpy as np
 import scipy
 
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import njit
-from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.part.creases import RIM_FOLD_RAD
 from paint_deposition.part.edges import near_pairs, rows_by_number
 from paint_deposition.part.refinement import face_areas_m2, face_normals
@@ -38,14 +38,6 @@ def surface_normals(vertices_m: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True, error_model='numpy')
-def _cross(a, b, out):
-    out[0] = a[1] * b[2] - a[2] * b[1]
-    out[1] = a[2] * b[0] - a[0] * b[2]
-    out[2] = a[0] * b[1] - a[1] * b[0]
-    return math.sqrt(out[0] * out[0] + out[1] * out[1] + out[2] * out[2])
-
-
-@njit(cache=True, nogil=True, error_model='numpy')
 def _mean_normal(vertices, faces, corners, out):
     ahead, behind, across = np.empty(3), np.empty(3), np.empty(3)
     for axis in range(3):
@@ -56,7 +48,10 @@ def _mean_normal(vertices, faces, corners, out):
         for axis in range(3):
             ahead[axis] = vertices[faces[f, (k + 1) % 3], axis] - vertices[here, axis]
             behind[axis] = vertices[faces[f, (k + 2) % 3], axis] - vertices[here, axis]
-        length = _cross(ahead, behind, across)
+        for axis in range(3):
+            i, j = (axis + 1) % 3, (axis + 2) % 3
+            across[axis] = ahead[i] * behind[j] - ahead[j] * behind[i]
+        length = math.sqrt(across[0] * across[0] + across[1] * across[1] + across[2] * across[2])
         cosine = ahead[0] * behind[0] + ahead[1] * behind[1] + ahead[2] * behind[2]
         angle = math.atan2(length, cosine)
         for axis in range(3):
@@ -183,8 +178,8 @@ def _fill(vertices, faces, first, corner, start, stop, normals):
                 normal[axis] = (normal[axis] - slope) * cosine
 
 
-# Normals within this radius tell the curvature [m]; vertices so close are at one place [m].
-RADIUS_M, SAME_PLACE_M = 0.03, 1e-6
+# Normals within this radius tell the curvature [m].
+RADIUS_M = 0.03
 
 
 def curvature_per_m(
@@ -209,7 +204,13 @@ def curvature_per_m(
     result = np.empty(len(points_m))
     for block, i, j, distance_m in near_pairs(points_m, surface_m, radius_m):
         offset = surface_m[j] - points_m[block][i]
-        same_side = _same_side(normals[block][i], surface_normals[j], offset)
+        own, other = normals[block][i], surface_normals[j]
+        # Copies of a vertex on both sides of a rim lie at one place, but for the last bits [m].
+        convex = np.einsum('ij,ij->i', other - own, offset) > -1e-6
+        # Surface that has turned so far within the radius lies round a rim, or is another side; in
+        # a hollow it may turn further.
+        least = np.where(convex, np.cos(RIM_FOLD_RAD), -0.25)
+        same_side = np.einsum('ij,ij->i', own, other) > least
         i, j, offset = i[same_side], j[same_side], offset[same_side]
         weight = surface_areas_m2[j] * (1.0 - (distance_m[same_side] / radius_m) ** 2) ** 2
         axes = tangents(normals[block])
@@ -217,15 +218,6 @@ def curvature_per_m(
         lean = np.einsum('kni,ni->kn', axes[:, i], surface_normals[j])
         result[block] = -_divergence(i, weight, place, lean, len(axes[0]))
     return result
-
-
-def _same_side(normals: np.ndarray, others: np.ndarray, offset_m: np.ndarray) -> np.ndarray:
-    """(K,) bool: whether surface is of the same side of the part; a hollow may turn further."""
-    cosine = np.einsum('ij,ij->i', normals, others)
-    # Copies of a vertex on both sides of a rim lie at one place, but for the last bits.
-    convex = np.einsum('ij,ij->i', others - normals, offset_m) > -SAME_PLACE_M
-    # Surface that has turned so far within the radius lies round a rim, or is another side.
-    return cosine > np.where(convex, np.cos(RIM_FOLD_RAD), -0.25)
 
 
 def tangents(normals: np.ndarray) -> np.ndarray:

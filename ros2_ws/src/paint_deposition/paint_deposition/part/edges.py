@@ -15,10 +15,8 @@ from paint_deposition.kernel.compiler import njit
 BLOCK = 4096
 # Pieces of edges so short that the nearest has one of the nearest middles [m].
 PIECE_M = 0.002
-CANDIDATES = 4
 # Patches of a CAD model are often triangulated apart; gaps up to this are no edges of the surface.
 SEAM_M = 3e-4
-SEAM_COSINE = -0.9
 
 
 @njit(cache=True, nogil=True)
@@ -174,7 +172,7 @@ def edge_distance_m(points_m: np.ndarray, rim_m: np.ndarray) -> np.ndarray:
         return np.full(len(points_m), np.inf)
     pieces = cut_segments(rim_m, PIECE_M)[0]
     middles = scipy.spatial.cKDTree(pieces.mean(axis=1))
-    near = middles.query(points_m, k=min(CANDIDATES, len(pieces)))[1]
+    near = middles.query(points_m, k=min(4, len(pieces)))[1]
     near = near.reshape(len(points_m), -1)
     return _distance_m(points_m[:, None, :], pieces[near]).min(axis=1)
 
@@ -195,7 +193,7 @@ def without_seams(segments_m: np.ndarray) -> np.ndarray:
     one, piece = near['i'], near['j']
     along = segments_m[:, 1] - segments_m[:, 0]
     along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
-    against = np.einsum('ni,ni->n', along[one], along[segment[piece]]) < SEAM_COSINE
+    against = np.einsum('ni,ni->n', along[one], along[segment[piece]]) < -0.9
     touching = _distance_m(middles[one], pieces[piece]) < SEAM_M
     free = np.ones(len(segments_m), dtype=bool)
     free[one[against & touching]] = False

@@ -47,8 +47,6 @@ def _face(surface: Surface) -> tuple[np.ndarray, np.ndarray, float, float]:
 
 # The foot of a usual gauge, from its middle to its rim [m].
 FOOT_M = 0.015
-# A grid is made finer by this factor until it has points enough, down to this pitch [m].
-FINER, LEAST_PITCH_M = 0.98, 0.005
 
 
 def can_stand(surface: Surface, foot_m: float = FOOT_M) -> np.ndarray:
@@ -97,6 +95,6 @@ def grid_places(surface: Surface, usable: np.ndarray, count: int) -> np.ndarray:
         places, hit = on_face_m(surface, np.stack(np.meshgrid(across, up), -1).reshape(-1, 2))
         near = np.unique(tree.query(places[hit])[1])
         near = near[usable[near]]
-        if len(near) >= count or pitch_m < LEAST_PITCH_M:
+        if len(near) >= count or pitch_m < 0.005:
             return near[np.linspace(0, len(near) - 1, min(count, len(near))).round().astype(int)]
-        pitch_m *= FINER
+        pitch_m *= 0.98

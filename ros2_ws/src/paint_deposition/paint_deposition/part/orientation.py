@@ -6,12 +6,8 @@ import numpy as np
 CANCELLED = 0.1
 # Parts whose mean normal is longer have their surface on one side, give or take a flange.
 ONE_SIDED = 0.5
-# Rounds in which the mean of the painted side settles, at the most.
-MOST_ROUNDS = 32
 # A part whose mean normal leans less than this from the horizontal plane stands.
 STANDING_COSINE = 0.7
-# A part drawn flat is no further from the plane z = 0 of its file.
-DRAWN_FLAT_M = 0.1
 
 
 def outward_side(
@@ -29,7 +25,19 @@ def outward_side(
     mean = mean_normal(normals, areas_m2)
     length = np.linalg.norm(mean)
     if gun_side is not None and len(normals) and length < ONE_SIDED:
-        return _facing_side(normals, areas_m2, gun_side)
+        # From the nearest of 26 directions, until the mean settles.
+        direction = np.rint(1.2 * gun_side / np.abs(gun_side).max())
+        direction /= np.linalg.norm(direction)
+        chosen = None
+        for _ in range(32):
+            # Surface of the side that the gun paints leans less than this from the side's mean.
+            about = normals @ direction > 0.5
+            if not about.any() or (chosen is not None and np.array_equal(about, chosen)):
+                break
+            chosen = about
+            direction = mean_normal(normals[about], None if areas_m2 is None else areas_m2[about])
+            direction /= np.linalg.norm(direction)
+        return direction
     if length > CANCELLED:
         return mean / length
     return np.array([0.0, -1.0, 0.0]) if abs(down[1]) < 0.9 else np.array([0.0, 0.0, 1.0])
@@ -48,10 +56,18 @@ def gravity(
     Down is -z. A part that lies in x-y does so in the booth, a hood or a roof, if it is away from
     the plane z = 0. In that plane it was drawn flat, and hangs: down is -y.
     """
-    if not _lies(normals, areas_m2):
+    mean = mean_normal(normals, areas_m2)
+    length = np.linalg.norm(mean)
+    lies = abs(mean[2]) >= STANDING_COSINE * length
+    if length <= CANCELLED:  # a closed body lies as a plate, not as a block
+        spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
+        shares, directions = np.linalg.eigh(spread)
+        # Share of a closed body's surface along one direction that makes it a plate.
+        lies = shares[-1] > 0.7 and abs(directions[2, -1]) >= STANDING_COSINE
+    if not lies:
         return np.array([0.0, 0.0, -1.0]), ''
-    low, high = vertices_m[:, 2].min() - DRAWN_FLAT_M, vertices_m[:, 2].max() + DRAWN_FLAT_M
-    if low <= 0.0 <= high:
+    # A part drawn flat is no further from that plane [m].
+    if vertices_m[:, 2].min() - 0.1 <= 0.0 <= vertices_m[:, 2].max() + 0.1:
         return np.array([0.0, -1.0, 0.0]), (
             'the part lies in x-y at z = 0, as if drawn flat: gravity is taken along -y of the '
             'mesh; if it lies so in the booth, as a hood or a roof does, give down 0 0 -1'
@@ -60,36 +76,6 @@ def gravity(
         'the part lies, as a hood or a roof does: gravity is taken along -z of the mesh; if it '
         'hangs while it is painted, give down'
     )
-
-
-def _lies(normals: np.ndarray, areas_m2: np.ndarray) -> bool:
-    """Whether most of the surface does; a closed body lies as a plate, not as a block."""
-    mean = mean_normal(normals, areas_m2)
-    length = np.linalg.norm(mean)
-    if length > CANCELLED:
-        return bool(abs(mean[2]) >= STANDING_COSINE * length)
-    spread = np.einsum('v,vi,vj->ij', areas_m2, normals, normals) / areas_m2.sum()
-    shares, directions = np.linalg.eigh(spread)
-    # Share of a closed body's surface along one direction that makes it a plate.
-    return bool(shares[-1] > 0.7 and abs(directions[2, -1]) >= STANDING_COSINE)
-
-
-def _facing_side(
-    normals: np.ndarray, areas_m2: np.ndarray | None, gun_side: np.ndarray
-) -> np.ndarray:
-    """Mean normal of the surface about it, from the nearest of 26 directions until it settles."""
-    direction = np.rint(1.2 * gun_side / np.abs(gun_side).max())
-    direction /= np.linalg.norm(direction)
-    chosen = None
-    for _ in range(MOST_ROUNDS):
-        # Surface of the side that the gun paints leans less than this from the side's mean.
-        about = normals @ direction > 0.5
-        if not about.any() or (chosen is not None and np.array_equal(about, chosen)):
-            break
-        chosen = about
-        direction = mean_normal(normals[about], None if areas_m2 is None else areas_m2[about])
-        direction /= np.linalg.norm(direction)
-    return direction
 
 
 def across_axis(outward: np.ndarray, down: np.ndarray) -> np.ndarray:

@@ -287,7 +287,11 @@ def _split(
     m, p, q = middle[rows[:, None], turn].T
     bc, ca = p >= 0, q >= 0
     one = ~bc & ~ca
+    # What is left are quadrilaterals (Q, 4), each cut along its shorter diagonal.
     quads = np.stack([m, np.where(bc, p, b), c, np.where(ca, q, a)], axis=1)[~one]
+    w, x, y, z = vertices_m[quads].transpose(1, 0, 2)
+    straight = np.linalg.norm(w - y, axis=1) <= np.linalg.norm(x - z, axis=1)
+    quads = np.where(straight[:, None], quads, np.roll(quads, -1, axis=1))
     return np.concatenate(
         [
             faces[kept],
@@ -295,17 +299,10 @@ def _split(
             np.stack([a, m, c], axis=1)[one],
             np.stack([m, b, p], axis=1)[bc],
             np.stack([a, m, q], axis=1)[ca],
-            *_halves(vertices_m, quads),
+            quads[:, [0, 1, 2]],
+            quads[:, [0, 2, 3]],
         ]
     )
-
-
-def _halves(vertices_m: np.ndarray, quads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two triangles for each quadrilateral (Q, 4), cut along its shorter diagonal."""
-    w, x, y, z = vertices_m[quads].transpose(1, 0, 2)
-    straight = np.linalg.norm(w - y, axis=1) <= np.linalg.norm(x - z, axis=1)
-    quads = np.where(straight[:, None], quads, np.roll(quads, -1, axis=1))
-    return quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]
 
 
 def _refuse_too_many(areas_m2: np.ndarray, longest_m: np.ndarray, edge_m: float) -> None:

@@ -16,11 +16,8 @@ from paint_deposition.part.surface import Surface
 
 # Within a face normals turn away from its mean by no more, but for a small share of its area.
 WIDEST_RAD, BEYOND = np.radians(40.0), 0.05
-MOST_SIDES, ROUNDS = 12, 30
 # What is smaller than this share of the part goes with the neighbour that it leans least from.
 LEAST_SHARE = 0.02
-# Vertices nearer than this are one place [m].
-SAME_PLACE_M = 1e-6
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,12 @@ def sprayable_faces(surface: Surface, widest_rad: float = WIDEST_RAD) -> tuple[F
     """
     normals = face_normals(surface.vertices_m, surface.faces)
     areas = face_areas_m2(surface.vertices_m, surface.faces)
-    pairs = _neighbours(surface)
+    # (N, 2) triangles that share an edge.
+    half_edges, first = half_edges_by_edge(_places(surface)[surface.faces])
+    follows = np.ones(len(half_edges), dtype=bool)
+    follows[first[:-1]] = False
+    same = np.flatnonzero(follows)
+    pairs = np.column_stack([half_edges[same - 1], half_edges[same]]) // 3
     side = _sides(normals, areas, widest_rad)
     one_side = pairs[side[pairs[:, 0]] == side[pairs[:, 1]]]
     _, label = connected(one_side, len(side))
@@ -90,28 +92,17 @@ def _face(surface: Surface, kept: np.ndarray) -> Face:
 
 def _places(surface: Surface) -> np.ndarray:
     """(V,) number of the place of each vertex: along creases several vertices share one."""
-    rounded = np.round(surface.vertices_m / SAME_PLACE_M).astype(np.int64)
+    rounded = np.round(surface.vertices_m / 1e-6).astype(np.int64)
     return np.unique(rounded, axis=0, return_inverse=True)[1].ravel()
-
-
-def _neighbours(surface: Surface) -> np.ndarray:
-    """(N, 2) triangles that share an edge."""
-    half_edges, first = half_edges_by_edge(_places(surface)[surface.faces])
-    follows = np.ones(len(half_edges), dtype=bool)
-    follows[first[:-1]] = False
-    same = np.flatnonzero(follows)
-    return np.column_stack([half_edges[same - 1], half_edges[same]]) // 3
 
 
 def _sides(normals: np.ndarray, areas: np.ndarray, widest_rad: float) -> np.ndarray:
     """(F,) number of the mean direction that each normal belongs to, by as few as will do."""
     means = normals[[int(np.argmax(normals @ (areas @ normals)))]]
-    for _ in range(MOST_SIDES):
-        for _ in range(ROUNDS):
+    for _ in range(12):  # sides, at the most
+        for _ in range(30):
             side = np.argmax(normals @ means.T, axis=1)
-            sums = np.stack(
-                [areas[side == k] @ normals[side == k] for k in range(len(means))]
-            )  # fmt: skip
+            sums = np.stack([areas[side == k] @ normals[side == k] for k in range(len(means))])
             moved = sums / np.maximum(np.linalg.norm(sums, axis=1, keepdims=True), 1e-12)
             settled = np.allclose(moved, means, atol=1e-6)
             means = moved

@@ -1,23 +1,28 @@
-"""The part's surface as a refined triangle mesh, and where points lie on it."""
+"""The part's surface as a refined triangle mesh: where points lie on it, which side guns see."""
 
 import hashlib
+from collections.abc import Iterable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from paint_deposition.kernel.blocks import neighbours_together
-from paint_deposition.kernel.threads import shared_among_threads
-from paint_deposition.part import creases, derivatives, locating
+from paint_deposition.kernel.blocks import neighbours_together, shared_among_threads
+from paint_deposition.part import creases, derivatives
 from paint_deposition.part.creases import NO_EDGES, CurvedEdges
 from paint_deposition.part.derivatives import surface_normals
 from paint_deposition.part.edges import Edges, edge_distance_m
-from paint_deposition.part.face_tree import FaceTree, first_hits
-from paint_deposition.part.locating import Location
-from paint_deposition.part.orientation import gravity, outward_side
+from paint_deposition.part.face_tree import FaceTree, Location, first_hits, locate
+from paint_deposition.part.orientation import (
+    CANCELLED,
+    ONE_SIDED,
+    gravity,
+    mean_normal,
+    outward_side,
+)
 from paint_deposition.part.points import SurfacePoints, box_centre_m, box_extent_m, heights
-from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, refine
+from paint_deposition.part.refinement import edge_lengths_m, face_areas_m2, face_normals, refine
 from paint_deposition.part.visibility import Occluder
 
 
@@ -84,7 +89,7 @@ class Surface:
         vertices_m = np.ascontiguousarray(vertices_m, dtype=np.float64)
         faces = np.ascontiguousarray(faces, dtype=np.int64)
         edges = Edges.of(faces)
-        folds = creases.folds_rad(vertices_m, faces, edges)
+        folds = creases.folds_rad(vertices_m, faces, face_normals(vertices_m, faces), edges.paired)
         rim = creases.rim_folds(vertices_m, faces, edges, folds)
         smooth = (np.abs(folds) <= creases.CREASE_RAD) & ~rim
         origin, patches = creases.split_at_creases(faces, edges, smooth)
@@ -121,13 +126,6 @@ class Surface:
         """Digest of the refined mesh: the same for the same vertices and faces in one order."""
         content = self.vertices_m.astype('<f8').tobytes() + self.faces.astype('<i8').tobytes()
         return hashlib.sha256(content).hexdigest()[:16]
-
-    def seen_from(self, gun_side: np.ndarray) -> 'Surface':
-        """The part with the gun (3,) on that side; what rays and searches need is shared."""
-        known = replace(self, gun_side=gun_side)
-        made = vars(self).items()
-        vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
-        return known
 
     @property
     def area_m2(self) -> float:
@@ -183,7 +181,10 @@ class Surface:
             normals: (N, 3) outward, any length; between two sides of a thin part the one that
                 agrees is taken. Without them it is the one that the gun paints, if only one is.
         """
-        return locating.locate(self._tree, self.normals, points_m, normals, self._only_side)
+        # A gun whose mean direction is shorter has turned to more sides of the part than one.
+        one_side = self.gun_side is not None and np.linalg.norm(self.gun_side) >= 0.9
+        side = self.outward if one_side else None
+        return locate(self._tree, self.normals, points_m, normals, side)
 
     def at(
         self,
@@ -231,13 +232,6 @@ class Surface:
     def _tree(self) -> FaceTree:
         return FaceTree.of(self.vertices_m, self.faces)
 
-    @property
-    def _only_side(self) -> np.ndarray | None:
-        # A gun whose mean direction is shorter has turned to more sides of the part than one.
-        if self.gun_side is None or np.linalg.norm(self.gun_side) < 0.9:
-            return None
-        return self.outward
-
     @cached_property
     def longest_edge_m(self) -> float:
         """Longest edge after refinement [m]."""
@@ -258,3 +252,72 @@ class Surface:
             np.concatenate([vertex_areas, areas]),
             max(derivatives.RADIUS_M, self.longest_edge_m),
         )
+
+
+def toward_the_guns(surface: Surface, motions: Iterable[tuple[np.ndarray, np.ndarray]]) -> Surface:
+    """Turn a part round that is sprayed from behind, and give a closed one its outward side.
+
+    Which side of an open surface is outward depends on the program that exported it, and a closed
+    body has a surface on every side; the first gun, (positions_m, z_axes), whose axis meets the
+    part decides. The surface itself is returned if it faces the gun; turned and with a note, since
+    it would stay bare, if most poses that look at it look at its back.
+    """
+    for positions_m, z_axes in motions:
+        front, back, axes = facing(surface, positions_m, z_axes)
+        if len(axes):
+            return _settled(surface, front, back, axes)
+    return surface
+
+
+def toward_the_gun(surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray) -> Surface:
+    """Turn a part as ``toward_the_guns`` does, for one gun."""
+    return toward_the_guns(surface, [(positions_m, z_axes)])
+
+
+def turned(surface: Surface) -> Surface:
+    """The part with its other side outward."""
+    return replace(
+        surface,
+        faces=np.ascontiguousarray(surface.faces[:, ::-1]),
+        normals=-surface.normals,
+        curved_edges=surface.curved_edges.turned(),
+    )
+
+
+def _settled(surface: Surface, front: int, back: int, axes: np.ndarray) -> Surface:
+    """The part with the side outward that these poses look at."""
+    if back > front:
+        note = (
+            f'{back} of {back + front} poses look at the back of the mesh: its '
+            'triangles were turned round'
+        )
+        surface = replace(turned(surface), notes=(*surface.notes, note))
+    mean = mean_normal(surface.normals, surface.vertex_areas_m2)
+    if np.linalg.norm(mean) >= ONE_SIDED:  # it has one outward side by itself, as an open sheet
+        return surface
+    gun_side = -axes.mean(axis=0)
+    if np.linalg.norm(gun_side) < CANCELLED:
+        return surface
+    known = replace(surface, gun_side=gun_side)
+    # What rays and searches need is shared.
+    made = vars(surface).items()
+    vars(known).update({key: value for key, value in made if key in ('_tree', 'occluder')})
+    settled = surface.gun_side is not None and np.array_equal(known.outward, surface.outward)
+    return surface if settled else known
+
+
+def facing(
+    surface: Surface, positions_m: np.ndarray, z_axes: np.ndarray
+) -> tuple[int, int, np.ndarray]:
+    """What the gun looks at from TCPs (N, 3) [m] along its axis, tool z (N, 3).
+
+    Returned are how many poses look at the outward side and how many at the other, and tool z
+    (M, 3) of both.
+    """
+    some = slice(None, None, max(1, len(positions_m) // 2000))  # 2000 poses tell it
+    positions_m, z_axes = np.asarray(positions_m)[some], np.asarray(z_axes)[some]
+    face = surface.first_faces(positions_m, z_axes)
+    met = face >= 0
+    normals = face_normals(surface.vertices_m, surface.faces[face[met]])
+    front = int(np.sum(np.einsum('ij,ij->i', normals, z_axes[met]) < 0.0))
+    return front, len(normals) - front, z_axes[met]

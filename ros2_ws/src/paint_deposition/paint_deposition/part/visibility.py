@@ -9,8 +9,8 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from paint_deposition.kernel.blocks import shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
-from paint_deposition.kernel.threads import shared_among_threads
 from paint_deposition.part.derivatives import tangents
 from paint_deposition.part.face_tree import (
     DEPTH,

@@ -9,8 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from paint_deposition.errors import PaintError
-from paint_deposition.part.face_tree import FaceTree
-from paint_deposition.part.locating import Location, locate
+from paint_deposition.part.face_tree import FaceTree, Location, locate
 from paint_deposition.part.points import box_words
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
@@ -129,8 +128,21 @@ class Zones:
         zones = Zones(tuple(facing))
         found = PointZones(zones, zones.of(surface.vertices_m, surface.normals))
         for k, zone in enumerate(zones.zones):
-            if not np.any(found.number == k):
-                raise PaintError(_empty(zone, zones.zones[:k], surface))
+            if np.any(found.number == k):
+                continue
+            inside = zone.holds(surface.vertices_m, surface.normals)
+            if inside.any():
+                names = ', '.join(one.name for one in zones.zones[:k])
+                raise PaintError(
+                    f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to "
+                    f'zones before it ({names}); put it before them'
+                )
+            boxes = ' and '.join(box_words(region.box_m) for region in zone.regions)
+            raise PaintError(
+                f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the "
+                f'part within {box_words(surface.vertices_m)}; give it in the frame and unit of '
+                'the mesh, or refine the mesh for a small zone'
+            )
         return found
 
 
@@ -168,20 +180,3 @@ class PointZones:
         targets = np.array([*(zone.target_um for zone in zones), target_um or np.nan])
         tolerances = np.array([*(zone.tolerance_um for zone in zones), tolerance_um or 0.0])
         return targets[self.number], tolerances[self.number]
-
-
-def _empty(zone: Zone, before: tuple[Zone, ...], surface: Surface) -> str:
-    """Why a zone has no vertex of a part."""
-    inside = zone.holds(surface.vertices_m, surface.normals)
-    if inside.any():
-        names = ', '.join(one.name for one in before)
-        return (
-            f"zone '{zone.name}': all {inside.sum()} vertices of the part in it belong to zones "
-            f'before it ({names}); put it before them'
-        )
-    boxes = ' and '.join(box_words(region.box_m) for region in zone.regions)
-    return (
-        f"zone '{zone.name}' holds no vertex of the part: it lies within {boxes}, the part within "
-        f'{box_words(surface.vertices_m)}; give it in the frame and unit of the mesh, or refine '
-        'the mesh for a small zone'
-    )

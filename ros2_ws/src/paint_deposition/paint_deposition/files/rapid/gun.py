@@ -13,8 +13,6 @@ from paint_deposition.model.eq1_pattern import MOST
 from paint_deposition.motion.programmed import GunSwitch, Move
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
-# Outputs that `writer` uses: an analogue one for the relative flow, a group output for the brush.
-FLOW_SIGNAL, BRUSH_SIGNAL = 'aoflow', 'gobrush'
 OUTPUTS = ('setdo', 'set', 'reset', 'setao', 'setgo', 'pulsedo', 'invertdo')
 TRIGGERS = ('triggio', 'triggequip')
 
@@ -111,7 +109,8 @@ class Gun(Interpreter):
         output = i.values[0] if i.values and i.name in OUTPUTS else None
         of_trigger = i.options.get('aop') or i.options.get('gop')
         signal = name_of(of_trigger if i.name in TRIGGERS else output)
-        return {FLOW_SIGNAL: 'flow', BRUSH_SIGNAL: 'brush'}.get(signal, '')
+        # As the module of a plan sets them: an analogue output and a group output.
+        return {'aoflow': 'flow', 'gobrush': 'brush'}.get(signal, '')
 
     def command(self, i: Instruction, what: str) -> None:
         """Set the gun, its flow or its brush."""

@@ -56,7 +56,11 @@ class Interpreter(Values):
         self._passed: dict[str, dict[int, None]] = {}
         with suppress(_Exit):
             self.call(start, [], {})
-        return ', '.join(f'{name} ({_lines([*lines])})' for name, lines in self._passed.items())
+        passed = []
+        for name, lines in self._passed.items():
+            shown = ', '.join(map(str, [*lines][:5])) + (' ...' if len(lines) > 5 else '')
+            passed.append(f'{name} (line{"s" * (len(lines) > 1)} {shown})')
+        return ', '.join(passed)
 
     def call(self, routine: Routine, values: list, options: dict[str, Any]) -> Any:
         if any(routine is one for one in self._running):
@@ -122,7 +126,14 @@ class Interpreter(Values):
 
     def _instruction(self, i: Instruction) -> None:
         self.line = i.line
-        i = i._replace(options=dict(self._given(i.options)))
+        # An option handed on, V?v, is one if the parameter is given.
+        given = {}
+        for name, node in i.options.items():
+            if not (isinstance(node, Node) and node.rule == 'conditional'):
+                given[name] = node
+            elif (parameter := node.children[0]) in self._local:
+                given[name] = Node('reference', [parameter])
+        i = i._replace(options=given)
         if routine := self.routine(i.name):
             self.call(routine, i.values, i.options)
         elif i.name == 'return':
@@ -137,14 +148,6 @@ class Interpreter(Values):
         elif not self.act(i):
             self._pass_over(i)
 
-    def _given(self, options: dict[str, Any]) -> Iterator[tuple[str, Any]]:
-        """The options without those handed on, V?v, of a parameter that is not given."""
-        for name, node in options.items():
-            if not (isinstance(node, Node) and node.rule == 'conditional'):
-                yield name, node
-            elif (parameter := node.children[0]) in self._local:
-                yield name, Node('reference', [parameter])
-
     def _pass_over(self, i: Instruction) -> None:
         if i.name not in PASSED_OVER:
             self.fail(
@@ -155,10 +158,7 @@ class Interpreter(Values):
             self.assign(i.values[0], Unknown(i.name, f'what {i.name} reads in line {i.line}'))
         outputs = i.values[:1] if i.name.startswith(('set', 'reset')) else []
         names = [part for node in outputs if isinstance(node, Node) for part in node.children[:1]]
-        self._told(' '.join([i.name, *map(str, names)]), i.line)
-
-    def _told(self, name: str, line: int) -> None:
-        self._passed.setdefault(name, {})[line] = None
+        self._passed.setdefault(' '.join([i.name, *map(str, names)]), {})[i.line] = None
 
     def _assignment(self, reference: Node, node: Any) -> None:
         self.line = reference.children[0].line
@@ -253,7 +253,7 @@ class Interpreter(Values):
                 name = reference.children[0]
                 unknown = Unknown(name, f'{name}, which depends on {reason}')
                 self.assign(Node('reference', [name]), unknown)
-        self._told(str(word), line_of(word))
+        self._passed.setdefault(str(word), {})[line_of(word)] = None
 
 
 def _assigned(node: Node) -> Iterator[Node]:
@@ -261,8 +261,3 @@ def _assigned(node: Node) -> Iterator[Node]:
     for part in node.children:
         if isinstance(part, Node):
             yield from part.children[:1] if part.rule == 'assignment' else _assigned(part)
-
-
-def _lines(lines: list[int]) -> str:
-    shown = ', '.join(map(str, lines[:5])) + (' ...' if len(lines) > 5 else '')
-    return f'line {shown}' if len(lines) == 1 else f'lines {shown}'

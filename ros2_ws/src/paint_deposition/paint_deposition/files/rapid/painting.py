@@ -6,11 +6,7 @@ import numpy as np
 
 from paint_deposition.errors import quoted
 from paint_deposition.files.rapid.functions import Frame, frame, inverse, product
-from paint_deposition.files.rapid.gun import (
-    Gun,
-    RapidMove,
-    name_of,
-)
+from paint_deposition.files.rapid.gun import Gun, RapidMove, name_of
 from paint_deposition.files.rapid.interpreter import PASSED_OVER
 from paint_deposition.files.rapid.parser import Instruction, Module, Routine
 from paint_deposition.files.rapid.values import NOWHERE, PREDEFINED, RECORDS, Unknown
@@ -21,9 +17,6 @@ MOVES = {
     'triggc': 2, 'moveldo': 1, 'movejdo': 1, 'movecdo': 2,
 }  # fmt: skip
 TRIGGER_OPTIONS = tuple(f't{number}' for number in range(2, 9))
-# Of the options of moves what the film sees, and what it does not; a path that a sensor corrects
-# (`\Corr`) is not known.
-MOVE_OPTIONS = ('v', 't', 'wobj', *TRIGGER_OPTIONS, 'conc', 'id', 'z', 'inpos', 'tload')
 HOME = frame(NOWHERE)
 
 
@@ -107,7 +100,10 @@ class Painting(Gun):
 
     def _move(self, i: Instruction) -> None:
         count = MOVES[i.name]
-        self.only_options(i.name, i.options, MOVE_OPTIONS)
+        # What the film sees, and what it does not. A path that a sensor corrects (`\Corr`) is not
+        # known.
+        known = ('v', 't', 'wobj', *TRIGGER_OPTIONS, 'conc', 'id', 'z', 'inpos', 'tload')
+        self.only_options(i.name, i.options, known)
         values = i.values[:-2] if i.name.endswith('do') else i.values
         if len(values) < count + 3:
             self.fail(f'{i.name} needs a target, a speed, a zone and a tool')
@@ -133,12 +129,17 @@ class Painting(Gun):
             spray = self.spray_in_move([self.known(node) for node in named])
         at = name, poses[-1]
         position, rotation = at[1]
+        held, its_tool = self.value(tool), name_of(tool)
+        if isinstance(held, Unknown):
+            its_tool = held.name
+        elif self._record(held, 'tooldata')[0] is False:
+            self.fail(f'tool {its_tool} stands still; only tools the robot holds are read')
         stop, radius_mm, *_ = self._record(self.known(zone), 'zonedata')
         zone_m = 0.0 if stop else self.number(radius_mm, 'the radius of the zone') * 1e-3
         self.program.moves.append(RapidMove(
             position * 1e-3, rotation.as_quat(), self._speed_m_per_s(i, speed, at),
             via_m=poses[0][0] * 1e-3 if count == 2 else None, line=i.line, instruction=i.name,
-            zone_m=zone_m, tool=self._tool(tool), frame=name,
+            zone_m=zone_m, tool=its_tool, frame=name,
             work_object=name_of(i.options.get('wobj')) or 'wobj0', **spray,
         ))  # fmt: skip
         self._at = at
@@ -170,14 +171,6 @@ class Painting(Gun):
             'with the part'
         )
         return unit, self._frame(own)
-
-    def _tool(self, node: object) -> str:
-        value, name = self.value(node), name_of(node)
-        if isinstance(value, Unknown):
-            return value.name
-        if self._record(value, 'tooldata')[0] is False:
-            self.fail(f'tool {name} stands still; only tools the robot holds are read')
-        return name
 
     def _speed_m_per_s(self, i: Instruction, node: object, at: tuple[str, Frame]) -> float:
         if 't' in i.options and self._at and self._at[0] == at[0]:

@@ -161,21 +161,17 @@ def parse_modules(text: str, source: str) -> list[Module]:
             reason = f'{text.lower()[error.pos_in_stream or 0]!r} is not RAPID'
         else:
             reason = f'{quoted(str(token) or "the end")} is not expected here'
-            reason += (
-                "; is a ';' missing before it?"
-                if 'SEMICOLON' in getattr(error, 'expected', ())
-                else ''
-            )
+            if 'SEMICOLON' in getattr(error, 'expected', ()):
+                reason += "; is a ';' missing before it?"
         raise RecordingError(f'{source} line {error.line}: {reason}') from None
-    return [_module(module, source) for module in modules]
-
-
-def _module(node: Node, source: str) -> Module:
-    name, *scopes = node.children
-    found: dict[str, list] = {'global': [], 'local': []}
-    for scope, (item, *_) in scopes:
-        if isinstance(item, Routine):
-            found[scope].append(item._replace(source=source))
-        elif isinstance(item, Node) and item.rule == 'declaration':
-            found[scope] += item.children
-    return Module(str(name), source, found['global'], found['local'])
+    read = []
+    for module in modules:
+        name, *scopes = module.children
+        found: dict[str, list] = {'global': [], 'local': []}
+        for scope, (item, *_) in scopes:
+            if isinstance(item, Routine):
+                found[scope].append(item._replace(source=source))
+            elif isinstance(item, Node) and item.rule == 'declaration':
+                found[scope] += item.children
+        read.append(Module(str(name), source, found['global'], found['local']))
+    return read

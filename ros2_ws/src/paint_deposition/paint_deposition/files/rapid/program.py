@@ -38,8 +38,16 @@ def read_program(
             every instruction that may act and is not understood; with file, line and remedy.
     """
     path = Path(path)
+    files = [path]
+    if path.is_dir():
+        files = sorted(file for file in path.iterdir() if file.suffix.lower() in MODULES)
+    elif path.suffix.lower() == LIST_OF_MODULES:
+        names = re.findall(r'<Module>\s*(.*?)\s*</Module>', _text(path), re.IGNORECASE)
+        files = [path.with_name(name) for name in names]
+        if not files:
+            raise RecordingError(f'{path} lists no modules; give the folder of the modules')
     try:
-        modules = [m for file in _files(path) for m in parse_modules(_text(file), str(file))]
+        modules = [m for file in files for m in parse_modules(_text(file), str(file))]
         start = _start(modules, procedure, path)
         painting = Painting(modules, start, gun_signal)
         painting.run(start)
@@ -57,17 +65,6 @@ def is_rapid(path: Path | str) -> bool:
     if path.is_dir():
         return any(file.suffix.lower() in MODULES for file in path.iterdir())
     return path.suffix.lower() in (*MODULES, LIST_OF_MODULES)
-
-
-def _files(path: Path) -> list[Path]:
-    if path.is_dir():
-        return sorted(file for file in path.iterdir() if file.suffix.lower() in MODULES)
-    if path.suffix.lower() != LIST_OF_MODULES:
-        return [path]
-    names = re.findall(r'<Module>\s*(.*?)\s*</Module>', _text(path), re.IGNORECASE)
-    if not names:
-        raise RecordingError(f'{path} lists no modules; give the folder of the modules')
-    return [path.with_name(name) for name in names]
 
 
 def _text(file: Path) -> str:

@@ -9,7 +9,7 @@ import math
 import re
 import shutil
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -22,7 +22,7 @@ import lz4.frame
 import yaml
 import zstandard
 from mcap.writer import MCAP0_MAGIC
-from rosbags.interfaces import Connection, MessageDefinitionFormat, Nodetype
+from rosbags.interfaces import MessageDefinitionFormat, Nodetype
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag1 import reader as ros1_reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -33,7 +33,7 @@ from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import MOST_TEXT_MB, read_file, require_file
-from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.strict_yaml import require_small
 
 # The key under which the custom data of a plan's bag names its trigger topic.
@@ -44,7 +44,7 @@ ROS2_SUFFIXES = ('.mcap', '.db3')
 # Of a chunk, expanded; recorders make chunks of some megabytes. Of a file compressed as a whole.
 MOST_CHUNK_BYTES, MOST_FILE_BYTES = 256 * 1024 * 1024, 20_000_000_000
 # Elements of the arrays of fixed length in a type, other than arrays of numbers.
-MOST_FIXED, TEXTS = 10_000, ('string', 'wstring')
+MOST_FIXED = 10_000
 
 
 @dataclass(frozen=True)
@@ -153,34 +153,30 @@ class Bag:
         if topic not in self._stores:
             connection = next(c for c in self._reader.connections if c.topic == topic)
             store = get_typestore(definitions.STANDARD_STORE if self._is_ros1 else Stores.EMPTY)
-            types = _definitions(connection)
-            _require_short_arrays(topic, types)
+            form, text = connection.msgdef
+            standard = get_typestore(definitions.STANDARD_STORE).fielddefs
+            if form == MessageDefinitionFormat.IDL:
+                types = get_types_from_idl(text)
+            elif form == MessageDefinitionFormat.MSG:
+                types = get_types_from_msg(text, connection.msgtype)
+            elif connection.msgtype in standard:  # older sqlite3 bags hold no definitions at all
+                types = dict(standard)
+            else:
+                text = definitions.installed(connection.msgtype).text
+                types = get_types_from_msg(text, connection.msgtype)
+            # For each element of these rosbags would write a line of code.
+            entries: list[Any] = [*types.values()]
+            fields = (kind for _, of in entries for _, kind in of)
+            arrays = (of for kind, of in fields if kind == Nodetype.ARRAY)
+            texts = ('string', 'wstring')
+            long = sum(n for (kind, of), n in arrays if kind != Nodetype.BASE or of[0] in texts)
+            if long > MOST_FIXED:
+                raise RecordingError(
+                    f'{topic} has a type with arrays of {long} elements, over {MOST_FIXED}'
+                )
             store.register({name: types[name] for name in types if name not in store.fielddefs})
             self._stores[topic] = store
         return self._stores[topic]
-
-
-def _definitions(connection: Connection) -> dict:
-    kind, text = connection.msgdef
-    if kind == MessageDefinitionFormat.IDL:
-        return get_types_from_idl(text)
-    if kind != MessageDefinitionFormat.MSG:  # older sqlite3 bags hold no definitions at all
-        standard = get_typestore(definitions.STANDARD_STORE).fielddefs
-        if connection.msgtype in standard:
-            return dict(standard)
-        text = definitions.installed(connection.msgtype).text
-    return get_types_from_msg(text, connection.msgtype)
-
-
-def _require_short_arrays(topic: str, types: Mapping[str, Any]) -> None:
-    """Refuse types for which rosbags would write a line of code for each of very many elements."""
-    fields = (kind for _, of in types.values() for _, kind in of)
-    arrays = (of for kind, of in fields if kind == Nodetype.ARRAY)
-    long = sum(length for (kind, of), length in arrays if kind != Nodetype.BASE or of[0] in TEXTS)
-    if long > MOST_FIXED:
-        raise RecordingError(
-            f'{topic} has a type with arrays of {long} elements, over {MOST_FIXED}'
-        )
 
 
 def expanded(compression: str, data: bytes, most_bytes: int = MOST_CHUNK_BYTES) -> bytes:

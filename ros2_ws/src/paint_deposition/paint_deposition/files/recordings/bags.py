@@ -11,12 +11,12 @@ import numpy as np
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
-from paint_deposition.files.recordings.triggers import BOOL_TYPE, unused_triggers, with_trigger
+from paint_deposition.files.recordings.triggers import BOOL_TYPE, with_trigger
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.stream_quality import StreamQuality, looks_like_mm
@@ -56,7 +56,17 @@ def trajectory_of(
     """
     trajectory, log_times_ns = motion_of(bag, pose_topic, tf, robot, pose_unit)
     if not state_topic:
-        return replace(trajectory, notes=(*trajectory.notes, *unused_triggers(bag)))
+        # AtomizerState is listed first, since a Bool may be anything.
+        unused = [t for t in bag.topics_of(STATE_TYPE, BOOL_TYPE) if t.message_count]
+        if not unused:
+            return trajectory
+        named = ' and '.join(f'{topic.name} ({topic.type})' for topic in unused)
+        note = (
+            f'recording {bag.path}: {named} {"is" if len(unused) == 1 else "are"} not used, the '
+            f'gun sprays whenever poses flow; add `state_topic: {unused[0].name}` (--state-topic) '
+            'if that is the trigger'
+        )
+        return replace(trajectory, notes=(*trajectory.notes, note))
     return with_trigger(bag, state_topic, trajectory, log_times_ns)
 
 

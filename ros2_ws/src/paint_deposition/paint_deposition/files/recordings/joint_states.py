@@ -15,8 +15,7 @@ from scipy.spatial.transform import Rotation
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.atomic import MOST_TEXT_MB, read_file
 from paint_deposition.files.recordings.bag_files import Bag, listed_topics
-from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.message_definitions import JOINT_TYPE
+from paint_deposition.files.recordings.messages import JOINT_TYPE, stamp_ns
 from paint_deposition.files.tables.headings import ANGLES, LENGTHS
 from paint_deposition.motion.arm import Arm
 from paint_deposition.motion.stream_quality import RepeatedSamples, StreamQuality

@@ -4,7 +4,7 @@ import math
 import shutil
 import struct
 from collections.abc import Callable, Collection, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
 from io import BytesIO
 from mmap import ACCESS_READ, mmap
@@ -27,7 +27,7 @@ from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import require_file
 from paint_deposition.files.recordings.bag_files import MOST_CHUNK_BYTES, expanded, mcap_files
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
-from paint_deposition.files.recordings.message_definitions import Definition
+from paint_deposition.files.recordings.messages import Definition
 
 # Exceptions of the readers on damaged data.
 DAMAGE = (
@@ -100,18 +100,21 @@ def _copy(
 ) -> None:  # fmt: skip
     schemas: dict[int, Schema] = {}
     channels: dict[int, Channel] = {}
-    try:  # the summary repeats all channels, in case the chunk that defines one is damaged
-        with _mapped(file) as stream:
-            reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
-            if summary := reader.get_summary():
-                schemas, channels = dict(summary.schemas), dict(summary.channels)
-    except (*DAMAGE, OSError):  # no summary
-        pass
+    # The summary, if any, repeats all channels, in case the chunk that defines one is damaged.
+    with suppress(*DAMAGE, OSError), _mapped(file) as stream:
+        reader = SeekingReader(stream, record_size_limit=file.stat().st_size)
+        if summary := reader.get_summary():
+            schemas, channels = dict(summary.schemas), dict(summary.channels)
     for record in _records(file, recovery, on_bytes):
         if isinstance(record, Schema):
             schemas[record.id] = record
         elif isinstance(record, Metadata) and record.name == 'rosbag2':
-            _copy_metadata(record, writer)
+            # An older record, or none, has to do where this one is damaged.
+            with suppress(yaml.YAMLError, AttributeError):
+                content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
+                custom = content.get('custom_data') or {}
+                writer.custom_data = {key: str(value) for key, value in custom.items()}
+                writer.ros_distro = content.get('ros_distro') or writer.ros_distro
         elif isinstance(record, Channel):
             channels[record.id] = record
         if isinstance(record, Channel | Message):
@@ -183,16 +186,6 @@ def _truncated_chunk_records(record: bytes) -> Iterator[McapRecord]:
         reader = StreamReader(BytesIO(data), skip_magic=True, record_size_limit=len(data))
         yield from reader.records
     except DAMAGE:
-        return
-
-
-def _copy_metadata(record: Metadata, writer: RunWriter) -> None:
-    """Copy custom data and distribution from the metadata record of rosbag2."""
-    try:
-        content = yaml.safe_load(record.metadata.get('serialized_metadata', ''))
-        writer.custom_data = {k: str(v) for k, v in (content.get('custom_data') or {}).items()}
-        writer.ros_distro = content.get('ros_distro') or writer.ros_distro
-    except (yaml.YAMLError, AttributeError):  # an older record, or none, has to do
         return
 
 

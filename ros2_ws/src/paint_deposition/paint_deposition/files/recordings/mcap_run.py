@@ -16,17 +16,15 @@ from pathlib import Path
 import yaml
 from mcap.writer import CompressionType, IndexType, Writer
 from rosbags import interfaces as ros
-from rosbags.interfaces import Qos, QosTime
+from rosbags.interfaces import Qos
 from rosbags.rosbag2.metadata import dump_qos_v9
 
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.atomic import write_text
 from paint_deposition.files.recordings.bag_files import KEPT
-from paint_deposition.files.recordings.message_definitions import Definition
+from paint_deposition.files.recordings.messages import Definition
 
 COMPRESSIONS = {kind.name.lower(): kind for kind in CompressionType}
-
-FOREVER = QosTime(9223372036, 854775807)
 
 
 def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos:
@@ -34,7 +32,8 @@ def offered_qos(depth: int, reliable: bool = True, latched: bool = False) -> Qos
     history, liveliness = ros.QosHistory.KEEP_LAST, ros.QosLiveliness.AUTOMATIC
     sent = ros.QosReliability.RELIABLE if reliable else ros.QosReliability.BEST_EFFORT
     kept = ros.QosDurability.TRANSIENT_LOCAL if latched else ros.QosDurability.VOLATILE
-    return Qos(history, depth, sent, kept, FOREVER, FOREVER, liveliness, FOREVER, False)
+    forever = ros.QosTime(9223372036, 854775807)
+    return Qos(history, depth, sent, kept, forever, forever, liveliness, forever, False)
 
 
 @dataclass(frozen=True)

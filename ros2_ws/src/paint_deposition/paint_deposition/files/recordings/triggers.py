@@ -10,8 +10,7 @@ import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic
-from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.messages import STATE_TYPE, stamp_ns, trigger_change
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import (
     ONLY_BRUSH,
@@ -87,20 +86,6 @@ def choose_state_topic(bag: Bag, name: str) -> BagTopic:
     return bag.choose(name, (STATE_TYPE, BOOL_TYPE), 'state')
 
 
-def unused_triggers(bag: Bag) -> tuple[str, ...]:
-    """A note on the topics that could be the trigger, if any."""
-    # AtomizerState is listed first, since a Bool may be anything.
-    topics = [topic for topic in bag.topics_of(STATE_TYPE, BOOL_TYPE) if topic.message_count]
-    if not topics:
-        return ()
-    named = ' and '.join(f'{topic.name} ({topic.type})' for topic in topics)
-    return (
-        f'recording {bag.path}: {named} {"is" if len(topics) == 1 else "are"} not used, the gun '
-        f'sprays whenever poses flow; add `state_topic: {topics[0].name}` (--state-topic) if '
-        'that is the trigger',
-    )
-
-
 def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarray) -> Trajectory:
     """The motion, logged at (N,) int64, with the trigger of a topic.
 
@@ -142,7 +127,22 @@ def _changes_of_signal(
     bag: Bag, topic: BagTopic, signal: Signal
 ) -> tuple[list[Change], bool, list[str]]:
     """The changes of a signal, whether they are by log time, and how it was interpreted."""
-    rows = list(_signal_values(bag, topic, signal))
+    rows: list[tuple[int, float, int, bool]] = []
+    for _, log_time_ns, message in bag.decoded([topic.name]):
+        stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
+        value = signal.value(message)
+        if value is None:
+            found = [f'{topic.name}{path}' for path in _numeric_fields(message)]
+            listed = ' '.join(found[:MOST_FIELDS]) + (' ...' if len(found) > MOST_FIELDS else '')
+            if not signal.path:
+                raise RecordingError(
+                    f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
+                )
+            raise RecordingError(
+                f'{topic.name} in {bag.path} has no number or Bool at {signal.path}; '
+                + did_you_mean(topic.name + signal.path, found, f'there are: {listed or "none"}')
+            )
+        rows.append((stamp or log_time_ns, value, log_time_ns, bool(stamp)))
     known = [row for row in rows if math.isfinite(row[1])]
     if not known:
         raise RecordingError(f'{topic.name} in {bag.path} has no numbers; record it again')
@@ -183,28 +183,6 @@ def _changes_of_states(
         bag.skipped[f'states on {topic.name}, the first of them an {refused[0]}'] = len(refused)
     notes = [f'trigger {topic.name} {SPRAYS_NOTHING} ({without_flow} states)'] * bool(without_flow)
     return changes, {name: float(np.median(values)) for name, values in settings.items()}, notes
-
-
-def _signal_values(
-    bag: Bag, topic: BagTopic, signal: Signal
-) -> Iterator[tuple[int, float, int, bool]]:
-    """(time, value, log time, whether the time is a header stamp) of each message."""
-    for _, log_time_ns, message in bag.decoded([topic.name]):
-        stamp = stamp_ns(message.header) if hasattr(message, 'header') else 0
-        value = signal.value(message)
-        if value is None:
-            raise RecordingError(_missing_field(bag, topic, message, signal.path))
-        yield stamp or log_time_ns, value, log_time_ns, bool(stamp)
-
-
-def _missing_field(bag: Bag, topic: BagTopic, message: Any, path: str) -> str:
-    """The error message for a missing field, with those that exist."""
-    found = [f'{topic.name}{switch}' for switch in _numeric_fields(message)]
-    listed = ' '.join(found[:MOST_FIELDS]) + (' ...' if len(found) > MOST_FIELDS else '')
-    if not path:
-        return f'{topic.name} in {bag.path} is {topic.type}; name one of its fields: {listed}'
-    remedy = did_you_mean(topic.name + path, found, f'there are: {listed or "none"}')
-    return f'{topic.name} in {bag.path} has no number or Bool at {path}; {remedy}'
 
 
 def _numeric_fields(value: Any, path: str = '') -> Iterator[str]:

@@ -19,7 +19,6 @@ from paint_deposition.files.tables.sheets import (
 
 # A heading further down than this is none.
 MOST_LINES_ABOVE = 200
-MOST_LINES_ABOVE_TWO = 40  # of headings on two rows
 
 # The ways to write a unit, by its metres, seconds, radians, or metres a second.
 WAYS_TO_WRITE: dict[str, dict[float, str]] = {
@@ -139,7 +138,7 @@ def find_table(
     found: list[tuple[Sheet, int]] = []
     for one in sheets:
         above = [(one, k) for k in range(min(len(one.rows), MOST_LINES_ABOVE))]
-        above += [(two, k) for k in range(MOST_LINES_ABOVE_TWO) if (two := _on_two_rows(one, k))]
+        above += [(two, k) for k in range(40) if (two := _on_two_rows(one, k))]
         ranked = [
             (known(headings_in(its.rows[k])), not is_comment(its.rows[k]), its, k)
             for its, k in above

@@ -1,6 +1,5 @@
 """The columns of a table of poses, known by their names."""
 
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from decimal import Decimal, InvalidOperation
@@ -30,8 +29,6 @@ if TYPE_CHECKING:
 POSITION = ('x', 'y', 'z')
 QUATERNION = ('qx', 'qy', 'qz', 'qw')
 ROTATION_VECTOR, ROLL_PITCH_YAW = ('rx', 'ry', 'rz'), ('roll', 'pitch', 'yaw')
-# What a heading says of a pose beside the coordinate itself.
-BESIDE_POSE = {*BESIDE, 'tcp', 'tool', 'pose', 'robot', 'header', 'field', 'p'}
 # What stands before an axis in the columns of an orientation, and what it makes of it.
 ROTATED = {
     **dict.fromkeys(('orientation', 'quaternion', 'quat', 'q'), 'q'),
@@ -45,7 +42,6 @@ EGM_LOG = {
     **{f'R_FB_QUAT_U{k}': f'q{k + 1}' for k in range(4)},
     **{f'R_FB_POS_RJ{k}': f'J{k} [deg]' for k in range(1, 7)},
 }
-MEASURED_BY_EGM = {'R_FB_POS_X', 'R_FB_POS_RJ1'}  # by which the log is known
 
 
 @dataclass
@@ -153,7 +149,9 @@ def column_name(heading: Heading) -> str:
     turned = [ROTATED[word] for word in before if word in ROTATED]
     if turned and last in ('x', 'y', 'z', 'w'):
         return turned[-1] + last
-    kept = [word for word in heading.words if word not in BESIDE_POSE] or [last]
+    # What a heading says of a pose beside the coordinate itself.
+    beside = {*BESIDE, 'tcp', 'tool', 'pose', 'robot', 'header', 'field', 'p'}
+    kept = [word for word in heading.words if word not in beside] or [last]
     # A logger's path to a coordinate: what is before it names the message.
     known = (*POSITION, *QUATERNION, *ROTATION_VECTOR, *ROLL_PITCH_YAW)
     return kept[-1] if kept[-1] in known else ''.join(kept)
@@ -164,7 +162,7 @@ def translated(headings: list[Heading]) -> list[Heading]:
 
     What it planned (R_PL) and was asked for (S_REF) has no words.
     """
-    if MEASURED_BY_EGM.isdisjoint(heading.text for heading in headings):
+    if {'R_FB_POS_X', 'R_FB_POS_RJ1'}.isdisjoint(heading.text for heading in headings):
         return headings
     usual = [Heading.of(EGM_LOG.get(heading.text, '')) for heading in headings]
     return [replace(its, text=heading.text) for its, heading in zip(usual, headings, strict=True)]
@@ -204,13 +202,6 @@ ROTATION_WORDS = (
     "'rotvec' for a rotation vector, three letters for Euler angles (ZYX about the axes of the "
     'tool, xyz about fixed axes), or kuka, abb, fanuc, rpy, staubli, kawasaki'
 )
-ROTVEC = 'rotvec'
-
-
-def is_rotation(name: str) -> bool:
-    """Whether a name is that of a rotation vector or of a convention of angles."""
-    known = name.lower() in (ROTVEC, *CONVENTIONS)
-    return known or re.fullmatch(r'[xyz]{3}|[XYZ]{3}', name) is not None
 
 
 def read_rotations(
@@ -243,7 +234,7 @@ def read_rotations(
             f'{written} reach {largest:.4g} and are read in rad; write the unit in the heading, '
             'as in roll [deg], or give --angle-unit deg'
         )
-    if convention == ROTVEC:
+    if convention == 'rotvec':
         return Rotation.from_rotvec(angles).as_quat(), f'rotation vector {written} in {unit}'
     sequence = CONVENTIONS.get(convention.lower(), convention)
     if by_axis and len(set(sequence.lower())) == 3:
@@ -258,7 +249,7 @@ def _angle_columns(table: PoseTable, rotation: str | None) -> tuple[list[int], b
     for names, usual, by_axis in ANGLE_COLUMNS:
         if columns := table.find_all(names):
             doubt = '' if usual else 'are Euler angles of an unknown convention'
-            if usual == ROTVEC and 'deg' in table.units(columns):
+            if usual == 'rotvec' and 'deg' in table.units(columns):
                 doubt = 'in degrees may be Euler angles or a rotation vector'
             if doubt and not rotation:
                 raise RecordingError(

@@ -32,10 +32,7 @@ AXES = ('x', 'y', 'z')
 ON_FACE = ('from_left', 'height')
 NORMALS = ('nx', 'ny', 'nz')
 LENGTH_UNITS, FILM_UNITS = (1.0, 1e-2, 1e-3, 25.4e-3), (1e-6, 25.4e-6, 1e-3)
-QUANTITIES = (*AXES, *NORMALS, *ALIASES)
 QUANTITY = {name: quantity for quantity, names in ALIASES.items() for name in names}
-LAYER = {name: layer for layer, names in LAYERS.items() for name in names}
-FILM_WORDS = {'schichtdicke', 'lackschichtdicke', 'dicke', 'thickness', 'dft', 'film'}
 
 
 @dataclass(frozen=True)
@@ -85,7 +82,8 @@ def columns_of(headings: list[Heading], layout: Layout) -> dict[str, list[int]]:
 def _known_columns(headings: list[Heading]) -> dict[str, list[int]]:
     """The columns of each quantity by the names of any table, of a gauge's layout, of layers."""
     at: dict[str, list[int]] = {}
-    for quantities, beside in ((QUANTITIES, BESIDE), (AXES, BESIDE | NOMINAL)):
+    every = (*AXES, *NORMALS, *ALIASES)
+    for quantities, beside in ((every, BESIDE), (AXES, BESIDE | NOMINAL)):
         found = [_quantity(heading, beside) for heading in headings]
         for quantity in (q for q in quantities if q in found and q not in at):
             at[quantity] = [k for k, one in enumerate(found) if one == quantity]
@@ -139,8 +137,10 @@ def _is_of_film(heading: Heading) -> bool:
 
 def _layer(heading: Heading) -> str:
     """The layer whose thickness a column holds by its heading, '' for none."""
-    words = tuple(word for word in heading.words if word not in FILM_WORDS)
-    layer = LAYER.get(plain(replace(heading, words=words)), '') if _is_of_film(heading) else ''
+    of_any = {'schichtdicke', 'lackschichtdicke', 'dicke', 'thickness', 'dft', 'film'}
+    words = tuple(word for word in heading.words if word not in of_any)
+    own = plain(replace(heading, words=words)) if _is_of_film(heading) else None
+    layer = next((layer for layer, names in LAYERS.items() if own in names), '')
     return layer and layer + ''.join(filter(str.isdigit, words))
 
 

@@ -37,7 +37,6 @@ from paint_deposition.files.tables.sheets import Sheet, cell_at, is_nothing, is_
 from paint_deposition.files.tables.table import Table
 
 GUESSED = 'no unit is given'
-MOST_FIGURES = 6  # of statistics without labels
 
 
 @dataclass
@@ -82,7 +81,7 @@ class ReadingTable(Table):
         table = table.without_units_in_cells(numeric).with_decimal(numeric, layout.decimal)
         failed = table._mark_failed() if films else ''
         if films and layout.zero == 'missing':
-            table = table.without(thick, lambda _, cell: table.is_zero(cell))
+            table = table.without(thick, lambda _, cell: table.number(cell) == 0.0)
         # The rows that are readings or points, and their order.
         kept, missing, table.left_out = table._sorted_rows(films, numeric, {*labels}, bare)
         table.left_out += failed
@@ -305,7 +304,7 @@ class ReadingTable(Table):
         if np.isnan(values).any():
             return ''
         decimals = [len(text.partition('.')[2]) for text in texts]
-        for count in range(min(MOST_FIGURES, len(values) - 3), 0, -1):
+        for count in range(min(6, len(values) - 3), 0, -1):
             rest, last = values[:-count], values[-count:]
             least, most = rest.min(), rest.max()
             figures = np.array([

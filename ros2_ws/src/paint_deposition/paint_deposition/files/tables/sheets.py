@@ -17,11 +17,7 @@ from paint_deposition.files.tables.gauge_formats import FOLDERS, LINES, NOTHING
 # Texts without blanks around them; the numbers of a workbook are numbers.
 Cell = str | float
 
-SEPARATORS = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
 WORKBOOKS = (b'PK\x03\x04', b'\xd0\xcf\x11\xe0')
-ENCODINGS = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
-# A reader of workbooks keeps all cells up to the last one: some 30 bytes each.
-MOST_CELLS = 10_000_000
 MOST_TABLE_MB = 500
 # The place of a cell, of a row, or of the end of the table.
 XLSX_CELL = re.compile(rb'\br=["\']([A-Za-z]*)(\d+)["\']')
@@ -118,7 +114,8 @@ def text_of(cell: Cell) -> str:
 
 def _decoded(content: bytes) -> list[tuple[str, str]]:
     """The text and the encoding's name: by its mark, else UTF-8, else what it may be."""
-    marked = [codec for mark, codec in ENCODINGS.items() if content.startswith(mark)]
+    marks = {b'\xef\xbb\xbf': 'utf-8-sig', b'\xff\xfe': 'utf-16', b'\xfe\xff': 'utf-16'}
+    marked = [codec for mark, codec in marks.items() if content.startswith(mark)]
     found = []
     for codec in marked or ('utf-8', 'cp1252', 'cp932'):
         try:
@@ -155,7 +152,8 @@ def _records(text: str) -> Sheet | None:
 
 def _sheets_of_text(text: str, encoding: str) -> list[Sheet]:
     sheets = []
-    for mark, name in SEPARATORS.items():
+    separators = {'\t': 'tabs', ';': 'semicolons', '|': 'bars', ',': 'commas'}
+    for mark, name in separators.items():
         if mark not in text:
             continue
         reader = csv.reader(StringIO(text, newline=''), delimiter=mark)
@@ -213,7 +211,7 @@ def _refuse_far_cells(content: bytes) -> None:
                 cells = max(cells, max(widths, default=0) * max(rows, default=0))
             if name == 'content.xml':
                 cells = max(cells, _cells_of_open_document(package.read(name)))
-    if cells > MOST_CELLS:
+    if cells > 10_000_000:  # the reader keeps all up to the last one, some 30 bytes each
         raise ValueError('a workbook (delete what lies far outside the table)')
 
 

@@ -10,13 +10,7 @@ import numpy as np
 
 from paint_deposition.errors import PaintError
 from paint_deposition.files.tables.headings import MOST_LINES_ABOVE, UNITS, Heading, unit_of
-from paint_deposition.files.tables.sheets import (
-    Cell,
-    cell_at,
-    is_nothing,
-    is_value,
-    text_of,
-)
+from paint_deposition.files.tables.sheets import Cell, cell_at, is_nothing, is_value, text_of
 
 MOST_ERRORS_SHOWN, MOST_REPEATS = 8, 50
 NUMBER_AND_MORE = re.compile(r'([+\-−]?[\d.,]+)\s*([^\W\d]\D*|°)')
@@ -64,7 +58,7 @@ class Table:
         name = self.headings[column].text or f'column {column + 1}'
         for index, row in enumerate(self.rows):
             cell = cell_at(row, column)
-            value = self._number(cell)
+            value = self.number(cell)
             if may_be_empty and is_nothing(cell):
                 continue
             if switch and text_of(cell).lower() in SWITCHED:
@@ -73,11 +67,8 @@ class Table:
                 mark = 'comma' if self.decimal == ',' else 'point'
                 wanted = f'expected a number with a decimal {mark}'
                 wanted += ', or n/a where there is none' if may_be_empty else ''
-                wanted += (
-                    '; write the one unit in the heading'
-                    if NUMBER_AND_MORE.fullmatch(text_of(cell))
-                    else ''
-                )
+                if NUMBER_AND_MORE.fullmatch(text_of(cell)):
+                    wanted += '; write the one unit in the heading'
                 self.add_error(index, f"{name} is '{text_of(cell)}'; {wanted}")
             elif finite and not np.isfinite(value):
                 self.add_error(index, f'{name} is {cell}; expected a finite number')
@@ -85,7 +76,8 @@ class Table:
                 values[index] = value
         return values
 
-    def _number(self, cell: Cell) -> float | None:
+    def number(self, cell: Cell) -> float | None:
+        """The number in a cell, None where it is none."""
         if isinstance(cell, float):
             return cell
         text = cell.replace('−', '-').lower()
@@ -138,10 +130,6 @@ class Table:
             for n, row in enumerate(self.rows)
         ]
         return replace(self, rows=rows)
-
-    def is_zero(self, cell: Cell) -> bool:
-        """Whether a cell is the number 0."""
-        return self._number(cell) == 0.0
 
     def with_repeats_apart(self: Kind, columns: Sequence[int]) -> tuple[Kind, list[int]]:
         """The table with a column for each of several numbers in one cell, as in '21.5; 22.1'.

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
+from paint_deposition.film.film import Tabular
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.film.tabular import Tabular
 from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Campaign

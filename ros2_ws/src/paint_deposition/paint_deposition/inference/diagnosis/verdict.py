@@ -10,8 +10,8 @@ from typing import Any, Literal
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
+from paint_deposition.film.film import Tabular
 from paint_deposition.film.spray_geometry import SprayGeometry
-from paint_deposition.film.tabular import Tabular
 from paint_deposition.inference.comparison.comparison import Comparison, compare
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray

@@ -21,8 +21,7 @@ from paint_deposition.film.integrator import (
 )
 from paint_deposition.film.layout import term_weights
 from paint_deposition.inference.readings.campaign import Campaign, Experiment
-from paint_deposition.kernel.blocks import LANES
-from paint_deposition.kernel.threads import THREADS
+from paint_deposition.kernel.blocks import LANES, THREADS
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.part.points import SurfacePoints
 

@@ -22,12 +22,11 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Bool
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings import message_definitions as definitions
+from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, RawMessage, open_bag
 from paint_deposition.files.recordings.bags import motion_of, trajectory_of
-from paint_deposition.files.recordings.headers import stamp_ns
 from paint_deposition.files.recordings.joint_states import Robot
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, stamp_ns
 from paint_deposition.files.recordings.pose_topics import (
     PART_POSE_TYPE,
     POSE_TYPE,

@@ -13,7 +13,7 @@ from rcl_interfaces.msg import ParameterEvent
 from rclpy.serialization import deserialize_message
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
+from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
 from paint_deposition.film.live_film import STREAM_RESTART_NS
 from paint_deposition.motion.part_frame import Rigid, is_pose
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF

@@ -12,7 +12,7 @@ from rclpy.duration import Duration
 from rclpy.node import Node
 from rclpy.publisher import Publisher
 
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.nodes.runtime.topics import PROGRESS, PROGRESS_TOPIC, node_name
 
 LOG_PERIOD_S = 5.0

@@ -13,9 +13,9 @@ from rclpy.serialization import deserialize_message
 
 from paint_deposition.errors import PaintError, RecordingError
 from paint_deposition.files.provenance import provenance
-from paint_deposition.files.recordings import message_definitions as definitions
-from paint_deposition.files.recordings.headers import stamp_ns
+from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter
+from paint_deposition.files.recordings.messages import stamp_ns
 from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.bags.recorded_topic import (

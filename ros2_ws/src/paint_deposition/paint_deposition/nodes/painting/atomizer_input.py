@@ -14,7 +14,7 @@ from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, PoseProgress
 
 from paint_deposition.errors import PaintError
-from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
+from paint_deposition.files.recordings.messages import stamp_ns, trigger_change
 from paint_deposition.motion.frame_tree import NoTransform
 from paint_deposition.motion.pose_stream import PoseBatch
 from paint_deposition.motion.stream_quality import Intervals, Jumps, SpeedNow

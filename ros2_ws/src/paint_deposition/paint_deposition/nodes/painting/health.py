@@ -9,8 +9,7 @@ import numpy as np
 from diagnostic_msgs.msg import DiagnosticStatus
 from paint_msgs.msg import PoseProgress
 
-from paint_deposition.files.recordings.headers import stamp_ns
-from paint_deposition.files.recordings.message_definitions import STATE_TYPE
+from paint_deposition.files.recordings.messages import STATE_TYPE, stamp_ns
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.nodes.painting.atomizer_input import (
     LONGEST_NAME,

@@ -26,9 +26,8 @@ from paint_deposition.nodes.painting.painting_parameters import (
 )
 from paint_deposition.nodes.runtime.managed_node import ManagedNode
 from paint_deposition.nodes.runtime.node import Task
-from paint_deposition.part.facing import facing, toward_the_gun
 from paint_deposition.part.points import SurfacePoints
-from paint_deposition.part.surface import Surface
+from paint_deposition.part.surface import Surface, facing, toward_the_gun
 
 MODEL_PARAMETERS = {'model_file', 'model_files'}
 

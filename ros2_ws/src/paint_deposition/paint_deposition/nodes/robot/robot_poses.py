@@ -10,8 +10,8 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 from sensor_msgs.msg import JointState
 
 from paint_deposition.errors import PaintError, RecordingError, did_you_mean
-from paint_deposition.files.recordings.headers import stamp_ns, transforms_of
 from paint_deposition.files.recordings.joint_states import Robot
+from paint_deposition.files.recordings.messages import stamp_ns, transforms_of
 from paint_deposition.motion.frame_tree import FrameTree, NoTransform
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, PaintNode, Status

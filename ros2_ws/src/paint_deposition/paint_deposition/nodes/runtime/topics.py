@@ -19,7 +19,7 @@ from rclpy.topic_endpoint_info import TopicEndpointInfo
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
-from paint_deposition.files.recordings.headers import nanoseconds
+from paint_deposition.files.recordings.messages import nanoseconds
 
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'

@@ -1,16 +1,21 @@
-"""Message definitions as rosbag2 stores them: text with dependencies, and type hash."""
+"""Messages as data: their definitions, as rosbag2 stores them, and the numbers in them."""
 
 import functools
 import json
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from paint_deposition.errors import RecordingError
+from paint_deposition.motion.part_frame import is_pose
+from paint_deposition.motion.pose_stream import FARTHEST_M, TriggerChange
+from paint_deposition.motion.trajectory import ONLY_BRUSH, relative_flow
 
 SEPARATOR = '=' * 80
 # Definitions of the messages that are serialised without a ROS installation.
@@ -55,9 +60,15 @@ def installed(message_type: str) -> Definition:
 
     def collect(name: str) -> None:
         texts[name] = _share_file(name, '.msg').read_text()
-        for used in sorted(_used_types(texts[name], name)):
-            if used not in texts:
-                collect(used)
+        _, fields = get_types_from_msg(texts[name], name)[name]
+        used = set()
+        for _, node in fields:
+            while node[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
+                node = node[1][0]
+            used |= {node[1]} if node[0] == Nodetype.NAME else set()
+        for other in sorted(used):
+            if other not in texts:
+                collect(other)
 
     collect(message_type)
     parts = [texts.pop(message_type)]
@@ -85,18 +96,6 @@ def standard(message_type: str) -> Definition:
     return Definition(text, store.hash_rihs01(message_type))
 
 
-def _used_types(text: str, message_type: str) -> set[str]:
-    _, fields = get_types_from_msg(text, message_type)[message_type]
-    used = set()
-    for _, description in fields:
-        node: Any = description
-        while node[0] in (Nodetype.ARRAY, Nodetype.SEQUENCE):
-            node = node[1][0]
-        if node[0] == Nodetype.NAME:
-            used.add(node[1])
-    return used
-
-
 def _share_file(message_type: str, suffix: str) -> Path:
     # ROS is imported where it is used: reading and writing bags must work without it.
     from ament_index_python.packages import PackageNotFoundError, get_package_share_directory
@@ -111,3 +110,58 @@ def _share_file(message_type: str, suffix: str) -> Path:
     if not path.is_file():
         raise RecordingError(f'{message_type} is not installed: {path} is missing')
     return path
+
+
+PLACED = ('translation', 'rotation')
+
+
+def stamp_ns(header: Any) -> int:
+    """A header's stamp in integer nanoseconds; 0 is none, or one that is no time of ROS."""
+    return nanoseconds(header.stamp.sec, header.stamp.nanosec)
+
+
+def nanoseconds(sec: int, nanosec: int) -> int:
+    """A time; 0 before 1970, and for a second or more of nanoseconds."""
+    valid = sec >= 0 and nanosec < 1_000_000_000
+    return sec * 1_000_000_000 + nanosec if valid else 0
+
+
+def pose_of(message: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) [m] and quaternion (4,) of a Pose or Transform.
+
+    They are NaN where one is infinite or further off than any part.
+    """
+    kind = ('position', 'orientation') if hasattr(message, 'position') else PLACED
+    p, q = (getattr(message, name) for name in kind)
+    values = np.array([p.x, p.y, p.z, q.x, q.y, q.z, q.w])
+    if not (np.abs(values) <= FARTHEST_M).all():
+        values[:] = np.nan
+    return values[:3], values[3:]
+
+
+def transforms_of(message: Any) -> Iterator[tuple[str, str, int, tuple[float, ...]]]:
+    """Child, parent, stamp [ns] and pose x y z qx qy qz qw of each transform of a TFMessage.
+
+    One that is not finite, or whose quaternion is none, is passed over, as by tf2.
+    """
+    for placed in message.transforms:
+        t, q = placed.transform.translation, placed.transform.rotation
+        pose = t.x, t.y, t.z, q.x, q.y, q.z, q.w
+        parent, child = placed.header.frame_id.lstrip('/'), placed.child_frame_id.lstrip('/')
+        if is_pose(pose):
+            yield child, parent, stamp_ns(placed.header), pose
+
+
+def trigger_change(state: Any) -> TriggerChange:
+    """What an AtomizerState says of the gun.
+
+    Raises:
+        RecordingError: it has no stamp, no possible flow or no possible number of a brush.
+    """
+    stamp, brush = stamp_ns(state.header), int(getattr(state, 'brush', ONLY_BRUSH))
+    if stamp == 0:
+        raise RecordingError('atomizer state without a stamp: stamp each state')
+    flow = relative_flow(bool(state.spraying), state.flow)
+    if flow > 0.0 and brush < ONLY_BRUSH:
+        raise RecordingError(f'atomizer state with brush {brush}: give 0 or more')
+    return TriggerChange(stamp, flow, brush)
