@@ -35,6 +35,7 @@ import paint_deposition as paint  # noqa: E402
 from paint_deposition.inference.diagnosis.discrepancy import PRIOR  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
+from worlds.measured import available  # noqa: E402
 from worlds.record import KINDS, Painted  # noqa: E402
 
 WORLDS = {
@@ -239,9 +240,7 @@ def main(
 
 
 def _is_there(world: str) -> bool:
-    if world != 'semi_real':
-        return True
-    there = importlib.import_module(WORLDS[world]).available()
+    there = world != 'semi_real' or available()
     if not there:
         click.echo('semi_real is left out: no measured tables beside the repository', err=True)
     return there

@@ -1,10 +1,11 @@
 """Pictures show what rays meet, and lines only where the part has an edge."""
 
 import numpy as np
+from matplotlib.figure import Figure
 from tests.surfaces import triangulated
 
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.pictures.part import PartPicture
+from paint_deposition.report.pictures.part import PartPicture, label_points
 
 
 def _folded(spacing_m):
@@ -32,3 +33,11 @@ def test_edges_are_those_of_the_outline_and_the_fold_alone():
     vertices, faces = _folded(0.01)
     picture = PartPicture.of(Surface.from_triangles(vertices, faces, 0.05))
     assert 0 < len(picture.edges_m) < 400
+
+
+def test_a_point_is_labelled_beside_what_is_written_there():
+    axes = Figure().subplots()
+    axes.text(9.0, 9.0, '20')
+    label_points(axes, np.zeros((1, 2)), ['1'], 1.0)
+    (label,) = axes.texts[1:]
+    assert np.hypot(*(np.subtract(label.get_position(), 9.0))) > 9.0
