@@ -16,6 +16,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import fields
+from functools import partial
 from pathlib import Path
 
 import click
@@ -35,6 +36,7 @@ import paint_deposition as paint  # noqa: E402
 from paint_deposition.inference.diagnosis.discrepancy import PRIOR  # noqa: E402
 from paint_deposition.inference.fitting.forward import Forward  # noqa: E402
 from paint_deposition.inference.readings.campaign import Campaign  # noqa: E402
+from worlds.measured import available  # noqa: E402
 from worlds.record import KINDS, Painted  # noqa: E402
 
 WORLDS = {
@@ -42,8 +44,6 @@ WORLDS = {
     'semi_real': 'worlds.semi_real',
 }
 PAINTED = ROOT / 'runs' / 'bench-diagnosis'
-# Constants of the diagnosis that have another value in this run, for its processes.
-CONSTANTS = 'PAINT_BENCH_CONSTANTS'
 # A reading this many times as far off as usual has a typing error; eight standard deviations.
 TYPING_ERROR = 12.0
 # Shares of the kinds of campaigns.
@@ -74,16 +74,17 @@ def painted(task: Task) -> Painted:
     if file.exists():
         return pickle.loads(file.read_bytes())
     made = importlib.import_module(WORLDS[world]).paint(seed, kind)
+    PAINTED.mkdir(parents=True, exist_ok=True)
     own = file.with_suffix(f'.{os.getpid()}')
     own.write_bytes(pickle.dumps(made))
     own.rename(file)
     return made
 
 
-def set_constants(settings: str) -> None:
-    """Give constants of the inference other values, as in 'SURE=0.9 PRIOR.sides=0.04'."""
+def set_constants(settings: Sequence[str]) -> None:
+    """Give constants of the inference other values, as in 'SURE=0.9' or 'PRIOR.sides=0.04'."""
     importlib.import_module('paint_deposition.inference.diagnosis.procedure')
-    for setting in settings.split():
+    for setting in settings:
         name, _, value = setting.partition('=')
         if name in (f'PRIOR.{field.name}' for field in fields(PRIOR)):
             object.__setattr__(PRIOR, name.removeprefix('PRIOR.'), ast.literal_eval(value))
@@ -99,10 +100,10 @@ def set_constants(settings: str) -> None:
             setattr(module, name, ast.literal_eval(value))
 
 
-def run(task: Task) -> list[dict]:
-    """Diagnose a campaign; a failure is a result too."""
+def run(constants: Sequence[str], task: Task) -> list[dict]:
+    """Diagnose a campaign, with other constants; a failure is a result too."""
     warnings.simplefilter('ignore')
-    set_constants(os.environ.get(CONSTANTS, ''))
+    set_constants(constants)
     world, seed, kind = task
     try:
         campaign = painted(task)
@@ -219,9 +220,7 @@ def main(
     worlds = [world for world in generators.split(',') if _is_there(world)]
     if not worlds:
         raise click.UsageError('the measured tables of semi_real are not beside the repository')
-    os.environ[CONSTANTS] = ' '.join(constants)
-    set_constants(os.environ[CONSTANTS])
-    PAINTED.mkdir(parents=True, exist_ok=True)
+    set_constants(constants)
     records = kept(results)
     if not report_only:
         done = {record['case'] for record in records}
@@ -230,7 +229,7 @@ def main(
             for task in tasks(campaigns, worlds, kinds.split(','), seed)
             if f'{task[0]}-{task[2]}-{task[1]}' not in done
         ]
-        records = add(results, run, todo)
+        records = add(results, partial(run, constants), todo)
     click.echo(table(records))
     if failed:
         click.echo('\n' + failures(records))
@@ -239,9 +238,7 @@ def main(
 
 
 def _is_there(world: str) -> bool:
-    if world != 'semi_real':
-        return True
-    there = importlib.import_module(WORLDS[world]).available()
+    there = world != 'semi_real' or available()
     if not there:
         click.echo('semi_real is left out: no measured tables beside the repository', err=True)
     return there

@@ -5,10 +5,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import click
-from distributed import as_completed
 from tqdm import tqdm
 
-from paint_deposition.batch.cases import workers
+from paint_deposition.batch.cases import Case, finished, workers
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -29,9 +28,10 @@ def kept(results: Path) -> list[dict]:
 def add(results: Path, run: Callable[[tuple], list[dict]], todo: Sequence[tuple]) -> list[dict]:
     """Run tasks as `paint sweep` runs its cases; return all records that the file holds."""
     results.parent.mkdir(parents=True, exist_ok=True)
-    with workers() as client, results.open('a') as file:
-        left = client.map(run, todo, pure=False)
-        for future in tqdm(as_completed(left), total=len(todo), mininterval=20):
+    cases = {repr(task): Case(repr(task), task) for task in todo}
+    with results.open('a') as file:
+        done = finished(run, cases, {}, workers()) if todo else ()
+        for _, future in tqdm(done, total=len(cases), mininterval=20):
             file.writelines(json.dumps(one, default=float) + '\n' for one in future.result())
             file.flush()
     return kept(results)

@@ -274,7 +274,7 @@ def reliability_diagram(records: list[Record], file: Path) -> None:
         axes.annotate(
             f'{number}', (place, share), (7, -11), textcoords='offset points', fontsize=8
         )
-    axes.set(xlim=(0, 1.02), ylim=(-0.02, 1.02), aspect='equal')
+    axes.set(xlim=(0, 1.08), ylim=(-0.02, 1.02), aspect='equal')
     axes.set(xlabel='stated probability of a group', ylabel='share that was right')
     axes.set_title(f'{len(sound)} campaigns, {count} groups: calibration error {error:.3f}')
     axes.legend(loc='upper left', frameon=False)

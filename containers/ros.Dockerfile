@@ -1,5 +1,5 @@
 # The nodes on ROS 2, with foxglove_bridge; compose.yaml makes a cell of it.
-ARG DISTRIBUTION=kilted
+ARG DISTRIBUTION=jazzy
 FROM ros:${DISTRIBUTION}
 SHELL ["/bin/bash", "-c"]
 RUN apt-get update && apt-get install --yes --no-install-recommends \

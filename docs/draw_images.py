@@ -1,10 +1,12 @@
 """Draw the pictures of the documentation again, with the commands that the documentation names.
 
 Run it in the project's environment, with nothing behind it for all pictures, or with `build` for
-the film as it builds up, `layers` for the layers in architecture.svg, `results` for the rest:
+the film as it builds up, `layers` for the layers in architecture.svg, `profiles` for real ones
+(their tables lie beside the repository), `results` for the rest:
 `. setup/environment.sh; python docs/draw_images.py build`.
 """
 
+import json
 import re
 import shutil
 import subprocess
@@ -18,11 +20,14 @@ import numpy as np
 from PIL import Image
 
 import paint_deposition as paint
+from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.model.eq3_collapse import ThreeGaussianCollapse
+from paint_deposition.report.style import ACCENT, INK, legend, new_figure, quiet, save_picture
 
 ROOT = Path(__file__).resolve().parent.parent
 SAMPLES = ROOT / 'ros2_ws/src/paint_deposition/samples'
 IMAGES = ROOT / 'docs/images'
-LARGEST_BYTES = 300_000
+LARGEST_BYTES = 350_000
 WIDEST_PX = 1280
 
 # The moving picture: frames a second, how much faster than the robot, the last frame's time [s].
@@ -36,7 +41,8 @@ ZONES = """zones:
 
 def main() -> None:
     """Draw what is named on the command line, or everything."""
-    drawn = {'build': draw_build, 'layers': draw_layers, 'results': draw_results}
+    drawn = {'build': draw_build, 'layers': draw_layers, 'profiles': draw_profiles,
+             'results': draw_results}  # fmt: skip
     for name in sys.argv[1:] or drawn:
         drawn[name]()
 
@@ -118,6 +124,42 @@ def draw_layers() -> None:
     path.write_text(new, encoding='utf-8')
 
 
+def draw_profiles() -> None:
+    """What other people measured, and eqs. (1) to (3) as the tests fit them to it."""
+    fits = json.loads((ROOT / 'tests/inference/fitting/real_profiles.json').read_text())
+    tables = [
+        np.loadtxt(ROOT.parent / 'shared/data' / name, delimiter=',', skiprows=1).T
+        for name in ('travelling_gun_transect_1d_collapse.csv',
+                     'magnetron_static_radial_130mm.csv',
+                     'hvof_wc17co_thickness_angle_standoff.csv')
+    ]  # fmt: skip
+    (station_ft, depth_in), (_, radius_mm, share), (angle, standoff_mm, thickness_um, *_) = tables
+    figure = new_figure(13.0, 4.0)
+    left, middle, right = figure.subplots(1, 3)
+    quiet(left, 'station [ft]', 'depth [in]', 'Moving sprinkler: eq. (3)')
+    x = np.linspace(-160.0, 160.0, 400)
+    left.plot(
+        x, ThreeGaussianCollapse(**fits['eq3']).thickness_um(x), color=ACCENT, label='eq. (3)'
+    )
+    left.plot(station_ft, depth_in, 'o', color=INK, markersize=5, label='measured')
+    quiet(middle, 'radius [mm]', 'thickness', 'Static magnetron at 130 mm: eq. (1)')
+    r = np.linspace(0.0, 300.0, 400)
+    pattern = PlanarPattern(**fits['eq1'])
+    middle.plot(r, pattern.flux_um_per_s(1e-3 * r, 0.0), color=ACCENT, label='eq. (1)')
+    middle.plot(radius_mm, share / 100.0, 'o', color=INK, markersize=5, label='measured')
+    quiet(right, 'spray angle [deg]', 'thickness [µm]', 'HVOF coating: eq. (2)')
+    upright_um = thickness_um[angle == 90.0].mean()
+    a = np.linspace(20.0, 90.0, 200)
+    right.plot(a, upright_um * np.sin(np.radians(a)), color=ACCENT, label='cosine law')
+    for distance in np.unique(standoff_mm):
+        at = standoff_mm == distance
+        right.plot(angle[at], thickness_um[at], 'o', markersize=5, label=f'{distance:g} mm')
+    for axes in (left, middle, right):
+        axes.set_ylim(bottom=0.0)
+        legend(axes)
+    save_picture(figure, IMAGES / 'real-profiles.png')
+
+
 def draw_results() -> None:
     """Run the commands on the samples and keep their pictures."""
     with tempfile.TemporaryDirectory() as name:
@@ -167,7 +209,7 @@ def run(command: str, *arguments: object) -> None:
 def of_the_door(profiles: Image.Image) -> Image.Image:
     """The legend and the lower half, where the door's four columns are."""
     width, height = profiles.size
-    legend, door = int(0.045 * height), int(0.518 * height)
+    legend, door = int(0.045 * height), int(0.525 * height)
     picture = Image.new('RGB', (width, legend + height - door), 'white')
     picture.paste(profiles.crop((0, 0, width, legend)), (0, 0))
     picture.paste(profiles.crop((0, door, width, height)), (0, legend))

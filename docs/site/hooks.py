@@ -3,7 +3,7 @@
 The pages are plain Markdown with links that work in the repository. Here a link to a file outside
 docs/ leads to a page that shows the file, `<!-- generated: NAME -->` is replaced by what the code
 says (docs/files.md has it already), and formulas become MathML, so that no script has to be
-fetched to show them.
+fetched to show them. The notebook is run, and shown as a page.
 """
 
 import html
@@ -17,6 +17,8 @@ from latex2mathml.converter import convert
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
+from nbconvert.exporters import MarkdownExporter
+from nbconvert.preprocessors import ExecutePreprocessor
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = ROOT / 'docs'
@@ -34,7 +36,7 @@ LANGUAGES = {'.yaml': 'yaml', '.py': 'python', '.xml': 'xml', '.json': 'json', '
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
-    """Add a page for each file of the repository that a page links to."""
+    """Add a page for each file of the repository that a page links to, and for the notebook."""
     linked = {
         (DOCS / target).resolve()
         for page in files.documentation_pages()
@@ -48,6 +50,10 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
             language = LANGUAGES.get(path.suffix, 'text')
             text = f'# {path.name}\n\n`{name}` of the repository.\n\n```{language}\n{text}\n```\n'
         files.append(File.generated(config, _uri(path), content=text))
+    run_all = MarkdownExporter(preprocessors=[ExecutePreprocessor(kernel_name='python3')])
+    text, made = run_all.from_filename(DOCS / 'notebook.ipynb', {'output_files_dir': 'notebook'})
+    for name, content in {'notebook.md': text, **made['outputs']}.items():
+        files.append(File.generated(config, name, content=content))
     return files
 
 
@@ -81,7 +87,7 @@ def on_page_content(content: str, page: Page, config: MkDocsConfig, files: Files
 
 def _uri(path: Path) -> str:
     """The page that shows a file of the repository."""
-    if path.is_relative_to(DOCS) and path.suffix == '.md':
-        return path.relative_to(DOCS).as_posix()
+    if path.is_relative_to(DOCS) and path.suffix in ('.md', '.ipynb'):
+        return path.relative_to(DOCS).with_suffix('.md').as_posix()
     name = os.path.relpath(path, ROOT)
     return f'source/{name}' if path.suffix == '.md' else f'source/{name}.md'

@@ -1,12 +1,16 @@
 """What benchmarks compute, print and score, on results made by hand."""
 
+import json
 import re
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 import pytest
+from benchmarks.diagnosis import main as score_the_diagnosis
 from benchmarks.live import ages_s
 from benchmarks.page import page_of, with_output
+from benchmarks.records import add
 from benchmarks.scores import (
     Row,
     expected_calibration_error,
@@ -20,6 +24,7 @@ from benchmarks.scores import (
     table,
     wrong,
 )
+from click.testing import CliRunner
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -52,6 +57,26 @@ def test_every_place_has_a_benchmark_that_fills_it(tmp_path):
         assert f'benchmarks.page {name} ' in makefile, name
     with pytest.raises(SystemExit, match='0 pages'):
         page_of('a', tmp_path)
+
+
+def recorded(task):
+    return [{'task': task}]
+
+
+def test_tasks_run_as_the_cases_of_a_sweep_and_join_the_kept_records(tmp_path, monkeypatch):
+    monkeypatch.setattr('benchmarks.records.workers', lambda: ThreadPoolExecutor(1))
+    results = tmp_path / 'results.jsonl'
+    results.write_text('{"task": [0]}\n')
+    records = add(results, recorded, [(1,), (2,), (2,)])
+    assert sorted(record['task'] for record in records) == [[0], [1], [2]]
+
+
+def test_the_diagnosis_is_scored_from_what_was_kept(tmp_path):
+    results = tmp_path / 'results.jsonl'
+    results.write_text(json.dumps(RIGHT | {'p_value': 0.01}) + '\n')
+    done = CliRunner().invoke(score_the_diagnosis, ['--report-only', '--results', str(results)])
+    assert done.exit_code == 0, done.exception
+    assert 'wrong effects accepted, per campaign' in done.output
 
 
 def result(case, **fields):

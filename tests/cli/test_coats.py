@@ -160,6 +160,7 @@ def test_a_column_of_wet_film_tells_the_remedy(folder):
     assert readings.thickness_um.tolist() == [20.0]
 
 
+@pytest.mark.slow
 def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):
     """The same readings as experiments of their own, of one coat and of both guns together."""
     hidden = pd.DepositionModel().with_effect(AirDrift(shift_down_m=0.05))

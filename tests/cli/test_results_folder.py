@@ -131,6 +131,7 @@ print(left[0])
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('end', ['kill', 'full'])
 @pytest.mark.parametrize('others', [True, False], ids=['among_other_files', 'alone'])
 def test_results_are_the_old_or_the_new_wherever_a_command_ends(tmp_path, end, others):

@@ -55,6 +55,7 @@ def test_simulate_counts_each_zone_against_its_band(panel, one_pass, zones, tmp_
     assert_refused(paint(*whole, '--zones', zones), "zone 'foot' holds no vertex of the part")
 
 
+@pytest.mark.slow
 def test_compare_tells_the_readings_of_each_zone(zones, tmp_path):
     """By --zones, which stands for the campaign's own."""
     sample = SAMPLES / 'measured_door'

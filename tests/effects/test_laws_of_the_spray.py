@@ -95,6 +95,7 @@ def test_misalignment_is_the_part_moved():
     np.testing.assert_allclose(film, expected, atol=1e-10 * expected.max())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('standoff_m', [0.15, 0.4])
 def test_width_and_volume_go_with_powers_of_the_distance(standoff_m):
     motion, ratio = spot(standoff_m=standoff_m), distance_ratio(standoff_m)

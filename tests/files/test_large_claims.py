@@ -174,6 +174,7 @@ def little_memory() -> Iterator[None]:
     resource.setrlimit(resource.RLIMIT_AS, before)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize('what', CLAIMS)
 def test_what_a_head_claims_is_not_believed(what, tmp_path, little_memory):
     name, content = CLAIMS[what]

@@ -27,6 +27,7 @@ def test_a_screen_before_the_gun_is_met_while_it_passes():
     assert abs(contact.place_m[1] + 0.1) < 1e-9
 
 
+@pytest.mark.slow
 def test_a_plan_on_which_the_gun_touches_the_part_is_refused_or_says_so(tmp_path):
     """The gun's body reaches back from the TCP, 30 mm from the panel: the screen is in its way."""
     low = {'speed_m_per_s': 0.3, 'standoff_m': 0.03, 'smoothing_radius_m': 0.3}

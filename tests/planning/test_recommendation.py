@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from inference.fitting.panels import column, passes
 from paint_deposition.effects.catalogue import EFFECTS
@@ -18,6 +19,7 @@ from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.points import SurfacePoints
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
+from paint_deposition.report.pictures.planning import draw_curve
 
 SYMMETRIC = DepositionModel(planar=PlanarPattern(K3=0.0))
 LOPSIDED = DepositionModel()
@@ -56,6 +58,14 @@ def test_with_a_tolerance_the_best_index_of_the_widest_range_is_recommended():
         if low > answer.index_range_m[0]:
             assert sigma_n(SYMMETRIC, low - 1e-4) > 0.05
         assert sigma_n(SYMMETRIC, high + 1e-4) > 0.05
+
+
+@pytest.mark.parametrize(('range_m', 'side'), [((0.2, 0.32), 'left'), ((0.54, 0.66), 'right')])
+def test_the_tolerance_is_named_where_the_curve_is_away_from_it(range_m, side):
+    axes, (low, high) = Figure().subplots(), range_m
+    draw_curve(axes, recommended(tolerance=0.05, index_min_m=low, index_max_m=high))
+    (label,) = (text for text in axes.texts if text.get_text() == 'tolerance 5 %')
+    assert label.get_ha() == side
 
 
 def test_drift_limits_are_where_the_tolerance_breaks():

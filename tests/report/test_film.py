@@ -6,6 +6,7 @@ import re
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 
 from booth import door, panel, serpentine
@@ -14,7 +15,7 @@ from paint_deposition.motion.path import SprayPath
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.part.surface import Surface
 from paint_deposition.report.pictures.film import film_picture
-from paint_deposition.report.pictures.part import PartPicture, View
+from paint_deposition.report.pictures.part import PartPicture, View, label_points
 from paint_deposition.report.style import BELOW, HIGH, WITHIN, save_picture
 from surfaces import triangulated
 
@@ -159,3 +160,11 @@ def test_edges_are_those_of_the_outline_and_the_fold_alone():
     vertices, faces = folded(0.01)
     picture = PartPicture.of(Surface.from_triangles(vertices, faces, 0.05))
     assert 0 < len(picture.edges_m) < 400
+
+
+def test_a_point_is_labelled_beside_what_is_written_there():
+    axes = Figure().subplots()
+    axes.text(9.0, 9.0, '20')
+    label_points(axes, np.zeros((1, 2)), ['1'], 1.0)
+    (label,) = axes.texts[1:]
+    assert np.hypot(*(np.subtract(label.get_position(), 9.0))) > 9.0

@@ -160,6 +160,7 @@ def test_a_prediction_does_not_depend_on_what_was_predicted_before(forward):
             assert np.array_equal(forward.predict_um(model), expected)
 
 
+@pytest.mark.slow
 def test_a_model_without_a_law_of_the_study_does_not_have_it():
     """Laws of one model are compiled for all, and absent in a model that has others."""
     law = LEARNED['incidence_deg'](low=0.0, high=60.0, learned=(0.1, 0.4))

@@ -12,6 +12,8 @@ from paint_deposition.inference.fitting.cleaning import clean_and_fit
 from paint_deposition.inference.readings.campaign import Experiment
 from paint_deposition.part.zones import Box, PointZones, Zone
 
+pytestmark = pytest.mark.slow
+
 MODEL = pd.DepositionModel()
 # Heights of the passes on two panels, neither of them symmetric about the middle.
 ORDERS = ((0.3, 0.7, 1.4), (1.5, 0.6, 1.2))

@@ -85,7 +85,7 @@ def compute(
     with _used_alone(folder):
         left = {c.digest: c for c in cases if not files[c.digest].is_file()}
         done = len(cases) - len(left)
-        for digest, future in _finished(work, left, inputs, executor) if left else ():
+        for digest, future in finished(work, left, inputs, executor) if left else ():
             try:
                 write_parquet(files[digest], pa.table(dict(future.result())))
             except CancelledError:
@@ -199,13 +199,13 @@ def _used_alone(folder: Path) -> Iterator[None]:
         os.close(descriptor)
 
 
-def _finished(
-    work: Callable[..., Columns],
+def finished(
+    work: Callable[..., Any],
     cases: Mapping[str, Case],
     inputs: Mapping[str, Any],
     executor: AbstractContextManager[Any],
 ) -> Iterator[tuple[str, Future]]:
-    """Submit the cases by their digests, and return each when it is done."""
+    """Submit the cases by their digests, as ``compute`` does, and return each when it is done."""
     futures: dict[Future, str] = {}
     with executor as pool:
         place: Callable[[bytes], Any] = bytes
@@ -231,9 +231,7 @@ def _finished(
                 future.cancel()
 
 
-def _run_case(
-    code: str, work: Callable[..., Columns], parameters: bytes, *inputs: bytes
-) -> Columns:
+def _run_case(code: str, work: Callable[..., Any], parameters: bytes, *inputs: bytes) -> Any:
     """Compute a case in a worker, which may have joined at any time."""
     if code != code_digest():  # films are the same only by the same code
         raise BatchError(

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, TriMesh
 from matplotlib.figure import Figure
 from matplotlib.patheffects import Normal, Stroke
+from matplotlib.text import Annotation
 from matplotlib.ticker import MaxNLocator
 from matplotlib.tri import Triangulation
 from scipy.spatial import cKDTree
@@ -259,9 +260,13 @@ def draw_triangles(axes: Axes, corners_m: np.ndarray, rgba: np.ndarray) -> None:
 def label_points(
     axes: Axes, places_m: np.ndarray, words: Sequence[str], points_per_m: float, **style: Any
 ) -> None:
-    """Write words beside places (n, 2) [m], each on the side with the most room."""
+    """Write words beside places (n, 2) [m], each on the side with the most room.
+
+    What is written on the axes already, such as the figures of contours, stays free.
+    """
     places = points_per_m * places_m
-    taken = [*places]
+    written = [text.get_position() for text in axes.texts if not isinstance(text, Annotation)]
+    taken = [*places, *(points_per_m * np.array(written))]
     for row, (word, place) in enumerate(zip(words, places, strict=True)):
         others = np.array(taken[:row] + taken[row + 1 :] or [place + 1e3])
         spots = place + AROUND_POINT

@@ -75,10 +75,13 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         tolerance = 100.0 * answer.tolerance
         if tolerance < top:
             axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
+            # At the end where the curve stays away from it.
+            away = np.abs(PERCENT * answer.curve.sigma_n - tolerance)
+            right = away[-(len(away) // 5) :].min() > away[: len(away) // 5].min()
             axes.annotate(
-                f'tolerance {tolerance:g} %', (1.0, tolerance),
-                xycoords=axes.get_yaxis_transform(), ha='right', va='bottom', fontsize=9,
-                color=MUTED,
+                f'tolerance {tolerance:g} %', (0.99 if right else 0.01, tolerance),
+                xycoords=axes.get_yaxis_transform(), ha='right' if right else 'left',
+                va='bottom', fontsize=9, color=MUTED,
             )  # fmt: skip
         for low, high in answer.windows_m:
             axes.axvspan(MM * low, MM * high, color='#d9ecf0', linewidth=0.0, zorder=0)
