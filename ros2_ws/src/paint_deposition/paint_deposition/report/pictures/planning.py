@@ -76,7 +76,7 @@ def draw_curve(axes: Axes, answer: Recommendation) -> None:
         if tolerance < top:
             axes.axhline(tolerance, color=MUTED, linewidth=0.9, linestyle='--')
             # At the end where the curve stays away from it.
-            away = np.abs(PERCENT * answer.curve.sigma_n - tolerance)
+            away = np.abs(100.0 * answer.curve.sigma_n - tolerance)
             right = away[-(len(away) // 5) :].min() > away[: len(away) // 5].min()
             axes.annotate(
                 f'tolerance {tolerance:g} %', (0.99 if right else 0.01, tolerance),
