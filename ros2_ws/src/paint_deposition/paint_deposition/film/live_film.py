@@ -33,6 +33,8 @@ DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change that is older than the newest pose by more is from a restarted stream, and none
 # is told so long ahead of its pose [ns].
 STREAM_RESTART_NS = 1_000_000_000
+# Stamp of a state that a film begins with: it holds whatever the clocks of its poses say [ns].
+BEFORE_FILM_NS = 1
 # That wait for poses; no gun is switched so often within the time that poses may be missing.
 MOST_CHANGES = 100_000
 _STAMP = attrgetter('stamp_ns')
@@ -73,7 +75,6 @@ class LiveFilm:
         self.trigger_latency_s = trigger_latency_s
         self._limit_poses = pose_memory
         self._integrator = FilmIntegrator(points, model, precision, occluder)
-        self._carried: list[TriggerChange] = []
         # Brushes of all trigger changes, including those carried over a reset.
         self._brushes: set[int] = set()
         self._clear()
@@ -101,7 +102,7 @@ class LiveFilm:
     @property
     def flow(self) -> float | None:
         """Relative flow at the newest pose; None: there was no trigger change yet."""
-        if not (self._changes or self._carried):
+        if not self._changes:
             return None
         return self._current_change.flow if self._current_change else 0.0
 
@@ -113,9 +114,19 @@ class LiveFilm:
     @property
     def _current_change(self) -> TriggerChange | None:
         """The trigger change in effect at the newest pose."""
-        changes, newest = self._changes or self._carried, self.newest_ns
+        changes, newest = self._changes, self.newest_ns
         passed = len(changes) if newest is None else bisect_right(changes, newest, key=_STAMP)
         return changes[passed - 1] if passed else None
+
+    @property
+    def carried_over(self) -> list[TriggerChange]:
+        """What a film that goes on with the motion begins with: the change in effect at the newest
+        pose, from before its first pose on, and those stamped after the newest pose.
+        """
+        passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
+        in_effect = self._changes[:passed][-1:]
+        began = [replace(change, stamp_ns=BEFORE_FILM_NS) for change in in_effect]
+        return began + self._changes[passed:]
 
     @property
     def _sprays_without_trigger(self) -> bool:
@@ -132,11 +143,14 @@ class LiveFilm:
         Raises:
             ModelError: the model does not have the brush that the gun sprays with.
         """
-        carried = before._changes or before._carried
+        carried, reached_ns = before.carried_over, before._reached_ns
         brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)
-        self._carried, self._brushes = carried, brushes
+        self._brushes = brushes
         self._clear()
+        self._reached_ns = reached_ns
+        for change in carried:
+            self._take_change(change)
 
     def _clear(self) -> None:
         self._integrator.reset()
@@ -148,7 +162,7 @@ class LiveFilm:
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
         # Of the newest pose that was kept, or of the first change of a stream about to restart.
-        self._reached_ns = BEFORE_ALL_NS
+        self._reached_ns: int = BEFORE_ALL_NS
         self._snapshot: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:
@@ -166,7 +180,6 @@ class LiveFilm:
         if change.flow > 0.0:
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
-        self._restore_carried_trigger(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
             log = self.log
             self._clear()
@@ -181,9 +194,6 @@ class LiveFilm:
         """Add poses, and paint those that no longer wait for the trigger."""
         if not len(batch):
             return
-        stamped = batch.stamps_ns[batch.stamps_ns > 0]
-        if len(stamped):
-            self._restore_carried_trigger(int(stamped[0]))
         self.log.add(batch)
         before_ns = self.newest_ns
         self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
@@ -231,16 +241,6 @@ class LiveFilm:
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
-
-    def _restore_carried_trigger(self, stamp_ns: int) -> None:
-        """After a reset, add the trigger changes from before it, unless the stream restarted.
-
-        They may be told ahead of the first pose after it.
-        """
-        carried, self._carried = self._carried, []
-        if carried and carried[0].stamp_ns - stamp_ns <= STREAM_RESTART_NS:
-            for change in carried:
-                self.add_trigger(change)
 
     def _take_change(self, change: TriggerChange) -> None:
         self.log.add(change)

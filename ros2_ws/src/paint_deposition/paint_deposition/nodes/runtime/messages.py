@@ -10,12 +10,14 @@ from collections.abc import Iterable
 
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Vector3
+from paint_msgs.msg import AtomizerState
 from rclpy.serialization import serialize_message
 from rclpy.time import Time
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.headers import nanoseconds
+from paint_deposition.motion.pose_stream import TriggerChange
 
 # The stamp of a header follows the four bytes that give the encoding of the message.
 STAMP_OFFSET = 4
@@ -36,6 +38,14 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     p, q = pose.pose.position, pose.pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
     return pose
+
+
+def state_message(frame_id: str, change: TriggerChange) -> AtomizerState:
+    """A state that says no more of the gun than this."""
+    return AtomizerState(
+        header=header(frame_id, change.stamp_ns), spraying=change.flow > 0.0, flow=change.flow,
+        brush=change.brush,
+    )  # fmt: skip
 
 
 def message_class(type_name: str) -> type:
