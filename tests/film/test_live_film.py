@@ -9,9 +9,9 @@ from brushes import two_brushes
 from paint_deposition.effects.catalogue import effect_class
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
-from paint_deposition.film.live_film import BEFORE_FILM_NS, LiveFilm
+from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
+from paint_deposition.motion.trajectory import BEFORE_RUN_NS, Trajectory
 from scenes import (
     START_NS,
     changes_of,
@@ -225,7 +225,7 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
     film = followed([*states, poses(moved, slice(0, half))])
     film.reset()
     carried = film.carried_over
-    assert carried == [TriggerChange(BEFORE_FILM_NS, 1.0)]
+    assert carried == [TriggerChange(BEFORE_RUN_NS, 1.0)]
     later = TriggerChange(int(stamps[half + 100]), 0.3)
     film.replay([poses(moved, slice(half, half + 50)), later])
     film.add_poses(poses(moved, slice(half + 50, None)))

@@ -21,6 +21,7 @@ from paint_deposition.motion.pose_stream import (
 )
 from paint_deposition.motion.trajectory import (
     BEFORE_ALL_NS,
+    BEFORE_RUN_NS,
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
     PoseCounts,
@@ -33,8 +34,6 @@ DEFAULT_TRIGGER_LATENCY_S = 0.1
 # A trigger change that is older than the newest pose by more is from a restarted stream, and none
 # is told so long ahead of its pose [ns].
 STREAM_RESTART_NS = 1_000_000_000
-# Stamp of a state that a film begins with: it holds whatever the clocks of its poses say [ns].
-BEFORE_FILM_NS = 1
 # That wait for poses; no gun is switched so often within the time that poses may be missing.
 MOST_CHANGES = 100_000
 _STAMP = attrgetter('stamp_ns')
@@ -125,7 +124,7 @@ class LiveFilm:
         """
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
         in_effect = self._changes[:passed][-1:]
-        began = [replace(change, stamp_ns=BEFORE_FILM_NS) for change in in_effect]
+        began = [replace(change, stamp_ns=BEFORE_RUN_NS) for change in in_effect]
         return began + self._changes[passed:]
 
     @property
@@ -147,12 +146,11 @@ class LiveFilm:
         brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)
         self._brushes = brushes
-        self._clear()
-        self._reached_ns = reached_ns
+        self._clear(reached_ns)
         for change in carried:
             self._take_change(change)
 
-    def _clear(self) -> None:
+    def _clear(self, reached_ns: int = BEFORE_ALL_NS) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(
             self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
@@ -162,7 +160,7 @@ class LiveFilm:
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
         # Of the newest pose that was kept, or of the first change of a stream about to restart.
-        self._reached_ns: int = BEFORE_ALL_NS
+        self._reached_ns = reached_ns
         self._snapshot: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, custom_data
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import (
+    BEFORE_RUN_NS,
     ONLY_BRUSH,
     SPRAYS_NOTHING,
     Trajectory,
@@ -124,8 +125,14 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
     rows: np.ndarray = np.empty(0, np.int64)
-    if np.any(np.diff(motion.stamps_ns) < 0):
-        # Where the clock was set back, the order in which they came says of which stream they are.
+    begins_ns = int(motion.stamps_ns.min()) - 1
+    changes = [
+        (begins_ns if at_ns == BEFORE_RUN_NS else at_ns, flow, brush, logged_ns)
+        for at_ns, flow, brush, logged_ns in changes
+    ]
+    # Where the clock was set back, the order in which they came says of which stream they are; in
+    # the run of a part it says so as it did to the simulator.
+    if 'serial' in custom_data(bag.path) or np.any(np.diff(motion.stamps_ns) < 0):
         logged = np.array([change[3] for change in changes], np.int64)
         rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
     else:
