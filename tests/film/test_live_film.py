@@ -241,6 +241,22 @@ def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_ba
     assert offline.emitted_cm3 == pytest.approx(MODEL.planar.K1_cm3_per_s * seconds, rel=0.01)
 
 
+@pytest.mark.parametrize('back_s', [0.4, 2.0, 3600.0])
+def test_a_state_of_a_stream_that_is_about_to_begin_changes_nothing_before_it(back_s):
+    motion = straight_pass(TIMES_S)
+    stamps = np.array([START_NS, motion.stamps_ns[-1] - round(back_s * 1e9)])
+    told = replace(
+        motion, trigger_stamps_ns=stamps, trigger_flow=np.array([1.0, 0.0]),
+        trigger_rows=np.array([0, len(motion)]),
+    )  # fmt: skip
+    on, off = changes_of(told)
+    film = followed([on, poses(motion, slice(None))])
+    before_um = film.snapshot().film_um
+    film.add_trigger(off)
+    assert np.array_equal(film.snapshot().film_um, before_um)
+    assert np.array_equal(painted(lying_plane(), told).film_um, before_um)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('batch', [1, 7, 40])
 @pytest.mark.parametrize('back_s', [0.4, 1.7, 3600.0])
