@@ -97,7 +97,7 @@ class InitialMessages:
         )
         until_ns = dict.fromkeys(self._guns, cut_ns)
         early = {poses: self._forget_poses(poses, cut_ns) for poses in self._guns}
-        for name, last_sent_ns in zip(part.guns, part.states_sent_ns, strict=True):
+        for name, last_sent_ns in zip(part.guns, part.states_sent_ns, strict=False):
             topic = self._states_of.get(name)
             if topic is not None:
                 until_ns[topic] = last_sent_ns
