@@ -125,7 +125,8 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
     rows: np.ndarray = np.empty(0, np.int64)
-    begins_ns = int(motion.stamps_ns.min()) - 1
+    told_ns = [change[0] for change in changes if change[0] != BEFORE_RUN_NS]
+    begins_ns = min([int(motion.stamps_ns.min()), *told_ns]) - 1
     changes = [
         (begins_ns if at_ns == BEFORE_RUN_NS else at_ns, flow, brush, logged_ns)
         for at_ns, flow, brush, logged_ns in changes
