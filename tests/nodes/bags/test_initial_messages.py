@@ -32,7 +32,7 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
         sent(POSE, 3, 6),
     ]:  # fmt: skip
         memory.add(*message)
-    carried = [state_message('', TriggerChange(1, 0.5, 2)),
+    carried = [state_message('', TriggerChange(START_NS, 0.5, 2)),
                state_message('', TriggerChange(START_NS + 4 * S, 1.0, 1))]  # fmt: skip
     part = Part(last_sent_ns=4 * S, guns=[''], states_sent_ns=[4 * S], states=carried)
     until_ns, early = memory.begin_part(part, 7 * S)
@@ -44,7 +44,7 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
     states = [deserialize_message(message.cdr, AtomizerState) for message in begun[:3]]
     told = [(stamp_ns(s.header), s.spraying, s.flow, s.brush) for s in states]
     assert told == [
-        (1, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1), (START_NS + 3 * S, False, 0.0, 0),
+        (START_NS, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1), (START_NS + 3 * S, False, 0.0, 0),
     ]  # fmt: skip
     assert states[0].voltage_kv == 60.0
 

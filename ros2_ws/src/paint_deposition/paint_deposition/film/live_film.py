@@ -21,7 +21,6 @@ from paint_deposition.motion.pose_stream import (
 )
 from paint_deposition.motion.trajectory import (
     BEFORE_ALL_NS,
-    BEFORE_RUN_NS,
     DEFAULT_MAX_POSE_GAP_S,
     ONLY_BRUSH,
     PoseCounts,
@@ -120,12 +119,10 @@ class LiveFilm:
     @property
     def carried_over(self) -> list[TriggerChange]:
         """What a film that goes on with the motion begins with: the change in effect at the newest
-        pose, from before its first pose on, and those stamped after the newest pose.
+        pose, and those stamped after it.
         """
         passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
-        in_effect = self._changes[:passed][-1:]
-        began = [replace(change, stamp_ns=BEFORE_RUN_NS) for change in in_effect]
-        return began + self._changes[passed:]
+        return self._changes[max(passed - 1, 0) :]
 
     @property
     def _sprays_without_trigger(self) -> bool:

@@ -15,8 +15,6 @@ from paint_deposition.kernel.compiler import njit
 ONLY_BRUSH = 0
 # Earlier than any stamp [ns].
 BEFORE_ALL_NS = -(2**62)
-# Stamp of a state that a run begins with: it holds whatever the clocks of its poses say [ns].
-BEFORE_RUN_NS = 1
 _TIMES = ('dwell_s', 'since_on_s', 'since_off_s')
 TRIGGER_STATE = np.dtype(
     [(name, 'f8') for name in ('flow', 'open_flow', *_TIMES)] + [('open_brush', 'i8')]

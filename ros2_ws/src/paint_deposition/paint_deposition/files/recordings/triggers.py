@@ -14,7 +14,6 @@ from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.files.recordings.message_definitions import STATE_TYPE
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import (
-    BEFORE_RUN_NS,
     ONLY_BRUSH,
     SPRAYS_NOTHING,
     Trajectory,
@@ -125,12 +124,6 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
     rows: np.ndarray = np.empty(0, np.int64)
-    told_ns = [change[0] for change in changes if change[0] != BEFORE_RUN_NS]
-    begins_ns = min([int(motion.stamps_ns.min()), *told_ns]) - 1
-    changes = [
-        (begins_ns if at_ns == BEFORE_RUN_NS else at_ns, flow, brush, logged_ns)
-        for at_ns, flow, brush, logged_ns in changes
-    ]
     # Where the clock was set back, the order in which they came says of which stream they are; in
     # the run of a part it says so as it did to the simulator.
     if 'serial' in custom_data(bag.path) or np.any(np.diff(motion.stamps_ns) < 0):

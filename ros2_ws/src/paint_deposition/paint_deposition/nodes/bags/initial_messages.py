@@ -14,6 +14,7 @@ from std_msgs.msg import Header
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.recordings.headers import stamp_ns, trigger_change
 from paint_deposition.motion.part_frame import Rigid, is_pose
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.recorded_topic import PARAMETER_EVENTS, STATIC_TF
 from paint_deposition.nodes.runtime.messages import header_stamp_ns
 
@@ -124,7 +125,7 @@ class InitialMessages:
         for poses, topic in self._guns.items():
             self._forget_poses(poses, math.inf)
             states = sorted(self._motion[topic], key=lambda state: state.stamp_ns)
-            states = [s for s in states if _gun(deserialize_message(s.cdr, AtomizerState))]
+            states = [s for s in states if _told(deserialize_message(s.cdr, AtomizerState))]
             passed = sum(s.stamp_ns <= self._forgotten[poses].stamp_ns for s in states)
             self._motion[topic] = deque(states[max(passed - 1, 0) :], REMEMBERED_MESSAGES)
 
@@ -163,20 +164,19 @@ class InitialMessages:
         for state in carried:
             # The part says what moves a film; the rest, the voltage say, stays as it was sent.
             messages = (deserialize_message(sent.cdr, AtomizerState) for sent in before)
-            told = next((sent for sent in messages if _gun(sent) == _gun(state)), state)
+            told = next((sent for sent in messages if _told(sent) == _told(state)), state)
             told.header = Header(stamp=state.header.stamp)
             taken.append(Recorded(topic, serialize_message(told), 0, until_ns))
         self._motion[topic] = deque([*taken, *later], REMEMBERED_MESSAGES)
         return len(later)
 
 
-def _gun(state: AtomizerState) -> tuple[float, int] | None:
-    """Flow and brush; None of a state that says neither, which whoever paints refuses."""
+def _told(state: AtomizerState) -> TriggerChange | None:
+    """What a state says of the gun; None of one that whoever paints refuses."""
     try:
-        change = trigger_change(state)
+        return trigger_change(state)
     except RecordingError:
         return None
-    return change.flow, change.brush
 
 
 def _pose(message: Recorded) -> list[float]:
