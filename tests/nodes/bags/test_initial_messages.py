@@ -44,7 +44,8 @@ def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
     states = [deserialize_message(message.cdr, AtomizerState) for message in begun[:3]]
     told = [(stamp_ns(s.header), s.spraying, s.flow, s.brush) for s in states]
     assert told == [
-        (START_NS, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1), (START_NS + 3 * S, False, 0.0, 0),
+        (START_NS, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1),
+        (START_NS + 3 * S, False, 0.0, 0),
     ]  # fmt: skip
     assert states[0].voltage_kv == 60.0
 
