@@ -213,6 +213,42 @@ def test_a_film_that_carries_a_motion_on_keeps_to_models_with_its_brush():
     assert (other_part.brush, other_part.flow) == (2, 1.0)
 
 
+@pytest.mark.parametrize('back_s', [0.0, 0.4, 2.0, 3600.0])
+def test_a_film_that_goes_on_begins_with_what_it_says_though_the_clock_is_set_back(back_s):
+    motion = straight_pass(TIMES_S)
+    half = len(motion) // 2
+    stamps = motion.stamps_ns - round(back_s * 1e9) * (np.arange(len(motion)) >= half)
+    last = TriggerChange(int(motion.stamps_ns[half - 1]), 1.0)
+    states = [TriggerChange(START_NS, 0.0), TriggerChange(int(stamps[half // 2]), 0.5), last]
+    film = followed([*states, poses(motion, slice(0, half))])
+    film.reset()
+    assert film.carried_over == [last]
+    begun = replace(
+        motion, stamps_ns=stamps[half:], positions_m=motion.positions_m[half:],
+        quaternions_xyzw=motion.quaternions_xyzw[half:],
+        trigger_stamps_ns=np.array([last.stamp_ns]), trigger_flow=np.array([last.flow]),
+    )  # fmt: skip
+    film.add_poses(poses(begun, slice(None)))
+    offline = painted(lying_plane(), begun)
+    assert np.array_equal(film.snapshot().film_um, offline.film_um)
+
+
+@pytest.mark.parametrize('back_s', [0.4, 2.0, 3600.0])
+def test_a_state_of_a_stream_that_is_about_to_begin_changes_nothing_before_it(back_s):
+    motion = straight_pass(TIMES_S)
+    stamps = np.array([START_NS, motion.stamps_ns[-1] - round(back_s * 1e9)])
+    told = replace(
+        motion, trigger_stamps_ns=stamps, trigger_flow=np.array([1.0, 0.0]),
+        trigger_rows=np.array([0, len(motion)]),
+    )  # fmt: skip
+    on, off = changes_of(told)
+    film = followed([on, poses(motion, slice(None))])
+    before_um = film.snapshot().film_um
+    film.add_trigger(off)
+    assert np.array_equal(film.snapshot().film_um, before_um)
+    assert np.array_equal(painted(lying_plane(), told).film_um, before_um)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize('batch', [1, 7, 40])
 @pytest.mark.parametrize('back_s', [0.4, 1.7, 3600.0])

@@ -1,11 +1,14 @@
 """Triggers in any message of a bag, of types that only the bag defines."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
+from paint_deposition.files.recordings.bags import write_pose_bag
 
 IO = 'cell_msgs/msg/Io'
 TYPES = {
@@ -93,3 +96,13 @@ def test_a_field_that_is_not_there_is_refused_with_those_there_are(trigger, word
     with pytest.raises(RecordingError) as refused:
         read_recording(bag, state_topic=trigger)
     assert words in str(refused.value)
+
+
+def test_the_run_of_a_part_keeps_the_order_in_which_its_states_came(tmp_path):
+    stamps = PASS.stamps_ns[[0, 10]]
+    told = replace(PASS, trigger_stamps_ns=stamps, trigger_flow=np.array([0.5, 1.0]))
+    for custom_data, rows in ({'serial': '1'}, [0, 10]), ({}, []):
+        bag = write_pose_bag(tmp_path / f'run_{len(rows)}', told, custom_data)
+        read = read_recording(bag, state_topic='/atomizer/state')
+        assert read.trigger_stamps_ns.tolist() == stamps.tolist()
+        assert read.trigger_rows.tolist() == rows

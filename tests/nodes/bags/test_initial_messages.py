@@ -1,86 +1,70 @@
 """What a run begins with: the states that are in force at its first pose."""
 
-import pytest
+from math import inf
+
 from geometry_msgs.msg import PoseStamped
 from paint_msgs.msg import AtomizerState, Part
 from rclpy.serialization import deserialize_message, serialize_message
 
 from nodes.cell import START_NS
+from paint_deposition.files.recordings.messages import stamp_ns
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.initial_messages import InitialMessages
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.runtime.topics import header, state_message
 
 POSE, STATE = '/atomizer/pose', '/atomizer/state'
 S = 1_000_000_000
 
 
-@pytest.mark.parametrize(
-    ('told', 'in_force'),
-    [
-        # (what, stamp [s], flow and brush), each sent a second after the one before; the part
-        # changes at '|', and the next run begins with the first pose of it.
-        ([('state', 0, 1.0, 1), ('pose', 1), '|', ('pose', 2)], [(0, 1.0, 1)]),
-        # Announced ahead of the first pose.
-        ([('state', 0.3, 1.0, 1), '|', ('pose', 0)], [(0.3, 1.0, 1)]),
-        # Of a stream that has ended.
-        ([('state', 5, 1.0, 1), ('pose', 5), '|', ('pose', 0)], []),
-        # A pose without a time says nothing.
-        ([('state', 5, 1.0, 1), ('pose', 5), '|', ('pose', None), ('pose', 6)], [(5, 1.0, 1)]),
-        # A model may have brush 1 and no 7: both are needed, and what is before both is not.
-        ([('state', 0, 0.5, 1), ('state', 1, 0.6, 1), ('state', 2, 1.0, 7), ('pose', 3), '|',
-          ('pose', 4)], [(1, 0.6, 1), (2, 1.0, 7)]),
-        ([('state', 0, 0.5, 1), ('state', 1, 0.0, 7), ('state', 2, 1.0, 7), ('pose', 3), '|',
-          ('pose', 4)], [(1, 0.0, 7), (2, 1.0, 7)]),
-    ],
-)  # fmt: skip
-def test_a_run_begins_with_the_states_that_hold(told, in_force):
-    memory, begun = InitialMessages({POSE: STATE}, '/part_pose'), []
-    memory.begin_run(1)
-    for sent_s, event in enumerate(told, start=1):
-        if event == '|':
-            memory.begin_part(Part(last_sent_ns=(sent_s - 1) * S), sent_s * S)
-            begun = memory.begin_run(sent_s * S)
-            continue
-        kind, at_s, *gun = event
-        at = header('', 0 if at_s is None else START_NS + round(at_s * S))
-        message = PoseStamped(header=at)
-        if kind == 'state':
-            message = AtomizerState(header=at, spraying=gun[0] > 0.0, flow=gun[0], brush=gun[1])
-        topic = POSE if kind == 'pose' else STATE
-        begun += memory.add(topic, serialize_message(message), sent_s * S, sent_s * S)
-    states = [deserialize_message(first.cdr, AtomizerState) for first in begun]
-    stamps_s = [(s.header.stamp.sec * S + s.header.stamp.nanosec - START_NS) / S for s in states]
-    assert [(at, s.flow, s.brush) for at, s in zip(stamps_s, states, strict=True)] == in_force
+def sent(topic, stamp_s, sent_s, **gun):
+    message = AtomizerState(spraying=gun.get('flow', 0.0) > 0.0, **gun)
+    message = PoseStamped() if topic == POSE else message
+    message.header = header('', START_NS + stamp_s * S)
+    return topic, serialize_message(message), sent_s * S, sent_s * S
 
 
-def test_a_latched_state_that_comes_before_older_ones_stays_for_the_next_run():
-    """The recorder was started in the midst of a part, and has its newest state first."""
-    memory = InitialMessages({POSE: STATE}, '/part_pose')
-    memory.begin_run(1)
+def test_a_run_begins_with_what_its_part_carries_over_and_what_was_sent_since():
+    """Whatever else the recorder has heard; it adds what moves no film."""
+    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
+    for message in [
+        sent(STATE, 0, 1, flow=0.5, brush=2, voltage_kv=60.0), sent(POSE, 1, 2),
+        sent(STATE, 2, 3, flow=1.0, brush=9), sent(POSE, 2, 4), sent(STATE, 3, 5, flow=0.0),
+        sent(POSE, 3, 6),
+    ]:  # fmt: skip
+        memory.add(*message)
+    carried = [state_message('', TriggerChange(START_NS, 0.5, 2)),
+               state_message('', TriggerChange(START_NS + 4 * S, 1.0, 1))]  # fmt: skip
+    part = Part(last_sent_ns=4 * S, guns=[''], states_sent_ns=[4 * S], states=carried)
+    until_ns, early = memory.begin_part(part, 7 * S)
+    assert until_ns == {POSE: 4 * S, STATE: 4 * S}
+    assert early == {POSE: 1, STATE: 1}
+    begun = memory.begin_run(7 * S)
+    assert [message.topic for message in begun] == [STATE, STATE, STATE, POSE]
+    assert [message.log_time_ns for message in begun] == [6 * S] * 4
+    states = [deserialize_message(message.cdr, AtomizerState) for message in begun[:3]]
+    told = [(stamp_ns(s.header), s.spraying, s.flow, s.brush) for s in states]
+    assert told == [
+        (START_NS, True, 0.5, 2), (START_NS + 4 * S, True, 1.0, 1),
+        (START_NS + 3 * S, False, 0.0, 0),
+    ]  # fmt: skip
+    assert states[0].voltage_kv == 60.0
 
-    def send(topic, stamp_s, sent_s, flow=0.0):
-        message = PoseStamped() if topic == POSE else AtomizerState(flow=flow, spraying=flow > 0)
-        message.header = header('', START_NS + stamp_s * S)
-        return memory.add(topic, serialize_message(message), sent_s * S, sent_s * S)
 
-    send(POSE, 1, 1)
-    send(STATE, 9, 9)
-    memory.begin_part(Part(), 0)
-    memory.begin_run(10 * S)
-    send(STATE, 0, 0, 1.0)
-    send(POSE, 10, 10)
-    memory.begin_part(Part(last_sent_ns=10 * S), 10 * S)
-    memory.begin_run(11 * S)
-    (first,) = send(POSE, 11, 11)
-    assert deserialize_message(first.cdr, AtomizerState).spraying is False
+def test_without_a_part_a_run_begins_with_the_states_in_force_at_the_last_pose_before_it():
+    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
+    for message in [
+        sent(STATE, 0, 1, flow=1.0), sent(STATE, 1, 2, flow=0.5), sent(STATE, 2, 3, flow=inf),
+        sent(POSE, 3, 4), sent(STATE, 4, 5, flow=0.0),
+    ]:  # fmt: skip
+        memory.add(*message)
+    memory.end_motion()
+    states = [deserialize_message(m.cdr, AtomizerState) for m in memory.begin_run(6 * S)]
+    assert [state.flow for state in states] == [0.5, 0.0]
 
 
 def test_of_two_states_with_one_stamp_the_one_sent_later_holds_whichever_comes_first():
-    memory = InitialMessages({POSE: STATE}, '/part_pose')
-    memory.begin_run(1)
+    memory = InitialMessages({'': (POSE, STATE)}, '/part_pose')
     for sent_s, flow in ((2, 0.0), (1, 1.0)):
-        state = AtomizerState(header=header('', START_NS), spraying=flow > 0.0, flow=flow)
-        memory.add(STATE, serialize_message(state), sent_s * S, sent_s * S)
-    memory.begin_run(3)
-    pose = serialize_message(PoseStamped(header=header('', START_NS + S)))
-    first = memory.add(POSE, pose, 3 * S, 3 * S)
-    assert [deserialize_message(m.cdr, AtomizerState).flow for m in first] == [1.0, 0.0]
+        memory.add(*sent(STATE, 0, sent_s, flow=flow))
+    states = [deserialize_message(m.cdr, AtomizerState) for m in memory.begin_run(3)]
+    assert [state.flow for state in states] == [1.0, 0.0]

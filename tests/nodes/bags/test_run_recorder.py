@@ -18,10 +18,11 @@ from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.bags import write_pose_bag
+from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.nodes.bags.run_recorder import LATE_S
 from paint_deposition.nodes.index_planner import IndexPlanner
 from paint_deposition.nodes.runtime import topics
-from paint_deposition.nodes.runtime.topics import header, header_stamp_ns
+from paint_deposition.nodes.runtime.topics import header, header_stamp_ns, state_message
 
 BEST_EFFORT = QoSProfile(depth=50, reliability=ReliabilityPolicy.BEST_EFFORT)
 
@@ -150,7 +151,11 @@ def test_poses_that_come_late_are_in_the_run_for_which_they_were_sent(
     wait_until(lambda: recorder.run.counts.get('/atomizer/pose'), what='the first pose')
     until_ns = time.time_ns() + 300_000_000
     at = header('part', START_NS + 9)
-    parts.publish(Part(run='1', header=at, last_sent_ns=until_ns))
+    carried = [state_message('', TriggerChange(START_NS + 5, 0.5))]
+    parts.publish(Part(
+        run='1', header=at, last_sent_ns=until_ns, guns=[''],
+        states_sent_ns=[until_ns], states=carried,
+    ))  # fmt: skip
     wait_until(lambda: recorder.run.folder.name == '1', what='the run')
     for k in range(1, 10):
         robot.send_pose(START_NS + k, *place)

@@ -72,7 +72,6 @@ class LiveFilm:
         self.trigger_latency_s = trigger_latency_s
         self._limit_poses = pose_memory
         self._integrator = FilmIntegrator(points, model, precision, occluder)
-        self._carried: list[TriggerChange] = []
         # Brushes of all trigger changes, including those carried over a reset.
         self._brushes: set[int] = set()
         self._clear()
@@ -100,7 +99,7 @@ class LiveFilm:
     @property
     def flow(self) -> float | None:
         """Relative flow at the newest pose; None: there was no trigger change yet."""
-        if not (self._changes or self._carried):
+        if not self._changes:
             return None
         return self._current_change.flow if self._current_change else 0.0
 
@@ -112,9 +111,17 @@ class LiveFilm:
     @property
     def _current_change(self) -> TriggerChange | None:
         """The trigger change in effect at the newest pose."""
-        changes, newest = self._changes or self._carried, self.newest_ns
+        changes, newest = self._changes, self.newest_ns
         passed = len(changes) if newest is None else bisect_right(changes, newest, key=_STAMP)
         return changes[passed - 1] if passed else None
+
+    @property
+    def carried_over(self) -> list[TriggerChange]:
+        """What a film that goes on with the motion begins with: the change in effect at the newest
+        pose, and those stamped after it.
+        """
+        passed = bisect_right(self._changes, self._reached_ns, key=_STAMP)
+        return self._changes[max(passed - 1, 0) :]
 
     @property
     def _sprays_without_trigger(self) -> bool:
@@ -131,13 +138,15 @@ class LiveFilm:
         Raises:
             ModelError: the model does not have the brush that the gun sprays with.
         """
-        carried = before._changes or before._carried
+        carried, reached_ns = before.carried_over, before._reached_ns
         brushes = {change.brush for change in carried if change.flow > 0.0}
         self.model.require_brushes(brushes)
-        self._carried, self._brushes = carried, brushes
-        self._clear()
+        self._brushes = brushes
+        self._clear(reached_ns)
+        for change in carried:
+            self._take_change(change)
 
-    def _clear(self) -> None:
+    def _clear(self, reached_ns: int = BEFORE_ALL_NS) -> None:
         self._integrator.reset()
         self._builder = PathBuilder(
             self.max_pose_gap_s, self.model.max_step_m, self.model.needs_whole_strokes
@@ -147,7 +156,7 @@ class LiveFilm:
         self.log = MotionLog(self._limit_poses)
         self._changes: list[TriggerChange] = []
         # Of the newest pose that was kept, or of the first change of a stream about to restart.
-        self._reached_ns = BEFORE_ALL_NS
+        self._reached_ns = reached_ns
         self._snapshot: FilmIntegrator | None = None
 
     def add_trigger(self, change: TriggerChange) -> None:
@@ -165,7 +174,6 @@ class LiveFilm:
         if change.flow > 0.0:
             self.model.require_brushes({*self._brushes, change.brush})
             self._brushes.add(change.brush)
-        self._restore_carried_trigger(change.stamp_ns)
         if not self._changes and self.log.complete and self.log.poses:
             log = self.log
             self._clear()
@@ -180,9 +188,6 @@ class LiveFilm:
         """Add poses, and paint those that no longer wait for the trigger."""
         if not len(batch):
             return
-        stamped = batch.stamps_ns[batch.stamps_ns > 0]
-        if len(stamped):
-            self._restore_carried_trigger(int(stamped[0]))
         self.log.add(batch)
         before_ns = self.newest_ns
         self._builder.add_poses(batch.stamps_ns, batch.positions_m, batch.quaternions_xyzw)
@@ -230,16 +235,6 @@ class LiveFilm:
         path = builder.take(finish=True)
         unpainted.add(path.with_(brush=np.full(len(path), self.model.brush)))
         _ = unpainted.gauge_um
-
-    def _restore_carried_trigger(self, stamp_ns: int) -> None:
-        """After a reset, add the trigger changes from before it, unless the stream restarted.
-
-        They may be told ahead of the first pose after it.
-        """
-        carried, self._carried = self._carried, []
-        if carried and carried[0].stamp_ns - stamp_ns <= STREAM_RESTART_NS:
-            for change in carried:
-                self.add_trigger(change)
 
     def _take_change(self, change: TriggerChange) -> None:
         self.log.add(change)

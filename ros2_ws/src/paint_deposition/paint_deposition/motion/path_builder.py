@@ -77,7 +77,7 @@ class PathBuilder:
         Before the first change the gun is off; without any it always sprays. A change that comes
         after the path beyond it was handed out is counted and takes effect from there on. One
         from before the newest pose by more than a gap waits as long, and the path with it: it is
-        a late one if the stream goes on, and else one of the restarted stream.
+        a late one if the stream goes on, and one of the restarted stream if that comes.
         """
         newest_ns = int(stamp_ns) if self.newest_ns is None else self.newest_ns
         waits = newest_ns - int(stamp_ns) > self.max_gap_ns
@@ -119,9 +119,9 @@ class PathBuilder:
         ``finish``: the stream has ended; the poses behind the last that was followed, and
         incomplete strokes, are handed out too.
         """
-        # Of a restart that was about to come nothing is left, nor of its changes.
-        if finish and not self._screen.finish():
-            self._go_on()
+        # Of a restart that was about to come nothing is left, nor of its changes, which wait on.
+        if finish:
+            self._screen.finish()
         self._cut_segments(until_ns, finish)
         if self._integrated_ns is not None:
             self._flow.forget(self._integrated_ns)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from paint_deposition.errors import RecordingError, did_you_mean
-from paint_deposition.files.recordings.bag_files import Bag, BagTopic
+from paint_deposition.files.recordings.bag_files import Bag, BagTopic, custom_data
 from paint_deposition.files.recordings.messages import STATE_TYPE, stamp_ns, trigger_change
 from paint_deposition.motion.pose_stream import TriggerChange
 from paint_deposition.motion.trajectory import (
@@ -109,8 +109,9 @@ def with_trigger(bag: Bag, name: str, motion: Trajectory, log_times_ns: np.ndarr
             f'{offset_s:.3g} s off its own stamps; record {STATE_TYPE} instead'
         )
     rows: np.ndarray = np.empty(0, np.int64)
-    if np.any(np.diff(motion.stamps_ns) < 0):
-        # Where the clock was set back, the order in which they came says of which stream they are.
+    # Where the clock was set back, the order in which they came says of which stream they are; in
+    # the run of a part it says so as it did to the simulator.
+    if 'serial' in custom_data(bag.path) or np.any(np.diff(motion.stamps_ns) < 0):
         logged = np.array([change[3] for change in changes], np.int64)
         rows = np.searchsorted(np.maximum.accumulate(log_times_ns), logged)
     else:

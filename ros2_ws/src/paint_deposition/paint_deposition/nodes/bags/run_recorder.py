@@ -64,13 +64,15 @@ class RunRecorder(ManagedNode):
         named = [self.resolve_topic_name(name) for name in wanted]
         self._wanted = list(dict.fromkeys([*named, self._part_topic]))
         motion = {
-            self.resolve_topic_name(gun_topic(gun, POSES)):
-            self.resolve_topic_name(gun_topic(gun, STATES)) for gun in guns
-        }  # fmt: skip
+            gun: (
+                self.resolve_topic_name(gun_topic(gun, POSES)),
+                self.resolve_topic_name(gun_topic(gun, STATES)),
+            )
+            for gun in guns
+        }
         self._initial_messages = InitialMessages(motion, self.resolve_topic_name(PART_POSE))
         # Also while no run is recorded, since they stay in force.
-        self._motion = {*motion, *motion.values()}
-        self._always_heard = {PARAMETER_EVENTS, *motion.values()}
+        self._always_heard = {PARAMETER_EVENTS, *(states for _, states in motion.values())}
         self.recorded: dict[str, RecordedTopic] = {}
         self._error: RecordingError | None = None
         self._progress = {
@@ -90,10 +92,11 @@ class RunRecorder(ManagedNode):
         # Run and stamp of the part, as it was announced.
         self._part: tuple[str, int] | None = None
         self._refused: set[str] = set()
-        # The run of the part that has left, while poses of it may come; until when, and when the
-        # last of them was sent. Poses that came even later.
+        # The run of the part that has left, while poses of it may come; until when, and by topic
+        # when the last of its messages was sent. Those that came even later.
         self.leaving: RunWriter | None = None
-        self._leaves_s, self._left_ns, self._too_late = 0.0, 0, 0
+        self._leaves_s, self._too_late = 0.0, 0
+        self._left_ns: dict[str, int] = {}
         self.create_steady_timer(0.1, self._discover)
         self.create_steady_timer(0.1, lambda: self._guarded(self.run.close_old_chunk))
         self.create_steady_timer(0.2, self._report_progress)
@@ -167,14 +170,12 @@ class RunRecorder(ManagedNode):
             return
         if name == self._part_topic:
             self._change_part(deserialize_message(cdr, Part), log_time_ns, sent_ns)
-        elif sent_ns <= self._left_ns and name in self._motion:
+        elif sent_ns <= self._left_ns.get(name, 0):
             self._guarded(self._write_late, name, cdr, log_time_ns, sent_ns)
-            if name in self._progress:
-                return
+            return
         elif self.leaving is not None and name == TF in self.leaving.counts:
             self._guarded(self.leaving.write, name, cdr, log_time_ns, sent_ns)
-        for first in self._initial_messages.add(name, cdr, log_time_ns, sent_ns):
-            self._guarded(self.run.write, *first[:4])
+        self._initial_messages.add(name, cdr, log_time_ns, sent_ns)
         self._guarded(self.run.write, name, cdr, log_time_ns, sent_ns)
         if name in self._progress and self.recorded[name].messages % 50 == 0:
             self._report_progress()
@@ -243,7 +244,8 @@ class RunRecorder(ManagedNode):
             topic.reset_counts(self._begun_ns)
             run.add_topic(topic.run_topic)
         for message in self._initial_messages.begin_run(log_time_ns):
-            run.write(*message[:4])
+            if message.topic in run.counts:
+                run.write(*message[:4])
 
     def _guarded(self, step: Callable[..., object], *arguments: object) -> None:
         """Write, unless writing has failed before; the first error ends the recording."""

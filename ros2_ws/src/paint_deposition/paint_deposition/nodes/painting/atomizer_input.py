@@ -48,7 +48,8 @@ class AtomizerInput:
         name: of the gun, '' for the only one of a cell.
         poses_received: since the node started.
         newest_ns: stamp of the last pose that was painted or dropped, 0 before the first.
-        sent_ns: when the last pose received was sent, 0 before the first.
+        sent_ns, state_sent_ns: when the last pose received and the last state taken were sent, 0
+            before the first.
         refused_s, pose_s: monotonic times of the last pose refused and of the last one received.
         spraying: whether the gun sprays, by the newest state; False before the first.
         speed: of the TCP now; programmed_m_per_s: by the newest state, 0 or NaN: unknown.
@@ -67,7 +68,7 @@ class AtomizerInput:
         self._node, self._number, self.name = node, number, name
         self._pose_topic = gun_topic(name, 'atomizer/pose')
         self._state_topic = gun_topic(name, 'atomizer/state')
-        self.poses_received = self.newest_ns = self.sent_ns = 0
+        self.poses_received = self.newest_ns = self.sent_ns = self.state_sent_ns = 0
         self.refused_s = self.pose_s = self._flushed_s = -math.inf
         self.spraying, self.programmed_m_per_s = False, 0.0
         self.speed = SpeedNow()
@@ -79,7 +80,7 @@ class AtomizerInput:
         self._new_states: list[tuple[AtomizerState, int]] = []
         # The next batch.
         self._poses: list[tuple[int, np.ndarray, np.ndarray]] = []
-        self._held: list[PoseStamped | AtomizerState] | None = None
+        self._held: list[tuple[PoseStamped | AtomizerState, int]] | None = None
         self._hold_after_ns = 0
         self.tf_queue: TfQueue = deque()
         self.times_s: deque[tuple[float, float]] = deque(maxlen=100)
@@ -121,7 +122,7 @@ class AtomizerInput:
         self.tf_queue.clear()
         self._poses.clear()
         if self._held is not None:
-            self._held[:] = [kept for kept in self._held if isinstance(kept, AtomizerState)]
+            self._held[:] = [kept for kept in self._held if isinstance(kept[0], AtomizerState)]
 
     def reset_counts(self) -> None:
         """Set the counts to zero and forget what was wrong."""
@@ -145,21 +146,22 @@ class AtomizerInput:
     def release(self) -> None:
         """Process the messages that were kept, as if they were received now."""
         held, self._held = self._held or [], None
-        for message in held:
-            self._process(message, 0)
+        for message, sent_ns in held:
+            self._process(message, sent_ns)
         self.flush()
 
     def _process(self, message: PoseStamped | AtomizerState, sent_ns: int) -> None:
         if self._held is not None and sent_ns > self._hold_after_ns:
             # Hours of poses.
             if len(self._held) < 2_000_000:
-                self._held.append(message)
+                self._held.append((message, sent_ns))
             else:
                 self.anomalies['messages dropped, since too many waited for the part'] += 1
         elif isinstance(message, PoseStamped):
             self.tf_queue.append((time.monotonic(), message))
             self._place()
         else:
+            self.state_sent_ns = max(self.state_sent_ns, sent_ns)
             self._switch(message)
 
     # --- batches

@@ -88,10 +88,7 @@ class Repainting:
         if any(gun.log is not log for gun, log in zip(current.guns, self._logs, strict=True)):
             return None
         for film, gun in zip(films.guns, current.guns, strict=True):
-            if gun.log.poses or gun.log.changes:
-                film.replay(gun.log.events(film.log.poses, film.log.changes))
-            else:  # after a reset the gun stays on or off
-                film.reset_keeping_trigger_of(gun)
+            film.replay(gun.log.events(film.log.poses, film.log.changes))
         return films
 
 

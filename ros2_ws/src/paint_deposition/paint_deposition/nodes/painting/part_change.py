@@ -23,7 +23,7 @@ from paint_deposition.nodes.painting.painting_parameters import PreparedPart
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK, WARN, Status
 from paint_deposition.nodes.runtime.parameters import require_file_name
-from paint_deposition.nodes.runtime.topics import header
+from paint_deposition.nodes.runtime.topics import header, state_message
 
 if TYPE_CHECKING:
     from paint_deposition.nodes.painting.deposition_simulator import DepositionSimulator
@@ -340,4 +340,11 @@ class PartChange:
         part.mesh_id = node.surface.mesh_id
         part.part_parent_frame = node.values['part_parent_frame']
         part.part_pose = list(part_pose) or list(node.values['part_pose'] or [])
+        part.guns = [*node.gun_names]
+        part.states_sent_ns = [source.state_sent_ns for source in node.inputs]
+        part.states = [
+            state_message(name, change)
+            for name, gun in zip(part.guns, node.film.guns, strict=True)
+            for change in gun.carried_over
+        ]
         self._publisher.publish(part)

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 from geometry_msgs.msg import Point, PoseStamped, Vector3
+from paint_msgs.msg import AtomizerState
 from rclpy.callback_groups import CallbackGroup
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
@@ -20,6 +21,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker
 
 from paint_deposition.files.recordings.messages import nanoseconds
+from paint_deposition.motion.pose_stream import TriggerChange
 
 # On which every subscriber of the poses reports its progress.
 PROGRESS_TOPIC = 'atomizer/progress'
@@ -207,6 +209,14 @@ def pose_message(frame_id: str, stamp_ns: int, values: Iterable[float]) -> PoseS
     p, q = pose.pose.position, pose.pose.orientation
     p.x, p.y, p.z, q.x, q.y, q.z, q.w = map(float, values)
     return pose
+
+
+def state_message(frame_id: str, change: TriggerChange) -> AtomizerState:
+    """A state that says no more of the gun than this."""
+    return AtomizerState(
+        header=header(frame_id, change.stamp_ns), spraying=change.flow > 0.0, flow=change.flow,
+        brush=change.brush,
+    )  # fmt: skip
 
 
 def message_class(type_name: str) -> type:
