@@ -301,7 +301,8 @@ class _Browser(_Guarded, WebSocketHandler):
         try:
             for turn in itertools.count():
                 frames = self.page.scene.lacking(seen)
-                if turn % 10 == 0:  # where nothing changes, the page knows that the server is there
+                # A page that hears nothing for some seconds takes the server to be gone.
+                if turn % 10 == 0:
                     frames.append(frame('alive'))
                 for message in frames:  # waits while the link is busy
                     await self.write_message(message, binary=True)
