@@ -40,7 +40,8 @@ const shares = new Chart('shares', 'area [%]', { scales: { y: { range: [0, 100] 
 
 // Mean film with one standard deviation to either side, the target, and the RMS of the residual
 // where there are readings; the shares of the area that are painted and, of that, within target.
-export function showCharts(history, target) {
+// Without a tolerance next to nothing is just on the target.
+export function showCharts(history, target, tolerance) {
   film.show(history, [
     { label: 'mean', of: ({ mean }) => mean, stroke: BLUE, width: 2 },
     { label: '+ 1 SD', of: ({ mean, sd }) => mean + sd, stroke: `${BLUE}66` },
@@ -50,6 +51,6 @@ export function showCharts(history, target) {
   ]);
   shares.show(history, [
     { label: 'painted', of: ({ coverage }) => 100 * coverage, stroke: BLUE, width: 2 },
-    { label: 'of it within target', of: ({ within }) => 100 * within, stroke: GREEN, width: 2 },
+    { label: 'of it within target', of: ({ within }) => (tolerance ? 100 * within : NaN), stroke: GREEN, width: 2 },
   ]);
 }

@@ -162,7 +162,8 @@ function showKeys() {
 // --- figures
 
 function showHistory() {
-  const { history, scale } = state;
+  const { history } = state;
+  const { target, tolerance } = state.scale ?? {};
   find('figures').hidden = !history.length;
   find('history').hidden = history.length < 2;
   if (!history.length) return;
@@ -172,15 +173,12 @@ function showHistory() {
     ['thinnest', text(min, 1, 'µm')], ['thickest', text(max, 1, 'µm')],
     ['area painted', text(100 * coverage, 1, '%')], ['solids on it', text(volume, 1, 'cm³')],
   ];
-  if (scale?.target) {
-    const band = scale.tolerance ? `${scale.target} ± ${scale.tolerance}` : `${scale.target}`;
-    if (Number.isFinite(within)) figures.unshift(['within target', text(100 * within, 1, '%')]);
-    figures.unshift(['target', `${band}<small> µm</small>`]);
-  }
+  if (tolerance) figures.unshift(['within target', text(100 * within, 1, '%')]);
+  if (target) figures.unshift(['target', `${target}${tolerance ? ` ± ${tolerance}` : ''}<small> µm</small>`]);
   if (Number.isFinite(capture)) figures.push(['share caught', text(100 * capture, 1, '%')]);
   if (Number.isFinite(rmse)) figures.push(['RMS of readings', text(rmse, 2, 'µm')]);
   find('figures').replaceChildren(...figures.map(([name, value]) => element('div', `<dt>${name}</dt><dd>${value}</dd>`)));
-  if (history.length > 1) showCharts(history, scale?.target);
+  if (history.length > 1) showCharts(history, target, tolerance);
 }
 
 // --- the probe
