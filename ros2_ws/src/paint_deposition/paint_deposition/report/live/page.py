@@ -11,7 +11,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Lock, Thread
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,11 +37,12 @@ STEP_UM = 1.0 / 32.0
 # Rows of a series beyond which its older half is forgotten: hours of figures, 500 m of a track.
 MOST_ROWS = 50_000
 
-Arrays = Mapping[str, np.ndarray]
+Arrays = Mapping[str, np.ndarray] | None
 
 
-def frame(kind: str, arrays: Arrays = MappingProxyType({}), **values: Any) -> bytes:
+def frame(kind: str, arrays: Arrays = None, **values: Any) -> bytes:
     """A message to the page: the length of its head (uint32), the head as JSON, the arrays."""
+    arrays = arrays or {}
     listed = [[name, array.dtype.name, array.size] for name, array in arrays.items()]
     # JSON knows no NaN and no infinity; the page takes null for them.
     plain = {
@@ -102,7 +102,7 @@ class Scene:
             self._forget()
             self._blocks['guns'] = frame('guns', guns=[])
 
-    def tell(self, kind: str, arrays: Arrays = MappingProxyType({}), **values: Any) -> None:
+    def tell(self, kind: str, arrays: Arrays = None, **values: Any) -> None:
         """Set what the page shall know of one kind."""
         with self._lock:
             self._blocks[kind] = frame(kind, arrays, **values)
