@@ -91,7 +91,7 @@ def test_browsers_see_the_film_of_the_simulator(
         early.wait_until("document.getElementById('link').classList.contains('off')")
         painter.reset()
         wait_until(lambda: is_bare(viewer.scene), what='the bare part')
-        viewer.page = Page([viewer.scene], port=port)
+        viewer.page = Page(viewer.scene, port=port)
         wait_until(lambda: shows(early, 0.0 * film_um), what='the bare part in the browser')
         assert early.evaluate('page.view.segments') == 0
 

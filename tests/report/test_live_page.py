@@ -43,7 +43,7 @@ class Onlooker:
             self.film_um[mask > 0] = arrays['um'].view(np.float16)
         elif head['kind'] == 'rows':
             kept = self.rows.get(head['series'], [])[: head['first']]
-            width = 11 - 1 if head['series'] == 'history' else 5
+            width = 10 if head['series'] == 'history' else 5
             self.rows[head['series']] = kept + arrays['rows'].reshape(-1, width).tolist()
         return head['kind']
 
@@ -69,7 +69,7 @@ def serve(scene):
     pages = []
 
     def serve(**options) -> Page:
-        pages.append(Page([scene], port=0, **options))
+        pages.append(Page(scene, port=0, **options))
         return pages[-1]
 
     yield serve
@@ -97,6 +97,7 @@ def test_only_what_changed_travels_and_whoever_comes_late_gets_all(scene, door):
         assert [row[4] for row in onlooker.rows['track']] == [0.0, 1.0, 0.0, 1.0]
     scene.begin_again()
     assert early.look(scene).rows['track'] == []
+    assert early.look(scene).kinds == []
 
 
 def test_a_run_is_painted_as_simulate_paints_it(door):
@@ -142,7 +143,7 @@ def test_a_page_for_other_machines_gets_a_token_and_one_for_this_machine_hears_i
     assert status(page.url, Host='elsewhere.example') == 403
     assert urlopen(page.url).headers['Content-Security-Policy'].startswith("default-src 'self'")
     with pytest.raises(PaintError, match='in use; choose another port'):
-        Page(page.scenes, port=int(page.url.split(':')[2].strip('/')))
+        Page(page.scene, port=int(page.url.split(':')[2].strip('/')))
 
 
 @pytest.mark.parametrize(
@@ -164,17 +165,35 @@ def test_watch_says_what_it_lacks(words, reason, capsys):
 @pytest.mark.skipif(CHROMIUM is None, reason='no Chromium')
 def test_a_painted_run_on_a_phone(door, tmp_path):
     surface, motion = door
+    film = pd.simulate(surface, motion)
     replay = Replay(surface, [GunMotion('', motion)], [DepositionModel()], rate=0.0)
     replay.scene.tell('about', text='door.stl')
     replay.paint(Event())
-    page = Page([replay.scene], port=0)
+    goes_on = Event()
+    page = Page(replay.scene, port=0, command=lambda _: goes_on.wait(60.0))
     try:
         with Chromium(tmp_path / 'browser') as browser:
             tab = browser.tab(page.url, 390, 844)
             tab.wait_until('globalThis.page?.view.film?.some((um) => um > 0)')
             assert tab.evaluate('document.body.scrollWidth') == 390  # nothing is cut off
             said = tab.evaluate("document.getElementById('figures').innerText")
-            assert f'{pd.simulate(surface, motion).statistics.mean_um:.1f} µm' in said
+            assert f'{film.statistics.mean_um:.1f} µm' in said
             assert tab.evaluate("document.getElementById('about').innerText") == 'door.stl'
+
+            # The part is compared with readings only later; then it is painted again.
+            legend = "document.querySelector('#film .u-legend').innerText.includes('RMS')"
+            assert not tab.evaluate(legend)
+            replay.scene.add_figures(1e3, film.statistics, rmse_um=0.7)
+            tab.wait_until(legend)
+            replay.scene.begin_again()
+            tab.wait_until("document.getElementById('figures').hidden")
+
+            # The server says no more, and its connection stays open.
+            tab.evaluate("document.querySelector('#replay [data-command=pause]').click()")
+            off = "document.getElementById('link').classList.contains('off')"
+            tab.wait_until(off)
+            goes_on.set()
+            tab.wait_until(f'!{off}')
     finally:
+        goes_on.set()
         page.close()

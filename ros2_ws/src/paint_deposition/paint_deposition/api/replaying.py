@@ -77,6 +77,7 @@ class Replay:
         self._paused, self._again = Event(), Event()
         self.scene = Scene()
         self.scene.show_part(self._surface)
+        self.scene.tell('replay', paused=False)
 
     def command(self, name: str) -> None:
         """Do what the page asks for: 'pause', or go on; or 'again' from the start."""

@@ -82,7 +82,7 @@ def watch_command(
         os.execv(command[0], command)
     with Progress('watch') as show:
         replay = _replay(show, run, part, model_file, motion, {**dict(band), **pace})
-        page = Page([replay.scene], host, port, token, replay.command)
+        page = Page(replay.scene, host, port, token, replay.command)
     print_all('warning', replay.warnings)
     click.echo(f'{page.url}  (Ctrl-C ends it)')
     stop = Event()

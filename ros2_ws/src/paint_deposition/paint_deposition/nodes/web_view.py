@@ -112,7 +112,7 @@ class WebView(PaintNode):
         self._show_part(self.values['mesh_file'])
         values = self.values
         token = values['token'] or os.environ.get(TOKEN, '')
-        self.page = Page([self.scene], values['host'], values['port'], token)
+        self.page = Page(self.scene, values['host'], values['port'], token)
         # Not to the log, which is published.
         sys.stdout.write(f'the page is at {self.page.url}\n')
         sys.stdout.flush()

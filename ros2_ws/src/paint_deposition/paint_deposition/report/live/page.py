@@ -2,6 +2,7 @@
 
 import asyncio
 import hmac
+import itertools
 import json
 import math
 import secrets
@@ -64,25 +65,27 @@ class Seen:
 
 
 class Scene:
-    """A part with its film, guns, history and readings; any thread may change and send it.
+    """A part with its film, guns and history; any thread may change and send it.
 
     A film travels as 16-bit floats, good to 0.016 µm or 0.05 %, and of these only those that a
     browser does not have: a slow one gets fewer messages and ends with the same film.
     """
 
-    def __init__(self, part: str = '', model: str = '') -> None:
-        self.part, self.model = part, model
+    def __init__(self) -> None:
         self._lock = Lock()
         # Messages by kind, each of which takes the place of the last.
         self._blocks: dict[str, bytes] = {}
         self._film: np.ndarray = np.empty(0, np.uint16)
-        self._rows: dict[str, list[Sequence[float]]] = {}
+        self._forget()
+
+    def _forget(self) -> None:
+        self._rows: dict[str, list[Sequence[float]]] = {'history': [], 'track': []}
         # Of each gun: number, last point of its track, whether it sprayed there.
         self._guns: dict[str, tuple[int, np.ndarray | None, bool]] = {}
         self._shown: dict[str, dict[str, Any]] = {}
 
     def show_part(self, surface: Surface) -> None:
-        """Show a bare part."""
+        """Show a bare part, and nothing else yet: the page forgets whatever it showed before."""
         arrays = {
             'vertices': surface.vertices_m.astype(np.float32),
             'faces': surface.faces.astype(np.uint32),
@@ -91,17 +94,15 @@ class Scene:
         with self._lock:
             self._blocks = {'part': frame('part', arrays, **sides)}
             self._film = np.zeros(len(surface.vertices_m), np.uint16)
-            self._rows, self._guns, self._shown = {}, {}, {}
+            self._forget()
 
     def begin_again(self) -> None:
         """Forget tracks and history; the next film takes the place of this one."""
         with self._lock:
-            self._rows, self._guns, self._shown = {}, {}, {}
+            self._forget()
             self._blocks['guns'] = frame('guns', guns=[])
 
-    def tell(
-        self, kind: str, arrays: Mapping[str, np.ndarray] | None = None, **values: Any
-    ) -> None:
+    def tell(self, kind: str, arrays: Arrays = None, **values: Any) -> None:
         """Set what the page shall know of one kind."""
         with self._lock:
             self._blocks[kind] = frame(kind, arrays, **values)
@@ -144,7 +145,7 @@ class Scene:
         """The messages that bring a browser up to date; it counts as having seen them."""
         with self._lock:
             blocks, film = dict(self._blocks), self._film
-            rows = {name: (kept, len(kept)) for name, kept in self._rows.items()}
+            rows = {series: (kept, len(kept)) for series, kept in self._rows.items()}
         frames = [block for kind, block in blocks.items() if seen.blocks.get(kind) != block]
         if seen.blocks.get('part') != blocks.get('part'):
             seen.film = np.zeros(len(film), np.uint16)
@@ -154,18 +155,17 @@ class Scene:
             mask = np.packbits(changed, bitorder='little')
             frames.append(frame('film', {'changed': mask, 'um': film[changed]}))
             seen.film = film
-        for name in [*seen.rows, *(name for name in rows if name not in seen.rows)]:
-            kept, count = rows.get(name, ([], 0))
-            had, first = seen.rows.get(name, (kept, 0))
-            first = first if had is kept else 0
+        for series, (kept, count) in rows.items():
+            had, sent = seen.rows.get(series, (kept, 0))
+            first = sent if had is kept else 0
             if had is not kept or count > first:
                 new = np.array(kept[first:count], np.float32)
-                frames.append(frame('rows', {'rows': new}, series=name, first=first))
-                seen.rows[name] = kept, count
+                frames.append(frame('rows', {'rows': new}, series=series, first=first))
+            seen.rows[series] = kept, count
         return frames
 
     def _append(self, series: str, row: Sequence[float]) -> None:
-        rows = self._rows.setdefault(series, [])
+        rows = self._rows[series]
         if len(rows) >= MOST_ROWS:
             rows = self._rows[series] = rows[MOST_ROWS // 2 :]
         rows.append(row)
@@ -178,11 +178,11 @@ class Page:
     """Serves the live page, from a thread of its own, until it is closed.
 
     Args:
-        scenes: what a browser can choose from; it begins with the first.
+        scene: what every browser sees.
         host: address to listen on. Any but this machine's own needs a token.
         port: 0 for one that is free.
         token: that browsers must give; '' makes one where it is needed.
-        command: called, in that thread, with 'pause' or 'again' of a page that can be replayed.
+        command: called, in that thread, with 'pause' or 'again' where a run is painted again.
 
     Attributes:
         url: with the token, for a browser; cookie: in which it keeps the token.
@@ -194,7 +194,7 @@ class Page:
 
     def __init__(
         self,
-        scenes: Sequence[Scene],
+        scene: Scene,
         host: str = DEFAULT_HOST,
         port: int = DEFAULT_PORT,
         token: str = '',
@@ -202,7 +202,7 @@ class Page:
     ) -> None:
         if not token and host not in THIS_MACHINE:
             token = secrets.token_urlsafe(16)
-        self.scenes, self.token, self.command = scenes, token, command
+        self.scene, self.token, self.command = scene, token, command
         self.browsers: set[_Browser] = set()
         self.bytes_sent = 0
         try:
@@ -220,7 +220,10 @@ class Page:
         self.url += f'?token={token}' if token else ''
         self._loop = asyncio.new_event_loop()
         self._closing = asyncio.Event()
-        self._thread = Thread(target=self._run, args=(sockets,), name='page', daemon=True)
+        serving = self._serve(sockets)
+        self._thread = Thread(
+            target=self._loop.run_until_complete, args=(serving,), name='page', daemon=True
+        )
         self._thread.start()
 
     def close(self) -> None:
@@ -228,10 +231,7 @@ class Page:
         if self._thread.is_alive():
             self._loop.call_soon_threadsafe(self._closing.set)
             self._thread.join()
-
-    def _run(self, sockets: list[socket.socket]) -> None:
-        self._loop.run_until_complete(self._serve(sockets))
-        self._loop.close()
+            self._loop.close()
 
     async def _serve(self, sockets: list[socket.socket]) -> None:
         static = Path(__file__).parent / 'static'
@@ -282,35 +282,31 @@ class _File(_Guarded, StaticFileHandler):
 
 
 class _Browser(_Guarded, WebSocketHandler):
-    """A browser: it has one scene and is sent what it lacks of it."""
+    """A browser, which is sent what it lacks of the scene."""
 
     def open(self, *_: str, **__: str) -> None:
-        self._scene = self.page.scenes[0]
         self.page.browsers.add(self)
         self._sending = asyncio.create_task(self._send())
 
     def on_message(self, message: str | bytes) -> None:
-        asked = json.loads(message)
-        if isinstance(scene := asked.get('scene'), int) and 0 <= scene < len(self.page.scenes):
-            self._scene = self.page.scenes[scene]
-        elif self.page.command and asked.get('command') in ('pause', 'again'):
-            self.page.command(asked['command'])
+        if self.page.command and message in ('pause', 'again'):
+            self.page.command(str(message))
 
     def on_close(self) -> None:
         self.page.browsers.discard(self)
         self._sending.cancel()
 
     async def _send(self) -> None:
-        page, seen = self.page, Seen()
-        named = [{'part': scene.part, 'model': scene.model} for scene in page.scenes]
-        frames = [frame('scenes', scenes=named, replayed=page.command is not None)]
+        seen = Seen()
         try:
-            while True:
-                frames += self._scene.lacking(seen)
+            for turn in itertools.count():
+                frames = self.page.scene.lacking(seen)
+                # A page that hears nothing for some seconds takes the server to be gone.
+                if turn % 10 == 0:
+                    frames.append(frame('alive'))
                 for message in frames:  # waits while the link is busy
                     await self.write_message(message, binary=True)
-                    page.bytes_sent += len(message)
-                frames = []
+                    self.page.bytes_sent += len(message)
                 # Browsers are brought up to date this often [s].
                 await asyncio.sleep(0.1)
         except WebSocketClosedError:

@@ -1,72 +1,56 @@
-// Film over time, and what was measured beside what was predicted.
+// The film over time, in two charts.
 
 import { uPlot } from './libraries.js';
 
-const COLOURS = { mean: '#0b63b0', band: '#0b63b022', target: '#2f7d32', other: '#b3541e', ink: '#5b6876' };
+const BLUE = '#0b63b0';
+const GREEN = '#2f7d32';
 const HEIGHT = 190;
 
-const axis = (label) => ({ label, labelSize: 20, size: label ? 44 : 36, stroke: COLOURS.ink, font: '12px system-ui', labelFont: '12px system-ui', grid: { stroke: '#e5e9ed' } });
-const time = { ...axis('time [s]'), size: 30 };
-const number = (digits, unit) => (_, value) => (value == null ? '–' : `${value.toFixed(digits)} ${unit}`);
-
 class Chart {
-  constructor(element, options) {
-    this.element = element;
-    this.chart = new uPlot({ width: element.clientWidth || 320, height: HEIGHT, cursor: { drag: { x: false, y: false } }, legend: { live: false }, ...options }, options.series.map(() => []), element);
+  constructor(id, label, options) {
+    this.element = document.getElementById(id);
+    const words = { stroke: '#5b6876', font: '12px system-ui', labelFont: '12px system-ui', labelSize: 20, grid: { stroke: '#e5e9ed' } };
+    this.options = {
+      height: HEIGHT, cursor: { drag: { x: false, y: false } }, legend: { live: false },
+      axes: [{ ...words, label: 'time [s]', size: 30 }, { ...words, label, size: 44 }],
+      ...options, scales: { x: { time: false }, ...options.scales },
+    };
     new ResizeObserver(() => {
-      if (element.clientWidth) this.chart.setSize({ width: element.clientWidth, height: HEIGHT });
-    }).observe(element);
+      if (this.element.clientWidth) this.plot?.setSize({ width: this.element.clientWidth, height: HEIGHT });
+    }).observe(this.element);
   }
 
-  show(...columns) { this.chart.setData(columns); }
+  // Series `of` rows; one without any value, as the target where there is none, is left out.
+  show(rows, series) {
+    const values = (of) => rows.map((row) => (Number.isFinite(of(row)) ? of(row) : null));
+    const columns = series.map((one) => [one, values(one.of)]).filter(([, column]) => column.some((value) => value !== null));
+    const labels = columns.map(([{ label }]) => label).join();
+    if (labels !== this.labels) {
+      this.plot?.destroy();
+      const lines = columns.map(([one]) => ({ points: { show: false }, ...one }));
+      this.plot = new uPlot({ ...this.options, width: this.element.clientWidth || 320, series: [{ label: 'time' }, ...lines] }, [], this.element);
+      this.labels = labels;
+    }
+    this.plot.setData([values(({ time }) => time), ...columns.map(([, column]) => column)]);
+  }
 }
+
+const film = new Chart('film', 'film [µm]', { bands: [{ series: [2, 3], fill: `${BLUE}22` }] });
+const shares = new Chart('shares', 'area [%]', { scales: { y: { range: [0, 100] } } });
 
 // Mean film with one standard deviation to either side, the target, and the RMS of the residual
-// where there are readings.
-export function filmChart(element, rms) {
-  const um = number(1, 'µm');
-  const band = { stroke: '#0b63b066', points: { show: false }, value: um };
-  const chart = new Chart(element, {
-    scales: { x: { time: false } },
-    axes: [time, axis('film [µm]')],
-    bands: [{ series: [2, 3], fill: COLOURS.band }],
-    series: [
-      { label: 'time', value: number(1, 's') },
-      { label: 'mean', stroke: COLOURS.mean, width: 2, value: um },
-      { label: '+ 1 SD', ...band },
-      { label: '− 1 SD', ...band },
-      { label: 'target', stroke: COLOURS.target, dash: [6, 4], points: { show: false }, value: um },
-      ...(rms ? [{ label: 'RMS of readings', stroke: COLOURS.other, width: 2, value: number(2, 'µm') }] : []),
-    ],
-  });
-  return Object.assign(chart, { extra: rms });
-}
-
-// Shares of the area: painted and, of that, within the target where there is one.
-export function sharesChart(element, within) {
-  const percent = number(1, '%');
-  const chart = new Chart(element, {
-    scales: { x: { time: false }, y: { range: [0, 100] } },
-    axes: [time, axis('area [%]')],
-    series: [
-      { label: 'time', value: number(1, 's') },
-      { label: 'painted', stroke: COLOURS.mean, width: 2, value: percent },
-      ...(within ? [{ label: 'of it within target', stroke: COLOURS.target, width: 2, value: percent }] : []),
-    ],
-  });
-  return Object.assign(chart, { extra: within });
-}
-
-export function parityChart(element) {
-  const um = number(1, 'µm');
-  const points = (stroke) => ({ stroke, width: 0, paths: () => null, points: { show: true, size: 6, fill: stroke }, value: um });
-  return new Chart(element, {
-    scales: { x: { time: false } },
-    axes: [{ ...axis('measured [µm]'), size: 30 }, axis('predicted [µm]')],
-    series: [
-      { label: 'measured', value: um },
-      { label: 'equal', stroke: COLOURS.ink, dash: [4, 4], value: um },
-      { label: 'predicted', ...points(COLOURS.mean) },
-    ],
-  });
+// where there are readings; the shares of the area that are painted and, of that, within target.
+// Without a tolerance next to nothing is just on the target.
+export function showCharts(history, target, tolerance) {
+  film.show(history, [
+    { label: 'mean', of: ({ mean }) => mean, stroke: BLUE, width: 2 },
+    { label: '+ 1 SD', of: ({ mean, sd }) => mean + sd, stroke: `${BLUE}66` },
+    { label: '− 1 SD', of: ({ mean, sd }) => mean - sd, stroke: `${BLUE}66` },
+    { label: 'target', of: () => target || NaN, stroke: GREEN, dash: [6, 4] },
+    { label: 'RMS of readings', of: ({ rmse }) => rmse, stroke: '#b3541e', width: 2 },
+  ]);
+  shares.show(history, [
+    { label: 'painted', of: ({ coverage }) => 100 * coverage, stroke: BLUE, width: 2 },
+    { label: 'of it within target', of: ({ within }) => (tolerance ? 100 * within : NaN), stroke: GREEN, width: 2 },
+  ]);
 }

@@ -3,6 +3,7 @@
 const KINDS = { float32: Float32Array, uint32: Uint32Array, uint16: Uint16Array, uint8: Uint8Array };
 const FIRST_PAUSE_MS = 500;
 const LONGEST_PAUSE_MS = 4000;
+const SILENCE_MS = 4000; // the server says something every second
 
 // A 16-bit float as a number, by its bits.
 const HALF = Float32Array.from({ length: 65536 }, (_, bits) => {
@@ -36,23 +37,35 @@ export function applyFilm(film, { changed, um }) {
   }
 }
 
-// Call `receive` with every message and `tell` with whether there is a connection; gives a
-// function that sends.
+// Call `receive` with every message and `tell` with whether the server is heard; gives a function
+// that sends a word.
 export function connect(receive, tell) {
   let socket;
   let pause = FIRST_PAUSE_MS;
+  let heard = Infinity;
   const open = () => {
     const scheme = location.protocol === 'https:' ? 'wss' : 'ws';
     socket = new WebSocket(`${scheme}://${location.host}/scene`);
     socket.binaryType = 'arraybuffer';
-    socket.onopen = () => { pause = FIRST_PAUSE_MS; tell(true); };
-    socket.onmessage = (event) => receive(decode(event.data));
+    socket.onmessage = (event) => {
+      pause = FIRST_PAUSE_MS;
+      heard = Date.now();
+      tell(true);
+      receive(decode(event.data));
+    };
     socket.onclose = () => {
+      heard = Infinity;
       tell(false);
       setTimeout(open, pause);
       pause = Math.min(2 * pause, LONGEST_PAUSE_MS);
     };
   };
+  const send = (word) => socket.readyState === WebSocket.OPEN && socket.send(word);
   open();
-  return (message) => socket.readyState === WebSocket.OPEN && socket.send(JSON.stringify(message));
+  setInterval(() => {
+    if (Date.now() - heard < SILENCE_MS) return;
+    tell(false);
+    send('alive?'); // to a server that is gone, it makes the browser close the socket
+  }, 1000);
+  return send;
 }

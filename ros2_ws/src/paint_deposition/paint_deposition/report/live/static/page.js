@@ -1,39 +1,35 @@
 // The page: messages of the server come in, the reader's choices go out.
 
 import { applyFilm, connect } from './connection.js';
-import { filmChart, parityChart, sharesChart } from './charts.js';
+import { showCharts } from './charts.js';
 import { PartView } from './part.js';
 
 const COLUMNS = ['time', 'mean', 'sd', 'min', 'max', 'coverage', 'within', 'volume', 'capture', 'rmse'];
 const find = (id) => document.getElementById(id);
 const view = new PartView(find('part'));
-const charts = {};
-const state = { scenes: [], scene: 0, against: false, scale: null, history: [], readings: null };
+const state = { against: false, scale: null, history: [], doubts: '' };
 // For tests, and for a look from the browser's console.
 globalThis.page = { view, state };
 
 const text = (value, digits, unit) => (Number.isFinite(value) ? `${value.toFixed(digits)}<small> ${unit}</small>` : '–');
 const element = (tag, content, className = '') => Object.assign(document.createElement(tag), { innerHTML: content, className });
 const signed = (value, digits) => `${value < 0 ? '−' : value > 0 ? '+' : ''}${Math.abs(value).toFixed(digits)}`;
-const escaped = (words) => new Option(words).innerHTML;
 const press = (button, on) => button.setAttribute('aria-pressed', on);
 
 // --- what the server says
 
 const receive = {
-  scenes({ scenes, replayed }) {
-    Object.assign(state, { scenes, history: [], readings: null, guns: [] });
-    if (state.scene >= scenes.length) state.scene = 0;
-    view.clearTrack();
-    find('track').hidden = true;
-    view.showGuns([]);
-    find('replay').hidden = !replayed;
-    showChoices();
-    if (state.scene) choose(state.scene);
-  },
+  // The first message of a connection, and of another part: what was shown before is gone.
   part(part) {
+    Object.assign(state, { history: [], doubts: '' });
     view.showPart(part);
     view.showGuns([]);
+    view.clearTrack();
+    for (const id of ['track', 'replay', 'message']) find(id).hidden = true;
+    hovered = null;
+    showProbe();
+    showHistory();
+    showLink();
   },
   scale(scale) {
     state.scale = scale;
@@ -54,22 +50,20 @@ const receive = {
       find('track').hidden = !view.segments;
     } else {
       state.history.length = first;
-      for (let at = 0; at < rows.length; at += COLUMNS.length) state.history.push(rows.subarray(at, at + COLUMNS.length));
+      for (let at = 0; at < rows.length; at += COLUMNS.length) {
+        state.history.push(Object.fromEntries(COLUMNS.map((name, column) => [name, rows[at + column]])));
+      }
       showHistory();
     }
-  },
-  readings(readings) {
-    state.readings = readings;
-    view.showReadings(readings);
-    showReadings();
-    showKeys();
-    showProbe();
   },
   about({ text: words }) {
     find('about').textContent = words;
     document.title = `${words} – film`;
   },
-  replay({ paused }) { find('replay').firstElementChild.textContent = paused ? 'go on' : 'pause'; },
+  replay({ paused }) {
+    find('replay').hidden = false;
+    find('replay').firstElementChild.textContent = paused ? 'go on' : 'pause';
+  },
   trust({ doubts }) {
     state.doubts = doubts;
     showLink();
@@ -78,6 +72,7 @@ const receive = {
     find('message').textContent = words;
     find('message').hidden = !words;
   },
+  alive() {},
 };
 
 const send = connect(
@@ -96,41 +91,14 @@ function showLink() {
 
 // --- choices
 
-function choose(scene) {
-  state.scene = scene;
-  send({ scene });
-  showChoices();
-}
-
-function showChoices() {
-  const { scenes, scene } = state;
-  const parts = [...new Set(scenes.map(({ part }) => part))];
-  const { part } = scenes[scene];
-  find('parts').hidden = parts.length < 2;
-  find('parts').replaceChildren(...parts.map((name) => new Option(name, name, false, name === part)));
-  const models = scenes.map((one, number) => ({ ...one, number })).filter((one) => one.part === part && one.model);
-  find('models').hidden = models.length < 2;
-  find('models').replaceChildren(...models.reverse().map(({ model, number }) => {
-    const button = element('button', escaped(model));
-    press(button, number === scene);
-    button.onclick = () => choose(number);
-    return button;
-  }));
-}
-
-find('parts').onchange = ({ target }) => {
-  const { model } = state.scenes[state.scene];
-  choose(state.scenes.findIndex((one) => one.part === target.value && one.model === model));
-};
 find('colours').onclick = ({ target }) => {
   if (!target.dataset.colours) return;
   state.against = target.dataset.colours === 'target';
-  for (const button of find('colours').children) press(button, button === target);
   showColours();
 };
 find('replay').onclick = ({ target }) => {
   const { command } = target.dataset;
-  if (command) send({ command });
+  if (command) send(command);
 };
 find('front').onclick = () => view.lookAtFront();
 find('track').onclick = ({ target }) => {
@@ -143,6 +111,7 @@ find('track').onclick = ({ target }) => {
 
 function showColours() {
   const { scale, against } = state;
+  for (const button of find('colours').children) press(button, (button.dataset.colours === 'target') === against);
   const span = 2 * scale.tolerance || 0.25 * scale.target;
   const [low, high] = against ? [-span, span] : [scale.low, scale.high];
   view.setColours({ ...scale, low, high, against });
@@ -177,16 +146,12 @@ function roundStep(least) {
 }
 
 function showKeys() {
-  const { scale, against, readings } = state;
+  const { scale, against } = state;
   const last = state.history.at(-1);
   const colour = (palette, row) => `rgb(${scale.palettes.subarray(4 * (palette * 259 + row), 4 * (palette * 259 + row) + 3)})`;
   const keys = [['bare metal, below ' + scale.bare + ' µm', colour(0, 258)]];
   if (against || scale.low > scale.bare) keys.push(['thinner still', colour(+against, 256)]);
-  if (against || (last && last[4] > scale.high)) keys.push(['thicker still', colour(+against, 257)]);
-  if (readings) {
-    const span = readings.span.toFixed(1);
-    keys.push([`reading ${span} µm thinner than predicted`, colour(1, 0)], [`${span} µm thicker`, colour(1, 255)]);
-  }
+  if (against || (last?.max > scale.high)) keys.push(['thicker still', colour(+against, 257)]);
   find('keys').replaceChildren(...keys.map(([words, fill]) => {
     const key = element('span', `<i></i>${words}`);
     key.firstChild.style.background = fill;
@@ -197,52 +162,23 @@ function showKeys() {
 // --- figures
 
 function showHistory() {
-  const { history, scale } = state;
-  const last = history.at(-1);
-  if (!last) return;
-  const [, mean, sd, min, max, coverage, within, volume, capture, rmse] = last;
+  const { history } = state;
+  const { target, tolerance } = state.scale ?? {};
+  find('figures').hidden = !history.length;
+  find('history').hidden = history.length < 2;
+  if (!history.length) return;
+  const { mean, sd, min, max, coverage, within, volume, capture, rmse } = history.at(-1);
   const figures = [
     ['mean film', text(mean, 1, 'µm')], ['std deviation', text(sd, 2, 'µm')],
     ['thinnest', text(min, 1, 'µm')], ['thickest', text(max, 1, 'µm')],
     ['area painted', text(100 * coverage, 1, '%')], ['solids on it', text(volume, 1, 'cm³')],
   ];
-  if (scale?.target) {
-    const band = scale.tolerance ? `${scale.target} ± ${scale.tolerance}` : `${scale.target}`;
-    if (Number.isFinite(within)) figures.unshift(['within target', text(100 * within, 1, '%')]);
-    figures.unshift(['target', `${band}<small> µm</small>`]);
-  }
+  if (tolerance) figures.unshift(['within target', text(100 * within, 1, '%')]);
+  if (target) figures.unshift(['target', `${target}${tolerance ? ` ± ${tolerance}` : ''}<small> µm</small>`]);
   if (Number.isFinite(capture)) figures.push(['share caught', text(100 * capture, 1, '%')]);
   if (Number.isFinite(rmse)) figures.push(['RMS of readings', text(rmse, 2, 'µm')]);
   find('figures').replaceChildren(...figures.map(([name, value]) => element('div', `<dt>${name}</dt><dd>${value}</dd>`)));
-  find('history').hidden = history.length < 2;
-  if (history.length < 2) return;
-  charts.film ??= filmChart(find('film'), Number.isFinite(rmse));
-  charts.shares ??= sharesChart(find('shares'), Number.isFinite(within));
-  const column = (name, of = (value) => value) => history.map((row) => {
-    const value = of(row[COLUMNS.indexOf(name)], row);
-    return Number.isFinite(value) ? value : null;
-  });
-  charts.film.show(
-    column('time'), column('mean'), column('sd', (sd, row) => row[1] + sd), column('sd', (sd, row) => row[1] - sd),
-    history.map(() => scale?.target || null), ...(charts.film.extra ? [column('rmse')] : []),
-  );
-  const percent = (name) => column(name, (value) => 100 * value);
-  charts.shares.show(column('time'), percent('coverage'), ...(charts.shares.extra ? [percent('within')] : []));
-}
-
-function showReadings() {
-  const { measured, predicted, errors, noise } = state.readings;
-  const { model } = state.scenes[state.scene];
-  find('readings').hidden = false;
-  const worst = Math.max(...errors.map(({ rmse_um }) => rmse_um));
-  find('errors').replaceChildren(...errors.map(({ model: name, rmse_um }) => element(
-    'li', `<span>${escaped(name)}</span><span>RMS ${rmse_um.toFixed(2)} µm</span><meter max="${worst}" value="${rmse_um}"></meter>`,
-    name === model ? 'now' : '',
-  )), element('li', `<span>noise of the gauge</span><span>${noise.toFixed(2)} µm</span>`));
-  charts.parity ??= parityChart(find('parity'));
-  const order = [...measured.keys()].sort((a, b) => measured[a] - measured[b]);
-  const sorted = order.map((k) => measured[k]);
-  charts.parity.show(sorted, sorted, order.map((k) => predicted[k]));
+  if (history.length > 1) showCharts(history, target, tolerance);
 }
 
 // --- the probe
@@ -255,15 +191,10 @@ function showProbe() {
   const place = hovered ?? view.pinned;
   find('probe').hidden = !place;
   if (!place) return;
-  const { film, reading } = view.probe(place);
-  const { scale, readings } = state;
+  const film = view.filmAt(place);
+  const { scale } = state;
   const lines = [`<b>${film.toFixed(1)} µm</b>`];
   if (scale?.target) lines.push(`${signed(film - scale.target, 1)} µm from the target<br>`);
-  if (reading !== null) {
-    const [measured, predicted] = [readings.measured[reading], readings.predicted[reading]];
-    lines.push(`reading ${escaped(readings.names[reading])}: measured ${measured.toFixed(1)}, predicted ${predicted.toFixed(1)}<br>`
-      + `residual ${signed(measured - predicted, 1)} µm<br>`);
-  }
   lines.push(`x ${place.point.x.toFixed(3)}, y ${place.point.y.toFixed(3)}, z ${place.point.z.toFixed(3)} m`);
   const probe = find('probe');
   probe.innerHTML = lines.join('').replaceAll('-', '−');

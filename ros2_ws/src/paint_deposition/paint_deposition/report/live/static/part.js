@@ -1,15 +1,14 @@
-// The part in 3D: its film in colours, the guns with their passes, the readings, the probe.
+// The part in 3D: its film in colours, the guns with their passes, the probe.
 
 import {
   acceleratedRaycast, BufferAttribute, BufferGeometry, Color, ConeGeometry, DataTexture, DoubleSide,
   Group, LineBasicMaterial, LineSegments, Mesh, MeshBasicMaterial, MeshBVH, OrbitControls,
-  PerspectiveCamera, Points, Raycaster, Scene, ShaderMaterial, SphereGeometry, Vector2, Vector3,
+  PerspectiveCamera, Raycaster, Scene, ShaderMaterial, SphereGeometry, Vector2, Vector3,
   WebGLRenderer,
 } from './libraries.js';
 
 const TABLE = 256; // colours of a palette, before those for under, over and bare
 const CONE_M = 0.25; // from the TCP to the model plane
-const NEAR_READING_M = 0.012;
 const JUMP_M = 0.2; // a gun that is so much further on was not seen on its way
 const SPRAYED = new Color('#17212b');
 const MOVED = new Color('#a9b4be');
@@ -33,22 +32,6 @@ const FILM = {
       vec3 colour = texture2D(palettes, vec2((row + 0.5) / ${TABLE + 3}.0, against ? 0.75 : 0.25)).rgb;
       float facing = abs(dot(normalize(outward), normalize(toEye)));
       gl_FragColor = vec4(colour * mix(0.7, 1.0, facing), 1.0);
-    }`,
-};
-// A disc with a dark rim, of one size on the screen.
-const DISC = {
-  vertexShader: `
-    attribute vec3 color; uniform float size; varying vec3 disc;
-    void main() {
-      disc = color; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
-      gl_Position.z -= 0.0005 * gl_Position.w; gl_PointSize = size;
-    }`,
-  fragmentShader: `
-    varying vec3 disc;
-    void main() {
-      float far = length(gl_PointCoord - 0.5);
-      if (far > 0.5) discard;
-      gl_FragColor = vec4(far > 0.38 ? vec3(0.07) : disc, 1.0);
     }`,
 };
 
@@ -93,9 +76,7 @@ export class PartView {
     this.outward = new Vector3(...outward);
     this.up = new Vector3(...down).negate();
     this.lookAtFront();
-    this.showReadings(null);
-    this.pinned = null;
-    this.pin.visible = false;
+    this.pinAt(null);
   }
 
   lookAtFront() {
@@ -125,7 +106,6 @@ export class PartView {
   // Colours from `low` to `high`, of the film or of its difference from the target.
   setColours({ low, high, bare, target, against, palettes }) {
     if (this.uniforms.palettes.value) this.uniforms.palettes.value.dispose();
-    this.palettes = palettes;
     const texture = new DataTexture(palettes, TABLE + 3, 2);
     texture.needsUpdate = true;
     for (const [name, value] of Object.entries({ low, high, bare, target, against, palettes: texture })) {
@@ -200,29 +180,6 @@ export class PartView {
     this.draw();
   }
 
-  // Readings as discs in the colour of their residual, measured minus predicted.
-  showReadings(readings) {
-    if (this.discs) this.scene.remove(this.discs);
-    this.readings = readings;
-    this.discs = null;
-    if (readings) {
-      const { positions, measured, predicted, span } = readings;
-      const colours = new Float32Array(positions.length);
-      for (let point = 0; point < measured.length; point++) {
-        const share = (measured[point] - predicted[point] + span) / (2 * span);
-        const row = TABLE + 3 + Math.min(Math.max(Math.floor(share * TABLE), 0), TABLE - 1);
-        for (let k = 0; k < 3; k++) colours[3 * point + k] = this.palettes[4 * row + k] / 255;
-      }
-      const geometry = new BufferGeometry();
-      geometry.setAttribute('position', new BufferAttribute(positions, 3));
-      geometry.setAttribute('color', new BufferAttribute(colours, 3));
-      const size = { value: 15 * this.renderer.getPixelRatio() };
-      this.discs = new Points(geometry, new ShaderMaterial({ ...DISC, uniforms: { size } }));
-      this.scene.add(this.discs);
-    }
-    this.draw();
-  }
-
   // What lies under a point of the window: the triangle and the weights of its corners.
   pick(clientX, clientY) {
     const box = this.canvas.getBoundingClientRect();
@@ -238,16 +195,9 @@ export class PartView {
     return { point: hit.point, corners: [a, b, c], weights: hit.barycoord.toArray() };
   }
 
-  // Film [µm] at a picked place, and the reading that was taken there, if any.
-  probe({ point, corners, weights }) {
-    const film = corners.reduce((sum, corner, k) => sum + weights[k] * this.film[corner], 0);
-    let reading = null;
-    let nearest = NEAR_READING_M;
-    for (let k = 0; this.readings && k < this.readings.measured.length; k++) {
-      const away = point.distanceTo(new Vector3().fromArray(this.readings.positions, 3 * k));
-      if (away < nearest) [nearest, reading] = [away, k];
-    }
-    return { film, reading };
+  // Film [µm] at a picked place.
+  filmAt({ corners, weights }) {
+    return corners.reduce((sum, corner, k) => sum + weights[k] * this.film[corner], 0);
   }
 
   pinAt(place) {
