@@ -119,11 +119,9 @@ def test_a_fold_that_calls_for_another_set_goes_no_further():
     folds = study.folds()
     sets = [first if fold == 0 else last for fold in range(len(parts))]
     assert [stages[0].chosen(folds != k).names for k in range(3)] == [one.names for one in sets]
-    predicted_um = np.empty(len(study))
-    for fold, one in enumerate(sets):
-        out = folds == fold
-        predicted_um[out] = study.predicted_without_um(one.fit, out)[out]
-    expected = root_mean_square(study.measured_um - predicted_um)
+    expected = study.errors_left_out_um(
+        lambda out: study.predicted_without_um(sets[folds[out][0]].fit, out)
+    )
     assert found_um == pytest.approx([expected] * (1 + MOST_LAWS))
 
 
