@@ -176,6 +176,10 @@ def test_a_level_that_no_other_part_tells_is_no_error_on_a_part_left_out():
     expected = np.sqrt((squares + np.sum(~usual) * anew**2) / len(study))
     assert found == pytest.approx(expected, rel=0.03)
     assert anew < 0.1 * np.mean(study.measured_um[~usual])
+    # Two parts of which one is such: neither tells the level of the other.
+    study, fit = clean_and_fit(pd.Campaign((first, off)), BASE, starts=6)
+    found = study.errors_left_out_um(lambda out: study.predicted_without_um(fit, out))
+    assert found < 0.1 * np.mean(study.measured_um)
 
 
 @pytest.fixture(scope='module')

@@ -92,12 +92,18 @@ def random_effects(
     return tuple(effects for effects in (level, zero) if effects.mixing.any())
 
 
-def levels_of_their_own(
-    campaign: Campaign, measured_um: np.ndarray, sigma_um: np.ndarray
+def levels_untold(
+    campaign: Campaign, measured_um: np.ndarray, sigma_um: np.ndarray, used: np.ndarray
 ) -> np.ndarray:
-    """(P, n) directions of the levels that no other part tells, see ``random_effects``."""
+    """(P, n) directions of the levels that the points used, (P,) bool, say nothing of.
+
+    Those of parts painted with something off, and that of the others if only such parts are used.
+    """
     part_of, off = _parts(campaign)
-    return OTHER_LEVEL_SHARE * part_of[:, off] * (measured_um / sigma_um)[:, np.newaxis]
+    levels = part_of[:, off]
+    if not part_of[used][:, ~off].any():
+        levels = np.column_stack([levels, part_of[:, ~off].any(axis=1)])
+    return OTHER_LEVEL_SHARE * levels * (measured_um / sigma_um)[:, np.newaxis]
 
 
 def _parts(campaign: Campaign) -> tuple[np.ndarray, np.ndarray]:

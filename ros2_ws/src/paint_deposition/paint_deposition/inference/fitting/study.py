@@ -17,7 +17,7 @@ from paint_deposition.inference.fitting.outliers import Outlier
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.random_effects import (
     RandomEffects,
-    levels_of_their_own,
+    levels_untold,
     random_effects,
 )
 from paint_deposition.inference.readings.campaign import Campaign
@@ -246,8 +246,8 @@ class Study:
     ) -> np.ndarray:
         """(...) root mean square errors on parts that are left out in turn [um].
 
-        The level of a part that was painted with something switched off is estimated from its own
-        readings, as in ``residuals``: the other parts say nothing of it.
+        Levels of which the other parts say nothing are estimated from the part's own readings, as
+        in ``residuals``: see ``levels_untold``.
 
         Args:
             predict: gives (..., P) films by models that were made without some readings, (P,)
@@ -255,10 +255,10 @@ class Study:
             patches: leave out patches of parts, even where there are several parts.
         """
         folds = self.patches() if patches else self.folds()
-        levels = levels_of_their_own(self.campaign, self.measured_um, self.sigma_um)
         squares_um2 = 0.0
         for fold in np.unique(folds):
             out = folds == fold
+            levels = levels_untold(self.campaign, self.measured_um, self.sigma_um, ~out)
             misfit = ((self.measured_um - predict(out)) / self.sigma_um)[..., out]
             away_um = self.sigma_um[out] * _beside(levels[out], misfit)
             squares_um2 = squares_um2 + np.sum(away_um**2, axis=-1)
