@@ -255,14 +255,18 @@ class Study:
             patches: leave out patches of parts, even where there are several parts.
         """
         folds = self.patches() if patches else self.folds()
-        squares_um2 = 0.0
+        squares_um2: np.ndarray | float = 0.0
         for fold in np.unique(folds):
             out = folds == fold
-            levels = levels_untold(self.campaign, self.measured_um, self.sigma_um, ~out)
-            misfit = ((self.measured_um - predict(out)) / self.sigma_um)[..., out]
-            away_um = self.sigma_um[out] * _beside(levels[out], misfit)
-            squares_um2 = squares_um2 + np.sum(away_um**2, axis=-1)
+            films_um = predict(out)
+            squares_um2 = squares_um2 + np.apply_along_axis(self._square_um2, -1, films_um, out)
         return np.sqrt(squares_um2 / len(self))
+
+    def _square_um2(self, film_um: np.ndarray, out: np.ndarray) -> float:
+        """Sum of squared errors of a film (P,) on points left out (P,), beside levels untold."""
+        levels = levels_untold(self.campaign, film_um, self.sigma_um, ~out)[out]
+        misfit = ((self.measured_um - film_um) / self.sigma_um)[out]
+        return float(np.sum((self.sigma_um[out] * _beside(levels, misfit)) ** 2))
 
     @property
     def _facet_notes(self) -> tuple[str, ...]:
