@@ -181,10 +181,12 @@ for _ in range(40):
 @pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP, signal.SIGINT])
 def test_a_signal_ends_a_command_like_an_interrupt_and_nothing_is_left(tmp_path, number):
     code = """
-import sys, time
+import signal, sys, time
 from pathlib import Path
 from paint_deposition.cli import main
 from paint_deposition.cli.results import results_in
+# As at a terminal: a shell ignores it for what it runs in the background.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 def work(**given):
     with results_in(Path(sys.argv[1])) as folder:
         (folder / 'half').touch()

@@ -75,7 +75,7 @@ class Simulator(DepositionSimulator):
         self.left = SimpleNamespace(
             points=self.points, surface=self.surface, film=self.film.snapshot().film_um,
             models=self.models, received=self.film.counts.received,
-            refused=self.inputs[0].poses_refused, late=self.film.counts.late_triggers,
+            refused=self.inputs[0].poses_refused,
         )  # fmt: skip
 
     def change_part(self, *part) -> None:
@@ -202,9 +202,6 @@ class Cell(RuleBasedStateMachine):
         motion = read_recording(run, state_topic=STATE_TOPIC)
         assert motion.stamps_ns.tolist() == of.stamps_ns, run
         assert len(motion) == of.received, run
-        # Of a clock that was set back and on again: it counts from when it came, and is reported.
-        if of.late:
-            return
         if not motion.brushes & BRUSHES:  # since the clock was set back no state has come
             assert not of.film.any()
             return
