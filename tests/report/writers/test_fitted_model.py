@@ -11,6 +11,7 @@ from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.report.writers.inference import write_fitted
 from small_campaign import small_campaign
@@ -30,7 +31,8 @@ def fitted(tmp_path_factory):
 @pytest.fixture(scope='module')
 def file(tmp_path_factory, fitted) -> Path:
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    write_fitted(path, fitted.study, fitted.history)
+    known = fitted.posterior, estimates(fitted.history[-1].fit)
+    write_fitted(path, fitted.study, fitted.history, *known)
     return path
 
 
