@@ -256,7 +256,9 @@ def _verdict(data: ReportData) -> dict[str, Any]:
 def key_figures(data: ReportData) -> list[Row]:
     """The figures beside the verdict."""
     noise, diagnosis = data.study.noise, data.diagnosis
-    source = {'repeats': 'from repeats', 'stated': 'as stated'}.get(noise.source, noise.source)
+    source = {'stated': 'as stated', 'assumed': 'assumed'}.get(
+        noise.source, f'from {noise.source}'
+    )
     floor = ('Gauge and texture', '', f'{data.study.noise_floor_um:.2f}', f'µm, {source}')
     if diagnosis is None:
         labels = [f'Error, {name}' for name in data.names] or ['Error']

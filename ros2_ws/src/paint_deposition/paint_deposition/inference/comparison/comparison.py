@@ -237,7 +237,8 @@ def compare(study: Study, model: DepositionModel) -> Comparison:
     points = study.residuals(study.forward.predict_um(model))
     campaign = study.campaign
     predicted_um = points.predicted_um[campaign.means.owner]
-    readings = Residuals(campaign.readings.thickness_um, predicted_um, study.noise.sigma_um)
+    sigma_um = np.hypot(study.noise.sigma_um, study.texture_um[campaign.means.owner])
+    readings = Residuals(campaign.readings.thickness_um, predicted_um, sigma_um)
     dependences = [
         Dependence(one.name, *map(float, spearmanr(one.values, points.residual_um)))
         for one in study.covariates(model)

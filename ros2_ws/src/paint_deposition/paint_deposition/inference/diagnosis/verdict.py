@@ -91,7 +91,8 @@ class Step:
     added: str  # effect id, '' for the model that the run started from
     fit: Fit  # of the model to the readings
     # On the fitted points [um], beside the estimated levels of the parts, see ``Study.residuals``;
-    # and on points left out, the model being refitted without them and their level not known.
+    # and on points left out, the model being refitted without them. Their level is not known but
+    # where no other part could tell it, see ``levels_untold``.
     rmse_um: float
     holdout_rmse_um: float
 
@@ -251,7 +252,7 @@ class Diagnosis(Tabular):
 
     @property
     def noise_floor_um(self) -> float:
-        """Standard deviation of the gauge at the points [um]."""
+        """Standard deviation of the points: gauge, texture, and what facets cost [um]."""
         return self.study.noise_floor_um
 
     @property
