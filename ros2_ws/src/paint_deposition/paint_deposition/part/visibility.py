@@ -9,7 +9,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
-from paint_deposition.kernel.blocks import shared_among_threads
+from paint_deposition.kernel.blocks import box_centre_m, shared_among_threads
 from paint_deposition.kernel.compiler import named_for_its_code, njit
 from paint_deposition.kernel.vectors import cross, difference, dot
 from paint_deposition.part.derivatives import tangents
@@ -21,7 +21,6 @@ from paint_deposition.part.face_tree import (
     support,
     wait,
 )
-from paint_deposition.part.points import box_centre_m
 
 # Lower horizons count as this one [sine]: hardly any paint comes from there.
 LEAST_SINE = 0.05

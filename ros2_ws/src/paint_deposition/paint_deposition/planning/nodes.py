@@ -176,9 +176,7 @@ class FilmAtPoints:
     def film_um(self, programme: Programme) -> np.ndarray:
         """(V,) film of a programme at the points [um]."""
         path, _ = spray_path(programme.trajectory(), max_step_m=self.step_m)
-        self._integrator.reset()
-        self._integrator.add(path)
-        return self._integrator.raw_um * self._finished_over_arrived(path) / self._share
+        return self._integrator.raw_of(path) * self._finished_over_arrived(path) / self._share
 
     def of_nodes(self, programme: Programme, nodes: Nodes, density: np.ndarray) -> np.ndarray:
         """(n, V) films for a density of paint of 1 s/m at each node [um].
@@ -209,6 +207,5 @@ class FilmAtPoints:
             return 1.0
         surface = self._surface
         whole = FilmIntegrator(surface.points(), self.model, occluder=surface.occluder)
-        whole.add(path)
-        raw = whole.raw_um
+        raw = whole.raw_of(path)
         return np.divide(whole.film_um, raw, out=np.ones(len(raw)), where=raw > 0.0)[self._rows]

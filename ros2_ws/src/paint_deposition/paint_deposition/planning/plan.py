@@ -179,8 +179,7 @@ def plan(
 def _style(model: DepositionModel, request: PlanRequest, plane: Recommendation) -> PassStyle:
     overspray = request.overspray_m
     if overspray is None:
-        distance = plane.standoff_m + model.projection.emission_offset_m
-        widening = distance / model.projection.model_plane_m
+        widening = model.projection.widening(plane.standoff_m)
         radii = np.linspace(0.0, model.planar.radius_of_flux_m(1e-6), 500)
         enclosed = model.planar.enclosed_fraction(radii)
         # The gun opens where 90 % of the pattern's volume begin to reach the part.
