@@ -11,20 +11,14 @@ from paint_deposition.kernel.compiler import named_for_its_code, njit
 
 
 class Ray(NamedTuple):
-    """One straight ray from the emission point to a surface point, inside the kernel.
+    """One straight ray from the emission point to a surface point, inside the kernel."""
 
-    Attributes:
-        x_m, y_m: where it pierces the model plane, tool axes [m].
-        standoff_ratio: distance along the bell's axis over Omega [1].
-        cos_incidence: cosine of the angle to the surface normal, above 0 [1].
-        speed_m_per_s: speed of the atomizer [m/s].
-    """
-
+    # Where it pierces the model plane, tool axes [m].
     x_m: float
     y_m: float
-    standoff_ratio: float
-    cos_incidence: float
-    speed_m_per_s: float
+    standoff_ratio: float  # distance along the bell's axis over Omega [1]
+    cos_incidence: float  # cosine of the angle to the surface normal, above 0 [1]
+    speed_m_per_s: float  # of the atomizer [m/s]
 
 
 Law = Callable[..., float]

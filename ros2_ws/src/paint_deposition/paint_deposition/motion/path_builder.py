@@ -91,7 +91,10 @@ class PathBuilder:
         if self._stream_ns is None and len(continued):
             self._stream_ns = int(continued.stamps_ns[0])
         if len(continued) and continued.stamps_ns[-1] > self._restart_until_ns:
-            self._go_on()
+            # The stream has not restarted: changes that waited for that are of this one.
+            waited = self._flow.go_on()
+            if self._integrated_ns is not None:
+                self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
         for stream in restarted:
             ended_ns = int(PoseBatch.joined(self._waiting).stamps_ns[-1])
             within = self._stream_ns is not None and stream.stamps_ns[0] > self._stream_ns
@@ -129,12 +132,6 @@ class PathBuilder:
         complete = path.with_(until_on_s=until_on, until_off_s=until_off, to_turn_m=to_turn)
         self._finished = [path.select(slice(ready, None))]
         return complete.select(slice(0, ready))
-
-    def _go_on(self) -> None:
-        """The stream has not restarted: changes that waited for that are of this one."""
-        waited = self._flow.go_on()
-        if self._integrated_ns is not None:
-            self.counts.late_triggers += sum(stamp < self._integrated_ns for stamp in waited)
 
     def _cut_segments(self, until_ns: int | None, finish: bool) -> None:
         if not self._waiting:

@@ -79,10 +79,10 @@ class Placement:
     middle_m: float  # coordinate across of their middle
     sigma_n: float  # of their film on the part
 
-    @property
-    def lines_m(self) -> np.ndarray:
-        """(n,) coordinates across, increasing [m]."""
-        return lines_of(self.passes, self.index_m, self.middle_m)
+    def lines_m(self, direction: str) -> np.ndarray:
+        """(n,) coordinates across [m]: level lines from the top down, others from the left."""
+        lines = lines_of(self.passes, self.index_m, self.middle_m)
+        return lines if direction == 'horizontal' else lines[::-1]
 
 
 def lines_of(passes: int, index_m: float | np.ndarray, middle_m: float | np.ndarray) -> np.ndarray:
