@@ -16,8 +16,8 @@ Positive = Annotated[float, Field(gt=0.0)]
 Vector = Annotated[tuple[float, float, float], BeforeValidator(tuple)]
 
 
-class PassRequest(Request):
-    """How passes run and what they lay."""
+class FilmBuild(Request):
+    """How much film passes lay."""
 
     speed_m_per_s: float | None = given(
         None, 'Speed of the passes [m/s].', '--speed',
@@ -26,6 +26,11 @@ class PassRequest(Request):
     target_um: float | None = given(
         None, 'Mean film build; the speed is chosen for it if it is not given [µm].', above=0.0
     )
+
+
+class PassRequest(FilmBuild):
+    """How passes run and what they lay."""
+
     index_min_m: float | None = given(
         None, 'Least index [m].', '--index-min', least=0.001, most=10.0
     )
