@@ -5,7 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose, locate
+from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
+from paint_deposition.planning.part_places import locate
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:

@@ -14,13 +14,13 @@ from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.messages import stamp_ns
-from paint_deposition.film.colour_scales import BARE_RGB
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.comparison.regions import radius_of_readings_m
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.nodes.model_comparison import ModelComparison
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import OK, WARN
+from paint_deposition.report.colour_scales import BARE_RGB
 
 MOTION = two_passes()
 TRUTH = DepositionModel().with_effect(effect_class('air_drift')(shift_down_m=0.08))

@@ -18,8 +18,8 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError, PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
-from paint_deposition.planning.driving import PartPlaces
 from paint_deposition.planning.joints import starts
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import driven, plan
 from paint_deposition.planning.requests import PlanRequest
 from planning.test_surface_map import sheet

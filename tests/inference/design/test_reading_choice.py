@@ -18,7 +18,7 @@ from paint_deposition.inference.design.reading_choice import (
 )
 from paint_deposition.inference.design.unmeasured_part import UnmeasuredPart
 from paint_deposition.inference.diagnosis.model_space import SIZES
-from paint_deposition.part.gauge_places import grid_places
+from paint_deposition.inference.readings.gauge_places import grid_places
 
 
 def on_panel(*names: str) -> UnmeasuredPart:

@@ -10,7 +10,6 @@ import numpy as np
 from paint_deposition.api.simulation import look_at_guns
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.files.motion_files import GunMotion
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.film.live_film import LiveFilm, without_refused_states
 from paint_deposition.film.statistics import (
@@ -21,6 +20,7 @@ from paint_deposition.film.statistics import (
 from paint_deposition.motion.pose_stream import PoseBatch, events_of
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.live.page import Scene
 
 # The film is shown so often [s].

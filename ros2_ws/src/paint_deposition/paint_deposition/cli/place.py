@@ -97,7 +97,7 @@ def locate_command(touched: Path, points: Path, pose_unit: str | None, as_json: 
     from paint_deposition.files.atomic import json_text
     from paint_deposition.files.gauge_readings import read_points
     from paint_deposition.files.provenance import origin
-    from paint_deposition.motion.part_frame import locate
+    from paint_deposition.planning.part_places import locate
 
     given = read_points(touched, pose_unit), read_points(points, pose_unit)
     try:

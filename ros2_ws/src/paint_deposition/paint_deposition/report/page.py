@@ -17,7 +17,6 @@ from scipy.special import fdtrc
 from paint_deposition import __version__
 from paint_deposition.files.atomic import plain, write_text
 from paint_deposition.files.version import git_version
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
@@ -26,6 +25,7 @@ from paint_deposition.inference.diagnosis.procedure import ALPHA
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, percent
 from paint_deposition.planning.improvement import FilmSummary, Improvement
 from paint_deposition.report import charts, words
+from paint_deposition.report.colour_scales import film_scale
 from paint_deposition.report.data import (
     ReportData,
     blind_rows,

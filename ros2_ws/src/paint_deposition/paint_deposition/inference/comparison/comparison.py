@@ -14,7 +14,6 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.film.film import Tabular
 from paint_deposition.film.spray_geometry import SprayGeometry
 from paint_deposition.inference.comparison.regions import Region, misfit_regions
 from paint_deposition.inference.fitting.study import Study
@@ -22,6 +21,7 @@ from paint_deposition.inference.readings.campaign import Campaign
 from paint_deposition.inference.readings.plausibility import geometry_by_experiment
 from paint_deposition.inference.readings.readings import Residuals
 from paint_deposition.part.zones import Zone
+from paint_deposition.tabular import Tabular
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,8 @@ from tornado.web import Application, RequestHandler, StaticFileHandler
 from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
 from paint_deposition.errors import PaintError
-from paint_deposition.film.colour_scales import FILM_PALETTE, RESIDUAL_PALETTE, ColourScale
 from paint_deposition.part.surface import Surface
+from paint_deposition.report.colour_scales import FILM_PALETTE, RESIDUAL_PALETTE, ColourScale
 
 DEFAULT_HOST, DEFAULT_PORT = '127.0.0.1', 8090
 # The variable of the environment for the token: others can read the words of a command.

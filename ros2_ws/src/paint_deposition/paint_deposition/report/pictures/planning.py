@@ -9,13 +9,13 @@ from matplotlib.figure import Figure
 from matplotlib.gridspec import GridSpec
 from matplotlib.patches import Patch
 
-from paint_deposition.film.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
 from paint_deposition.film.integrator import NO_PAINT_UM
 from paint_deposition.inference.design.reading_choice import ChosenReadings
-from paint_deposition.planning.driving import PartPlaces
 from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
+from paint_deposition.report.colour_scales import OVER_RGB, UNDER_RGB, ColourScale, film_scale
 from paint_deposition.report.pictures.film import draw_tool_path, page_film
 from paint_deposition.report.pictures.part import (
     PALE_HALO,

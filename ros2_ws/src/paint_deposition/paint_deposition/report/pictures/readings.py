@@ -7,11 +7,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, FigureBase
 
-from paint_deposition.film.colour_scales import film_scale, residual_scale
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.comparison.profiles import Profile
 from paint_deposition.inference.comparison.regions import interpolate_over_surface
 from paint_deposition.inference.fitting.calibration import Calibration, PanelFit
+from paint_deposition.report.colour_scales import film_scale, residual_scale
 from paint_deposition.report.data import ReportData
 from paint_deposition.report.pictures.film import page_film
 from paint_deposition.report.pictures.part import HALO, PartPicture, label_points

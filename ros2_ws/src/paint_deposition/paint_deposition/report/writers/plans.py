@@ -32,9 +32,9 @@ from paint_deposition.motion.part_frame import Rigid, moved
 from paint_deposition.motion.path_builder import spray_path
 from paint_deposition.motion.programmed import Move, timed
 from paint_deposition.part.orientation import across_axis
-from paint_deposition.planning.driving import PartPlaces
 from paint_deposition.planning.faces import PartPlan
 from paint_deposition.planning.improvement import Improvement
+from paint_deposition.planning.part_places import PartPlaces
 from paint_deposition.planning.plan import Plan
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import film_picture

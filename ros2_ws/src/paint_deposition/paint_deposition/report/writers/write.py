@@ -15,11 +15,11 @@ from paint_deposition.files.atomic import replacing, write_json
 from paint_deposition.files.gauge_readings import table_text, write_predictions
 from paint_deposition.files.meshes import write_mesh_ply
 from paint_deposition.files.provenance import origin
-from paint_deposition.film.colour_scales import film_scale
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import FilmStatistics
 from paint_deposition.part.surface import Surface
 from paint_deposition.part.zones import PointZones
+from paint_deposition.report.colour_scales import film_scale
 
 # Modules beside this one that register writers; those that import least come first.
 WRITERS = ('plans', 'inference')

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib import colormaps
 
-from paint_deposition.film.colour_scales import (
+from paint_deposition.report.colour_scales import (
     BARE_RGB,
     FILM_PALETTE,
     OVER_RGB,
