@@ -15,7 +15,7 @@ from paint_deposition.cli.main import run
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
 from paint_deposition.files.motion_files import GunMotion, read_recording
-from paint_deposition.report.live.page import STEP_UM, Page, Scene, Seen
+from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
 

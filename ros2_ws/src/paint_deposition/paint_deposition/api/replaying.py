@@ -21,7 +21,7 @@ from paint_deposition.film.statistics import (
 from paint_deposition.motion.pose_stream import PoseBatch, events_of
 from paint_deposition.motion.trajectory import DEFAULT_MAX_POSE_GAP_S, Trajectory
 from paint_deposition.part.surface import Surface
-from paint_deposition.report.live.page import Scene
+from paint_deposition.report.live_page import Scene
 
 # The film is shown so often [s].
 PERIOD_S = 0.2

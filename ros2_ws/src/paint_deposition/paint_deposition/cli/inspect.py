@@ -83,9 +83,9 @@ def _contents(
     from paint_deposition.files.meshes import SUFFIXES
     from paint_deposition.files.motion_files import MotionSource, read_table
     from paint_deposition.files.rapid.program import is_rapid, program_as_text, read_program
+    from paint_deposition.files.recordings.bags import BOOL_TYPE
     from paint_deposition.files.recordings.messages import STATE_TYPE
     from paint_deposition.files.recordings.pose_topics import summarise
-    from paint_deposition.files.recordings.triggers import BOOL_TYPE
     from paint_deposition.files.tables.poses import is_pose_table, may_hold_poses
     from paint_deposition.files.tables.readings import holds_readings
     from paint_deposition.files.tables.sheets import is_gauge_file

@@ -17,7 +17,7 @@ from paint_deposition.cli import options
 from paint_deposition.cli.models import models_for
 from paint_deposition.cli.results import SHOW_PROGRESS_AFTER_S, Progress, print_all, python
 from paint_deposition.errors import PaintError
-from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
+from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page
 
 if TYPE_CHECKING:
     from paint_deposition.api.replaying import Replay
