@@ -8,7 +8,7 @@ import sys
 import click
 from click.shell_completion import CompletionItem
 
-from paint_deposition import __version__
+from paint_deposition import __version__, git_version
 from paint_deposition.errors import PaintError, did_you_mean
 
 # As fitting/one_thread.py does for the fits of a script, here for all that a command computes; to
@@ -109,8 +109,6 @@ def paint(context: click.Context, shows_version: bool) -> None:
     Lengths are in metres, film in micrometres. `paint COMMAND --help` says more.
     """
     if shows_version:
-        from paint_deposition.files.version import git_version
-
         click.echo(f'paint {__version__} {git_version()}'.rstrip())
         context.exit()
     if context.invoked_subcommand is None:

@@ -24,8 +24,7 @@ from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError, quoted
-from paint_deposition.files.atomic import plain, write_text
-from paint_deposition.files.strict_yaml import read_yaml
+from paint_deposition.files.atomic import plain, read_yaml, write_text
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import MOST, Brush, PlanarPattern, SetPoints
 from paint_deposition.model.eq2_projection import Projection

@@ -7,8 +7,8 @@ import numpy as np
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
 from paint_deposition.errors import PaintError, quoted
+from paint_deposition.files.atomic import read_yaml
 from paint_deposition.files.meshes import read_triangles
-from paint_deposition.files.strict_yaml import read_yaml
 from paint_deposition.film.statistics import require_band
 from paint_deposition.part.zones import Box, Patch, Region, Zone, Zones
 from paint_deposition.request import Number, Text, validate
