@@ -118,7 +118,7 @@ def _replay(
     named = Path(recorded['model_file']) if recorded.get('model_file') else None
     guns = read_gun_motions([run], validate(MotionSource, 'motion', motion, pd.PaintError))
     files = [file for file in (model_file or named,) if file]
-    chosen = models_for(files, [run], [gun.name for gun in guns], named=model_file is not None)
+    chosen = models_for(files, [run], [name for name, _ in guns], named=model_file is not None)
     show('refining the mesh')
     surface = part.surface(Path(mesh))
     replay = Replay(surface, guns, [model.model for model in chosen], **given)

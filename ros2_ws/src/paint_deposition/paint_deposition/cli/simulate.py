@@ -85,18 +85,17 @@ def simulate_command(
 
         show('reading')
         source = validate(MotionSource, 'motion', motion, pd.PaintError)
-        guns = read_gun_motions(trajectories, source, atomizers)
-        chosen = models_for(model_files, trajectories, [gun.name for gun in guns])
+        names, motions = zip(*read_gun_motions(trajectories, source, atomizers), strict=True)
+        chosen = models_for(model_files, trajectories, names)
         show('refining the mesh')
         surface, readings = part.surface(), None
         zones = part.zones()
         if readings_file:
             readings = pd.read_readings(readings_file, points_file, surface=surface)
         film = pd.simulate(
-            surface, [gun.trajectory for gun in guns], [model.model for model in chosen],
-            names=[gun.name for gun in guns], coats=coats, wet_on_wet=wet_on_wet,
-            readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones, strict=source.strict,
-            progress=show, **dict(band),
+            surface, motions, [model.model for model in chosen], names=names, coats=coats,
+            wet_on_wet=wet_on_wet, readings=readings, max_pose_gap_s=max_pose_gap_s, zones=zones,
+            strict=source.strict, progress=show, **dict(band),
         )  # fmt: skip
         made_from = {
             **inputs(mesh_file=part.mesh, zones_file=part.zones_file),

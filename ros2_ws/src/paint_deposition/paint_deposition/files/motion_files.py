@@ -3,7 +3,7 @@
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -69,14 +69,6 @@ class MotionSource(MotionOptions):
             if plural[kind] not in kinds and getattr(self, name) is not None:
                 option = f'--{name.replace("_", "-")}'
                 raise RecordingError(f'{option} is for {kinds}, {path} is {kind}; leave it out')
-
-
-@dataclass(frozen=True)
-class GunMotion:
-    """The name of a gun, '' for the only one, and its motion in the frame of the part."""
-
-    name: str
-    trajectory: Trajectory
 
 
 def read_recording(
@@ -161,8 +153,8 @@ def read_table(path: Path, source: MotionSource) -> Trajectory:
 
 def read_gun_motions(
     files: Sequence[Path], source: MotionSource, atomizers: Sequence[str] = ()
-) -> list[GunMotion]:
-    """Read the motion of each gun from a bag, a RAPID module or a table for each.
+) -> list[tuple[str, Trajectory]]:
+    """The name of each gun, '' for the only one, and its motion, from a file for each.
 
     Or from one bag with all ``atomizers``, whose names precede their topics, as in
     /robot_1/atomizer/pose; a gun without a recorded state sprays whenever it moves. Raises
@@ -186,7 +178,7 @@ def read_gun_motions(
         names = [f'{name} {number}' for number, name in enumerate(names, start=1)]
     each = list(files) * (len(names) if len(files) == 1 else 1)
     of_each = zip(names, each, guns or [''] * len(each), strict=True)
-    return [GunMotion(name, read_motion(file, source, gun)) for name, file, gun in of_each]
+    return [(name, read_motion(file, source, gun)) for name, file, gun in of_each]
 
 
 def _read_bag(bag: Bag, source: MotionSource, gun: str) -> Trajectory:
