@@ -16,6 +16,7 @@ from paint_deposition.files.rapid.program import is_rapid, program_trajectory, r
 from paint_deposition.files.recordings.bag_files import TRIGGER, Bag, custom_data, open_bag
 from paint_deposition.files.recordings.bags import POSE_TOPIC, STATE_TOPIC, trajectory_of
 from paint_deposition.files.recordings.messages import JOINT_TYPE
+from paint_deposition.files.recordings.pose_topics import lookups, read_frames
 from paint_deposition.files.tables.pose_columns import CONVENTIONS, ROTATION_WORDS
 from paint_deposition.files.tables.poses import is_pose_table, read_pose_table
 from paint_deposition.motion.part_frame import POSE_FORMAT, Rigid, is_frame, is_pose, moved
@@ -232,8 +233,6 @@ def _in_part_frame(recorded: Trajectory, source: MotionSource, bag: Bag | None) 
         return replace(brought, notes=(*brought.notes, note))
     known = ''
     if bag is not None and (recorded.frames or not is_frame(named, part)):
-        from paint_deposition.files.recordings.pose_topics import read_frames
-
         tree = read_frames(bag)
         recorded = _by_transforms(recorded, part, tree, bag, source.part_pose)
         fixed = tree.connected(named)
@@ -262,8 +261,6 @@ def _by_transforms(
     A pose without a frame is the part's. If nothing places the part, it is the most frequent
     frame of the poses; poses for which no transform is known are left out.
     """
-    from paint_deposition.files.recordings.pose_topics import lookups
-
     named = recorded.frame_id
     frames = np.array(recorded.frames or [named] * len(recorded))
     own = [frame for frame in {*frames.tolist()} if is_frame(frame, part)]

@@ -19,7 +19,7 @@ from paint_deposition.files.recordings import messages as definitions
 from paint_deposition.files.recordings.bag_files import Bag, BagTopic, custom_data
 from paint_deposition.files.recordings.mcap_run import RunTopic, RunWriter, offered_qos
 from paint_deposition.files.recordings.messages import STATE_TYPE, TF_TYPES, Signal, stamp_ns
-from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE, read_poses, read_tf_poses
 from paint_deposition.files.tables.headings import LENGTHS
 from paint_deposition.motion.part_frame import Rigid
 from paint_deposition.motion.pose_stream import TriggerChange
@@ -102,8 +102,6 @@ def motion_of(
         read, log_times_ns, name = read_joint_poses(bag, robot, pose_topic)
     else:
         if tf:
-            from paint_deposition.files.recordings.pose_topics import read_tf_poses
-
             read, log_times_ns = read_tf_poses(bag, *tf)
             name = f'transforms to {tf[1]}'
         else:
@@ -281,8 +279,14 @@ def write_pose_bag(
             if is_pose:
                 pose = _pose_message(types, 'Pose', 'Point', poses[content])
                 write(POSE_TOPIC, time_ns, types.types[POSE_TYPE](header, pose))
+            elif state_type == BOOL_TYPE:
+                write(STATE_TOPIC, time_ns, types.types[BOOL_TYPE](content[0] > 0.0))
             else:
-                write(STATE_TOPIC, time_ns, _state(types, state_type, header, *content))
+                # Neither set-points nor a programmed speed.
+                (flow, brush), unknown = content, float('nan')
+                settings = flow, unknown, unknown, unknown, brush, unknown, unknown
+                state = types.types[STATE_TYPE](header, flow > 0.0, *settings)
+                write(STATE_TOPIC, time_ns, state)
     return run.folder
 
 
@@ -301,17 +305,6 @@ def _joint_trajectory(types: Typestore, begin_ns: int, drive: Drive) -> Any:
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:
     qos = [offered_qos(1 if latched else 500, latched=latched)]
     run.add_topic(RunTopic(name, message_type, definitions.standard(message_type), qos))
-
-
-def _state(types: Typestore, kind: str, header: Any, flow: float, brush: int) -> Any:
-    """A Bool or an AtomizerState with relative flow and brush."""
-    if kind == BOOL_TYPE:
-        return types.types[BOOL_TYPE](flow > 0.0)
-    # Neither set-points nor a programmed speed.
-    unknown = float('nan')
-    return types.types[STATE_TYPE](
-        header, flow > 0.0, flow, *(unknown,) * 3, brush, unknown, unknown
-    )
 
 
 def _pose_message(types: Typestore, kind: str, place: str, values: Sequence[float]) -> Any:
