@@ -68,7 +68,14 @@ class Replay:
         self._times_ns = [np.maximum.accumulate(motion.stamps_ns) for motion in trajectories]
         self._start_ns = min(int(times[0]) for times in self._times_ns)
         self._end_ns = max(int(times[-1]) for times in self._times_ns)
-        self._flows = [_flow_at_poses(motion) for motion in trajectories]
+        # Relative flow (N,) at each pose; 1 without a trigger.
+        self._flows = []
+        for motion in trajectories:
+            order = np.argsort(motion.trigger_stamps_ns, kind='stable')
+            stamps_ns = motion.trigger_stamps_ns[order]
+            passed = np.searchsorted(stamps_ns, motion.stamps_ns, side='right')
+            before = 0.0 if len(order) else 1.0
+            self._flows.append(np.append(before, motion.trigger_flow[order])[passed])
         self._paused, self._again = Event(), Event()
         self.scene = Scene()
         self.scene.show_part(self._surface)
@@ -141,12 +148,3 @@ class Replay:
         self.scene.show_scale(scale, DEFAULT_PAINTED_ABOVE_UM, target_um, tolerance_um)
         self.scene.show_film(film_um)
         self.scene.add_figures(time_s, figures)
-
-
-def _flow_at_poses(motion: Trajectory) -> np.ndarray:
-    """(N,) relative flow at each pose; 1 without a trigger."""
-    if not len(motion.trigger_flow):
-        return np.ones(len(motion))
-    order = np.argsort(motion.trigger_stamps_ns, kind='stable')
-    passed = np.searchsorted(motion.trigger_stamps_ns[order], motion.stamps_ns, side='right')
-    return np.concatenate([[0.0], motion.trigger_flow[order]])[passed]

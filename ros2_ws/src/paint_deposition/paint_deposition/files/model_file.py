@@ -18,7 +18,6 @@ from paint_deposition.effects.catalogue import (
     effect_class,
     learned_law,
     load_effect_file,
-    load_unnamed_effect_file,
 )
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.law import LearnedLaw
@@ -126,25 +125,6 @@ def write_model(
         'history': list(history or ()),
     }
     write_text(path, model_text(model, path.parent, header_comment or '', name, extras))
-
-
-def model_of(values: Mapping[str, Any]) -> DepositionModel:
-    """The model that the ``provenance`` of a result describes; its brushes are a list there.
-
-    Raises:
-        ModelError: it has an effect of a user's own, whose file is not named there.
-    """
-    # Results of earlier versions also say whether a brush was interpolated.
-    about = {'number', 'interpolated'}
-    try:
-        brushes = {
-            brush['number']: {key: value for key, value in brush.items() if key not in about}
-            for brush in values.get('brushes', ())
-        }
-    except (KeyError, TypeError, AttributeError):
-        raise ModelError('brushes is no list of brushes with their number') from None
-    sections = {**values, 'brushes': brushes or None}
-    return _model_file(sections, load_unnamed_effect_file).model
 
 
 def _model_file(content: Any, load: Callable[[str], type[Effect]]) -> ModelFile:

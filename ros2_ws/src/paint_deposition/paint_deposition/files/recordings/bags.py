@@ -273,7 +273,15 @@ def write_pose_bag(
         if drive:
             begin_ns = int(trajectory.stamps_ns[0])
             _add_topic(run, JOINT_TOPIC, JOINT_TRAJECTORY_TYPE)
-            write(JOINT_TOPIC, begin_ns, _joint_trajectory(types, begin_ns, drive))
+            point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
+            duration, none = types.types['builtin_interfaces/msg/Duration'], np.empty(0)
+            seconds = [duration(int(s), round(s % 1.0 * 1e9)) for s in drive.seconds.tolist()]
+            points = [
+                point(position, speed, none, none, at)
+                for position, speed, at in zip(drive.joints, drive.speeds, seconds, strict=True)
+            ]
+            joints = _header(types, begin_ns, ''), list(drive.arm.joints), points
+            write(JOINT_TOPIC, begin_ns, types.types[JOINT_TRAJECTORY_TYPE](*joints))
         for time_ns, is_pose, content in sorted(entries, key=lambda entry: entry[:2]):
             header = _header(types, time_ns, frame_id)
             if is_pose:
@@ -288,18 +296,6 @@ def write_pose_bag(
                 state = types.types[STATE_TYPE](header, flow > 0.0, *settings)
                 write(STATE_TOPIC, time_ns, state)
     return run.folder
-
-
-def _joint_trajectory(types: Typestore, begin_ns: int, drive: Drive) -> Any:
-    point = types.types['trajectory_msgs/msg/JointTrajectoryPoint']
-    duration = types.types['builtin_interfaces/msg/Duration']
-    none, rows = np.empty(0), zip(drive.seconds.tolist(), drive.joints, drive.speeds, strict=True)
-    points = [
-        point(position, speed, none, none, duration(int(time_s), round(time_s % 1.0 * 1e9)))
-        for time_s, position, speed in rows
-    ]
-    header = _header(types, begin_ns, '')
-    return types.types[JOINT_TRAJECTORY_TYPE](header, list(drive.arm.joints), points)
 
 
 def _add_topic(run: RunWriter, name: str, message_type: str, latched: bool = False) -> None:

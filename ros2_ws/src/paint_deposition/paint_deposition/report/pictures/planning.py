@@ -19,7 +19,7 @@ from paint_deposition.part.points import box_extent_m
 from paint_deposition.part.refinement import face_normals
 from paint_deposition.part.surface import Surface
 from paint_deposition.planning.driving import PartPlaces
-from paint_deposition.planning.improvement import FilmSummary, Improvement, PassChange
+from paint_deposition.planning.improvement import Improvement
 from paint_deposition.planning.programme import STANDING_M, speed_along
 from paint_deposition.planning.recommendation import Recommendation
 from paint_deposition.report.pictures.film import draw_tool_path, page_film
@@ -229,7 +229,13 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
         part.draw(one, scale.rgba(laid.film_um, laid.film_um > 1.0))
         part.draw_zones(one, result.wanted.zones, driven)
         draw_tool_path(one, driven, part.view, low, high)
-        one.set_title(_title(name, laid), loc='left', fontsize=11, color=INK)
+        s = laid.statistics
+        title = (
+            f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
+            f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
+            f'{laid.cycle_s:.1f} s'
+        )
+        one.set_title(title, loc='left', fontsize=11, color=INK)
     axes[1].set_ylabel('')
     colour_bar(top, axes, 'film [µm]', scale)
     top.legend(
@@ -244,8 +250,16 @@ def write_improvement_picture(path: str | Path, result: Improvement) -> Path:
     charts = bottom.subplots(rows, columns, squeeze=False, sharey=True)
     for chart in charts.ravel()[len(passes) :]:
         chart.set_axis_off()
+    retiming = result.retiming
+    programmes = ('before', retiming.original, BEFORE), ('after', retiming.programme, ACCENT)
     for chart, change in zip(charts.ravel(), passes, strict=False):
-        _draw_speeds(chart, change, result)
+        begin, end = change.place_m
+        places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
+        middle = 0.5 * (places[1:] + places[:-1]) - begin
+        for name, programme, colour in programmes:
+            speed = speed_along(programme, places)
+            chart.plot(middle, speed, color=colour, linewidth=1.6, label=name)
+        quiet(chart, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
     for chart in charts[:, 0]:
         chart.set_ylabel('speed [m/s]', color=MUTED, fontsize=9.0)
     charts[0, 0].set_ylim(0.0, 1.08 * charts[0, 0].get_ylim()[1])
@@ -275,28 +289,6 @@ def _scale(result: Improvement) -> ColourScale:
         [one.film_um[result.wanted.region] for one in (result.before, result.after)]
     )
     return film_scale(np.quantile(films, [0.01, 0.99]))
-
-
-def _title(name: str, laid: FilmSummary) -> str:
-    s = laid.statistics
-    return (
-        f'{name}: $\\sigma_N$ {100 * laid.sigma_n:.1f} %, mean {laid.mean_um:.1f} µm\n'
-        f'{s.min_um:.1f} to {s.max_um:.1f} µm, paint {laid.paint_cm3:.1f} cm³, '
-        f'{laid.cycle_s:.1f} s'
-    )
-
-
-def _draw_speeds(axes: Axes, change: PassChange, result: Improvement) -> None:
-    """The speeds along a pass, before and after."""
-    begin, end = change.place_m
-    places = np.linspace(begin + STANDING_M, end - STANDING_M, 121)
-    middle = 0.5 * (places[1:] + places[:-1]) - begin
-    programmes = result.retiming.original, result.retiming.programme
-    for programme, colour, name in zip(
-        programmes, (BEFORE, ACCENT), ('before', 'after'), strict=True
-    ):
-        axes.plot(middle, speed_along(programme, places), color=colour, linewidth=1.6, label=name)
-    quiet(axes, 'along the pass [m]', '', f'pass {change.number}', size=9.0)
 
 
 def write_places(path: str | Path, places: PartPlaces) -> Path:
