@@ -22,9 +22,10 @@ from paint_deposition.files.meshes import read_mesh
 from paint_deposition.files.model_file import read_model_file
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.provenance import planned_model
+from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.joint_states import Robot
 from paint_deposition.files.recordings.mcap_recovery import recover
-from paint_deposition.files.recordings.pose_topics import summarise
+from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
 from robot_arm import urdf
@@ -183,7 +184,8 @@ def _mcap() -> bytes:
 
 
 def _bag(path: Path) -> object:
-    summarise(path, 0.25)
+    with open_bag(path) as bag:
+        list(sources_of_poses(bag, 0.25))
     state = None if path.suffix == '.bag' else '/atomizer/state'
     return read_recording(path, pose_topic='/atomizer/pose', state_topic=state)
 

@@ -9,7 +9,8 @@ import pytest
 from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
-from paint_deposition.files.recordings.pose_topics import summarise
+from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.files.recordings.pose_topics import sources_of_poses
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import JOINTS, sweep, tip_poses, urdf
@@ -226,7 +227,8 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(folder, tmp_path
         poses('/poses', 'PoseArray'), joints('/slow', ABB_JOINTS, SWEEP, every=50),
         joints('/twice', ABB_JOINTS, SWEEP, times=2),
     )  # fmt: skip
-    found = {source.topic: source for source in summarise(run, 0.25)[1]}
+    with open_bag(run) as opened:
+        found = {source.topic: source for source in sources_of_poses(opened, 0.25)}
     assert {topic: source.unit for topic, source in found.items()} == {
         '/arm_PoseStamped': 'mm', '/arm_JointState': 'deg', '/odom': 'm', '/poses': '',
         '/slow': 'rad', '/twice': 'rad',

@@ -162,7 +162,7 @@ def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
     wait_until(lambda: all(player.finished.done() for player in players), what='both replays')
     assert np.array_equal(painted(node, poses), live)
 
-    motions = [gun.trajectory for gun in read_gun_motions([run], MotionSource(), GUNS)]
+    motions = [motion for _, motion in read_gun_motions([run], MotionSource(), GUNS)]
     film = simulate(node.surface, motions, names=GUNS)
     assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
     assert np.abs(film.film_um - live).max() < 1e-5 * live.max()

@@ -37,7 +37,7 @@ from paint_deposition.nodes.runtime.parameters import (
 from paint_deposition.nodes.runtime.topics import AdaptiveSubscription, gun_topic
 from paint_deposition.part.surface import turned
 from paint_deposition.report.colour_scales import film_scale
-from paint_deposition.report.live.page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
+from paint_deposition.report.live_page import DEFAULT_HOST, DEFAULT_PORT, TOKEN, Page, Scene
 
 
 class WebView(PaintNode):

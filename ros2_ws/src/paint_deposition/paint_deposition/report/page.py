@@ -14,9 +14,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from scipy.special import fdtrc
 
-from paint_deposition import __version__
+from paint_deposition import __version__, git_version
 from paint_deposition.files.atomic import plain, write_text
-from paint_deposition.files.version import git_version
 from paint_deposition.film.film import Film
 from paint_deposition.film.statistics import CPK_MEANS, film_statistics
 from paint_deposition.inference.comparison.comparison import SideBySide
