@@ -10,15 +10,9 @@ HEADER = 'x_m,y_m,z_m,thickness_um'
 
 
 @pytest.fixture
-def table(tmp_path):
+def table(file):
     """`table(line, ...)`: a CSV file of these lines."""
-
-    def write(*lines: str):
-        path = tmp_path / 'door.csv'
-        path.write_text('\n'.join(lines) + '\n')
-        return path
-
-    return write
+    return lambda *lines: file('door.csv', '\n'.join(lines) + '\n')
 
 
 def test_every_column_arrives_where_it_belongs(table):
@@ -56,10 +50,7 @@ def test_without_labels_readings_at_exactly_one_place_are_repeats(table):
             r"known as z \(columns: 'x_m', 'y_m', 'thickness_um'\); give it with columns: {z: ",
         ),
         (['x_mm,y_m,z_m,thickness_um', '0,0,0,20'], 'x, y, z are in .* give all in one of m, mm'),
-        (
-            ['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'],
-            "x, y, z are in 'ell'; give all in one",
-        ),
+        (['x,y,z,DFT', 'ell,ell,ell,um', '0,0,0,20'], "x, y, z are in 'ell'; give all in one"),
         (['x_m,y_m,z_m,thickness_m', '0,0,0,1'], 'no column is known as the thick'),
         (['x,y,z,dft_um,film_um', '0,0,0,1,2'], "may be in 'dft_um', 'film_um'; name one"),
         (

@@ -18,18 +18,6 @@ from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
 
 
-@pytest.fixture
-def written(tmp_path: Path):
-    """Writes a model file of this text."""
-
-    def write(text: str) -> Path:
-        path = tmp_path / 'model.yaml'
-        path.write_text(text, encoding='utf-8')
-        return path
-
-    return write
-
-
 def refusal(path: Path) -> str:
     with pytest.raises(ModelError) as refused:
         read_model(path)
@@ -149,17 +137,17 @@ MAP = 'covariate: place, maps: [{part_m: [1, 1, 1], high_m: [0.5, 0.5], rows: 2'
         ('covariate: footprint, reach_m: 0', 'reach_m is 0; expected a number above 0'),
     ],
 )
-def test_what_is_no_learned_law_is_said_in_one_line(written, entry: str, message: str):
-    assert message in refusal(written(f'effects: [{{id: learned, {entry}}}]'))
+def test_what_is_no_learned_law_is_said_in_one_line(file, entry: str, message: str):
+    assert message in refusal(file('model.yaml', f'effects: [{{id: learned, {entry}}}]'))
 
 
-def test_what_is_left_out_has_its_default(written):
-    assert read_model(written('planar: {K2: 0.3}')) == DepositionModel(
+def test_what_is_left_out_has_its_default(file):
+    assert read_model(file('model.yaml', 'planar: {K2: 0.3}')) == DepositionModel(
         planar=PlanarPattern(K2=0.3)
     )
-    assert read_model(written('effects:')).effects == ()
-    assert read_model(written('planar: {K2: 1e-2}')).planar.K2 == 0.01
-    assert read_model(written('effects: [{id: air_drift}]')).effects[0].is_neutral
+    assert read_model(file('model.yaml', 'effects:')).effects == ()
+    assert read_model(file('model.yaml', 'planar: {K2: 1e-2}')).planar.K2 == 0.01
+    assert read_model(file('model.yaml', 'effects: [{id: air_drift}]')).effects[0].is_neutral
 
 
 @pytest.mark.parametrize(
@@ -191,8 +179,8 @@ def test_what_is_left_out_has_its_default(written):
         ('planar:\n  K2: [', 'cannot be read as YAML (line 2: '),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_one_line(written, text: str, message: str):
-    assert message in refusal(written(text))
+def test_what_is_wrong_is_said_in_one_line(file, text: str, message: str):
+    assert message in refusal(file('model.yaml', text))
 
 
 def test_a_missing_or_unreadable_file_is_named(tmp_path: Path):

@@ -55,11 +55,7 @@ def test_the_forward_model_is_the_film_at_the_readings(spotted, exact):
 
 def test_a_known_pattern_comes_back_from_readings_without_noise(forward, exact):
     fit = fit_readings(
-        forward,
-        exact,
-        np.full(len(exact), 0.003),
-        FreeParameters.of(BASE),
-        starts=6,
+        forward, exact, np.full(len(exact), 0.003), FreeParameters.of(BASE), starts=6
     )
     assert fit.converged
     assert fit.chi_square < 1.0
