@@ -14,7 +14,7 @@ from mcap.writer import CompressionType, Writer
 
 from booth import SAMPLES
 from files.recorded import Messages, pose_entries, straight_pass, write_bag
-from files.tables.test_gauge_layouts import ELCOMETER, FISCHER, POSITECTOR, ROBOT
+from files.tables.test_gauge_layouts import LAYOUTS
 from paint_deposition.batch.sweep_file import read_sweep
 from paint_deposition.files.campaign_file import read_campaign
 from paint_deposition.files.gauge_readings import MeasuringPoints, read_points, read_readings
@@ -27,7 +27,7 @@ from paint_deposition.files.recordings.mcap_recovery import recover
 from paint_deposition.files.recordings.pose_topics import summarise
 from paint_deposition.files.tables.reading_columns import Layout
 from paint_deposition.files.zones_file import read_zones
-from robot_arm import urdf
+from robot_arm import URDF
 from workbook import write_workbook
 
 GAUGE_JSON = (
@@ -211,7 +211,7 @@ def targets() -> dict[str, Target]:
     book = _written(lambda path: write_workbook(path, {'Readings': rows}), 'book.xlsx')
     in_mm = _box('3mf', 1000.0)
     ros1 = _written(lambda path: write_bag(path, _entries(True), 'ros1'), 'run.bag')
-    readings = [text.encode() for text in (ELCOMETER, FISCHER, POSITECTOR, ROBOT)]
+    readings = [path.read_bytes() for path in sorted(LAYOUTS.glob('*.txt'))]
     model = (SAMPLES.parents[3] / 'config/model.yaml').read_bytes()
     campaign = (SAMPLES / 'measured_door/campaign.yaml').read_bytes()
     return {
@@ -257,5 +257,5 @@ def targets() -> dict[str, Target]:
         'zones': Target('.yaml', lambda path: read_zones(path, SAMPLES / 'panel.stl'), [ZONES]),
         'sweep': Target('.yaml', read_sweep, [SWEEP], 'grid: cases: sample: vary: &a *a null'),
         'campaign': Target('.yaml', read_campaign, [campaign], '&a *a <<: tf: points:'),
-        'urdf': Target('.urdf', Robot.read, [urdf().encode()], '<mimic xyz="1"'),
+        'urdf': Target('.urdf', Robot.read, [URDF.read_bytes()], '<mimic xyz="1"'),
     }  # fmt: skip

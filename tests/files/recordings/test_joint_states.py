@@ -8,17 +8,10 @@ from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
 from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.joint_states import Robot
-from robot_arm import JOINTS, TIP_M, sweep, tip_poses, urdf
+from robot_arm import JOINTS, TIP_M, URDF, sweep, tip_poses
 from scenes import stamps_ns
 
 TIMES_S = np.linspace(0.0, 3.0, 151)
-
-
-@pytest.fixture(scope='module')
-def arm(tmp_path_factory):
-    path = tmp_path_factory.mktemp('arm') / 'arm.urdf'
-    path.write_text(urdf())
-    return path
 
 
 def joint_bag(path, rows, storage='mcap'):
@@ -39,10 +32,10 @@ def rows_of(joints=None, names=JOINTS):
     ]
 
 
-def test_any_joints_agree_with_the_product_of_exponentials(arm):
+def test_any_joints_agree_with_the_product_of_exponentials():
     joints = np.random.default_rng(8).uniform(-3.5, 3.5, (40, 6))  # beyond their limits, too
     joints[0] = 0.0
-    robot = Robot.read(arm)
+    robot = Robot.read(URDF)
     assert (robot.base, robot.tip, robot.moving_joints) == ('base_link', 'tool0', list(JOINTS))
     positions, quaternions = robot.poses(joints)
     assert np.allclose(positions[0], TIP_M, atol=1e-9)
@@ -52,9 +45,9 @@ def test_any_joints_agree_with_the_product_of_exponentials(arm):
     assert apart.max() < 1e-8
 
 
-def test_joint_states_become_poses(arm, tmp_path):
+def test_joint_states_become_poses(tmp_path):
     bag = joint_bag(tmp_path / 'run.bag', rows_of(), 'ros1')
-    read = read_recording(bag, urdf=str(arm), frame_id='base_link')
+    read = read_recording(bag, urdf=str(URDF), frame_id='base_link')
     assert np.array_equal(read.stamps_ns, stamps_ns(TIMES_S))
     assert np.allclose(read.positions_m, tip_poses(sweep())[0], atol=1e-9)
     assert read.frame_id == 'base_link'
@@ -62,7 +55,7 @@ def test_joint_states_become_poses(arm, tmp_path):
     assert "pose of 'tool0' in 'base_link' by arm.urdf" in note
 
 
-def test_joints_in_any_order_and_in_messages_of_their_own(arm, tmp_path):
+def test_joints_in_any_order_and_in_messages_of_their_own(tmp_path):
     """The pan comes at half the rate from another controller; a gripper's joint is left out."""
     joints, rows = sweep(), []
     for row, (stamp, values) in enumerate(zip(stamps_ns(TIMES_S), joints, strict=True)):
@@ -71,14 +64,14 @@ def test_joints_in_any_order_and_in_messages_of_their_own(arm, tmp_path):
         if row % 2 == 0:
             rows.append(('/joint_states', stamp, ('shoulder_pan',), values[:1]))
     bag = joint_bag(tmp_path / 'run', rows)
-    read = read_recording(bag, '/joint_states', urdf=str(arm), frame_id='base_link')
+    read = read_recording(bag, '/joint_states', urdf=str(URDF), frame_id='base_link')
     # The pan is even in time, so that what is interpolated is exact.
     assert np.allclose(read.positions_m, tip_poses(joints)[0], atol=1e-9)
 
 
-def test_another_link_and_another_base(arm, tmp_path):
+def test_another_link_and_another_base(tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of())
-    given = {'urdf': str(arm), 'tip_link': 'wrist_roll_link', 'base_link': 'shoulder_pan_link'}
+    given = {'urdf': str(URDF), 'tip_link': 'wrist_roll_link', 'base_link': 'shoulder_pan_link'}
     read = read_recording(bag, **given, frame_id='shoulder_pan_link')
     joints = sweep()
     joints[:, 0] = 0.0  # the base turns along
@@ -98,18 +91,18 @@ def test_another_link_and_another_base(arm, tmp_path):
         ({'urdf': 'ARM', 'frame_id': 'door'}, "in frame 'base_link', the mesh in 'door'"),
     ],
 )
-def test_missing_links_and_joints_are_named(given, words, arm, tmp_path):
+def test_missing_links_and_joints_are_named(given, words, tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of()[:3])
-    given = {key: str(arm) if value == 'ARM' else value for key, value in given.items()}
+    given = {key: str(URDF) if value == 'ARM' else value for key, value in given.items()}
     with pytest.raises(RecordingError) as refused:
         read_recording(bag, **given)
     assert words in str(refused.value)
 
 
-def test_joints_that_are_not_recorded_are_named(arm, tmp_path):
+def test_joints_that_are_not_recorded_are_named(tmp_path):
     bag = joint_bag(tmp_path / 'run', rows_of(sweep()[:, :5], JOINTS[:5]))
     with pytest.raises(RecordingError, match=r'has nothing of wrist_roll of arm\.urdf'):
-        read_recording(bag, urdf=str(arm))
+        read_recording(bag, urdf=str(URDF))
 
 
 @pytest.mark.parametrize(
@@ -126,10 +119,10 @@ def test_what_is_no_robot_is_refused(text, words, tmp_path):
         Robot.read(tmp_path / 'robot.urdf', tip='tool0')
 
 
-def test_joint_states_that_are_not_finite_are_left_out_and_counted(arm, tmp_path):
+def test_joint_states_that_are_not_finite_are_left_out_and_counted(tmp_path):
     rows = rows_of()
     rows[20] = (*rows[20][:3], np.full(6, np.nan))
-    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(arm), frame_id='base_link')
+    read = read_recording(joint_bag(tmp_path / 'run', rows), urdf=str(URDF), frame_id='base_link')
     assert len(read) == len(rows) - 1
     assert np.isfinite(read.positions_m).all()
     assert '1 joint states on /joint_states with joints that are not finite' in ' '.join(
