@@ -5,13 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from booth import spot
-from paint_deposition.batch.sweep_file import (
-    SweepFile,
-    read_sweep,
-    variations,
-    varied_model,
-    varied_motion,
-)
+from paint_deposition.batch import sweep_file
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import BatchError
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
@@ -19,7 +13,7 @@ from paint_deposition.motion.path_builder import spray_path
 
 
 def swept(**told) -> list[dict]:
-    return variations(SweepFile.model_validate(told))
+    return sweep_file.variations(sweep_file.SweepFile.model_validate(told))
 
 
 def test_grid_cases_and_draws_are_combined():
@@ -76,45 +70,45 @@ def test_a_sweep_file_is_refused_in_a_line(tmp_path, text, words):
     path = tmp_path / 'sweep.yaml'
     path.write_text(text)
     with pytest.raises(BatchError) as refused:
-        read_sweep(path)
+        sweep_file.read_sweep(path)
     assert words in str(refused.value)
     assert str(path) in str(refused.value)
     assert '\n' not in str(refused.value)
 
 
 def test_a_model_is_varied_and_its_bounds_hold():
-    varied = varied_model(
+    varied = sweep_file.varied_model(
         DepositionModel(), {'planar.K1_cm3_per_s': 2.5, 'air_drift.shift_down_m': 0.02}
     )
     assert varied.planar.K1_cm3_per_s == 2.5
     assert varied.effect('air_drift').shift_down_m == 0.02
-    assert varied_model(varied, {'effects': []}).effects == ()
+    assert sweep_file.varied_model(varied, {'effects': []}).effects == ()
     with pytest.raises(BatchError, match=r'K2 is 1\.5'):
-        varied_model(DepositionModel(), {'planar.K2': 1.5})
+        sweep_file.varied_model(DepositionModel(), {'planar.K2': 1.5})
     with pytest.raises(BatchError, match="the model has no effect 'sag'; it has: none"):
-        varied_model(DepositionModel(), {'effects': ['sag']})
+        sweep_file.varied_model(DepositionModel(), {'effects': ['sag']})
 
 
 def test_a_pattern_of_brushes_is_varied_brush_by_brush():
     model = DepositionModel.of_brushes([Brush(number=k, planar=PlanarPattern()) for k in (1, 4)])
-    file = SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
-    (values,) = variations(file, [model])
-    first, other = varied_model(model, values).patterns
+    file = sweep_file.SweepFile.model_validate({'grid': {'brush_4.K1_cm3_per_s': [2.5]}})
+    (values,) = sweep_file.variations(file, [model])
+    first, other = sweep_file.varied_model(model, values).patterns
     assert (first, other.K1_cm3_per_s) == (PlanarPattern(), 2.5)
     with pytest.raises(BatchError, match=r'vary brush_1\.K2 or brush_4\.K2'):
-        varied_model(model, {'planar.K2': 0.2})
+        sweep_file.varied_model(model, {'planar.K2': 0.2})
     with pytest.raises(BatchError, match="no effect 'brush_4' is in"):
-        variations(file)
+        sweep_file.variations(file)
 
 
 def test_a_motion_runs_faster_further_off_and_with_more_flow():
     motion = spot()
-    assert varied_motion(motion) is motion
-    twice, _ = spray_path(varied_motion(motion, speed_factor=2.0))
+    assert sweep_file.varied_motion(motion) is motion
+    twice, _ = spray_path(sweep_file.varied_motion(motion, speed_factor=2.0))
     assert twice.spraying_time_s == pytest.approx(0.5 * spray_path(motion)[0].spraying_time_s)
-    further = varied_motion(motion, standoff_change_m=0.01)
+    further = sweep_file.varied_motion(motion, standoff_change_m=0.01)
     tool_z = Rotation.from_quat(motion.quaternions_xyzw).as_matrix()[:, :, 2]
     moved = ((motion.positions_m - further.positions_m) * tool_z).sum(axis=1)
     assert moved == pytest.approx(0.01)
-    path, _ = spray_path(varied_motion(motion, flow_factor=1.1))
+    path, _ = spray_path(sweep_file.varied_motion(motion, flow_factor=1.1))
     assert path.flow.max() == pytest.approx(1.1)

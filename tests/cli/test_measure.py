@@ -12,7 +12,6 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, figures_of, paint, ran
 from paint_deposition.errors import ReadingsError
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.motion.part_frame import Rigid, moved
 
@@ -70,7 +69,7 @@ def test_the_filled_table_is_gauge_readings_and_the_empty_one_is_refused(measure
 def test_poses_stand_in_the_frame_of_the_robot(measured, tmp_path):
     pose = (1.0, 0.5, 0.0, 0, 0, 1, 0)
     # The same motion, given in the robot's frame: the part is turned by half a turn there.
-    motion = moved(read_recording(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
+    motion = moved(pd.read_recording(SAMPLES / 'door_horizontal'), Rigid.of(pose), 'base_link')
     figures = figures_of(
         'measure', *DOOR, '--trajectory', write_pose_bag(tmp_path / 'run', motion), '--part-pose',
         *pose, '--points', 12, '--repeats', 0, '--json', '-o', tmp_path / 'out',

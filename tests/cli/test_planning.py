@@ -7,26 +7,24 @@ import pytest
 import trimesh
 from PIL import Image
 
+import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import assert_refused, paint, ran
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.model_file import read_model, write_model
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.rapid.program import read_program
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.planning.recommendation import recommend
 from paint_deposition.planning.requests import IndexRequest
 
 STUDY = SAMPLES / 'panel_study'
-MODEL = DepositionModel(planar=PlanarPattern(K3=0.1))
+MODEL = pd.DepositionModel(planar=PlanarPattern(K3=0.1))
 
 
 @pytest.fixture(scope='module')
 def model_file(tmp_path_factory):
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    write_model(path, MODEL)
+    pd.write_model(path, MODEL)
     return path
 
 
@@ -85,7 +83,7 @@ def test_impossible_recommendations_are_refused(arguments, words, tmp_path):
 def test_calibration_writes_model_figures_and_pictures(calibrated):
     done, folder = calibrated
     assert done.returncode == 0, done.stderr
-    model = read_model(folder / 'model.yaml')
+    model = pd.read_model(folder / 'model.yaml')
     assert model.planar.K1_cm3_per_s == pytest.approx(0.653, rel=0.02)
     content = json.loads((folder / 'calibration.json').read_text())
     assert content['experiments'][0]['residual_sd_um'] < 0.75
@@ -119,7 +117,7 @@ def test_plan_writes_bag_table_program_and_film(model_file, tmp_path):
     }  # fmt: skip
     program = read_program(tmp_path / 'plan' / 'passes.mod')
     assert {'paintl', 'movel'} <= {move.instruction for move in program.moves}
-    assert len(read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
+    assert len(pd.read_recording(tmp_path / 'plan' / 'trajectory')) > 1000
     assert is_picture(tmp_path / 'plan' / 'film.png')
 
 

@@ -8,12 +8,9 @@ import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from cli.command import assert_refused, figures_of, paint
 from files.recorded import Messages, pose_entries, write_bag
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.flow_drift import FlowDrift
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.errors import ModelError
-from paint_deposition.files.campaign_file import read_campaign
-from paint_deposition.files.model_file import write_model
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.inference.fitting.forward import Forward
 from paint_deposition.model.eq1_pattern import Brush, PlanarPattern
@@ -23,7 +20,7 @@ PANEL = SAMPLES / 'panel.stl'
 TIMES_S = np.arange(0.0, 3.0, 0.02)
 UPPER = straight_pass(TIMES_S, (-0.5, -0.25, 0.15), (0.5, -0.25, 0.15), LOOKING_ALONG_Y)
 LOWER = straight_pass(TIMES_S + 1.0, (0.5, -0.25, -0.1), (-0.5, -0.25, -0.1), LOOKING_ALONG_Y)
-THIN = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=0.7))
+THIN = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=0.7))
 
 
 @pytest.fixture(scope='module')
@@ -60,12 +57,12 @@ def bags(tmp_path_factory):
 
 
 def _model(path, model):
-    write_model(path, model)
+    pd.write_model(path, model)
     return path
 
 
 def test_the_film_is_the_sum_of_the_guns(surface):
-    models = [DepositionModel(), THIN]
+    models = [pd.DepositionModel(), THIN]
     alone = [
         pd.simulate(surface, motion, model)
         for motion, model in zip((UPPER, LOWER), models, strict=True)
@@ -124,7 +121,7 @@ def write_readings(path, surface, film_um):
 
 def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path):
     """A law that counts a gun's own passes counts them so in a campaign, too."""
-    model = DepositionModel().with_effect(FlowDrift(drift_per_pass=0.2))
+    model = pd.DepositionModel().with_effect(FlowDrift(drift_per_pass=0.2))
     films = [pd.simulate(surface, motion, model).film_um for motion in (UPPER, LOWER)]
     film = pd.simulate(surface, [UPPER, LOWER], model)
     assert np.array_equal(film.film_um, films[0] + films[1])
@@ -136,7 +133,7 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
     }  # fmt: skip
     path = tmp_path / 'campaign.yaml'
     path.write_text(yaml.safe_dump({'experiments': [entry]}))
-    campaign = read_campaign(path)
+    campaign = pd.read_campaign(path)
     assert campaign.experiments[0].path.spray_pass.max() == 1
     predicted = Forward(campaign).predict_um(model)
     assert predicted == pytest.approx(campaign.readings.thickness_um, rel=1e-5)
@@ -145,17 +142,17 @@ def test_a_campaign_whose_parts_were_painted_by_two_guns(bags, surface, tmp_path
 
 @pytest.mark.slow
 def test_guns_of_different_patterns_share_a_campaign_as_brushes(bags, surface, tmp_path):
-    bell = DepositionModel()
+    bell = pd.DepositionModel()
     film = pd.simulate(surface, [UPPER, LOWER], [bell, THIN]).film_um
     write_readings(tmp_path / 'film.csv', surface, film)
     guns = [{'trajectory': str(bags['upper'])}, {'trajectory': str(bags['lower']), 'brush': 2}]
     entry = {'mesh': str(PANEL), 'measurements': 'film.csv', 'guns': guns, 'brush': 1}
     path = tmp_path / 'campaign.yaml'
     path.write_text(yaml.safe_dump({'experiments': [entry]}))
-    both = DepositionModel.of_brushes(
+    both = pd.DepositionModel.of_brushes(
         Brush(number=number, planar=model.planar) for number, model in ((1, bell), (2, THIN))
     )
-    assert pd.compare(read_campaign(path), both).points.rmse_um < 1e-4
+    assert pd.compare(pd.read_campaign(path), both).points.rmse_um < 1e-4
     # One pattern for both guns is not enough.
     with pytest.raises(ModelError, match='brushes 1, 2 are used and the model has the pattern of'):
-        pd.compare(read_campaign(path), bell)
+        pd.compare(pd.read_campaign(path), bell)

@@ -10,10 +10,7 @@ import paint_deposition as pd
 from booth import SAMPLES
 from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran
 from paint_deposition.cli.results import MARKER
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.gauge_gain import GaugeGain
-from paint_deposition.files.model_file import write_model
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bags import write_pose_bag
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
@@ -57,12 +54,12 @@ def test_the_door_is_painted(painted_door):
 @pytest.mark.slow
 def test_the_figures_say_how_it_was_painted(painted_door):
     _, figures = painted_door
-    recorded = read_recording(DOOR_BAG, None, '/atomizer/state')
+    recorded = pd.read_recording(DOOR_BAG, None, '/atomizer/state')
     assert (figures['poses']['received'], figures['poses']['rejected']) == (len(recorded), 0)
     changes = recorded.trigger_stamps_ns[1:]
     on_s = np.sum(changes[1::2] - changes[0::2]) * 1e-9
     assert figures['spraying_time_s'] == pytest.approx(on_s, rel=1e-9)
-    emitted = DepositionModel().planar.K1_cm3_per_s * on_s
+    emitted = pd.DepositionModel().planar.K1_cm3_per_s * on_s
     assert figures['emitted_volume_cm3'] == pytest.approx(emitted, rel=1e-9)
     share = figures['painted_volume_cm3'] / emitted
     assert figures['capture_fraction'] == pytest.approx(share, rel=1e-9)
@@ -83,8 +80,8 @@ def test_predictions_are_exact_at_the_readings(panel, one_pass, tmp_path):
             for k, (a, b) in enumerate(zip(x, z, strict=True))
         )
     )
-    model = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
-    write_model(tmp_path / 'model.yaml', model)
+    model = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.2, K3=0.4, phi_rad=1.0))
+    pd.write_model(tmp_path / 'model.yaml', model)
     done = ran(
         'simulate', '--mesh', panel, '--trajectory', one_pass, '--model', tmp_path / 'model.yaml',
         '--at', readings, *COARSE, '-o', tmp_path / 'out',
@@ -107,10 +104,10 @@ def test_effects_on_the_gauge_are_predicted_and_not_in_the_film(panel):
     places = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.1]])
     labels, unknown = np.array(['a', 'b']), np.full(2, np.nan)
     readings = pd.Readings(places, np.full(2, 9.0), labels, labels, unknown)
-    gauge = DepositionModel().with_effect(GaugeGain(gain=0.1))
+    gauge = pd.DepositionModel().with_effect(GaugeGain(gain=0.1))
     plain, read = (
         pd.simulate(surface, level_pass(), model, readings=readings)
-        for model in (DepositionModel(), gauge)
+        for model in (pd.DepositionModel(), gauge)
     )
     assert np.allclose(read.predicted_um, 1.1 * plain.predicted_um)
     assert np.array_equal(read.film_um, plain.film_um)

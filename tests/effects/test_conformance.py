@@ -7,18 +7,7 @@ import pytest
 from numba import float32, njit
 from pydantic import ValidationError
 
-from booth import (
-    MODEL,
-    SAMPLES,
-    door,
-    in_batches,
-    painted,
-    panel,
-    panel_with_screen,
-    path_of,
-    serpentine,
-    spot,
-)
+import booth
 from paint_deposition.effects.base import Effect, PathContext
 from paint_deposition.effects.catalogue import EFFECTS, FAMILIES, read_effect_file
 from paint_deposition.effects.learned.curves import CURVES
@@ -26,7 +15,7 @@ from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.kernel.laws import Ray, in_precision
 from reference import reference_film_um
 
-ALL = [*EFFECTS.values(), read_effect_file(SAMPLES / 'my_effect.py')]
+ALL = [*EFFECTS.values(), read_effect_file(booth.SAMPLES / 'my_effect.py')]
 AMPLITUDES = [(effect, name) for effect in ALL for name in effect.amplitudes()]
 TWO_SIDED = [
     (effect, name)
@@ -50,7 +39,7 @@ def case(effect: type[Effect], *more: str):
 
 
 # Two passes over the panel, the gun opening and closing on it.
-PASSES = path_of(serpentine((0.08, -0.08)))
+PASSES = booth.path_of(booth.serpentine((0.08, -0.08)))
 EFFECT = pytest.mark.parametrize('effect', [case(effect) for effect in ALL])
 AMPLITUDE = pytest.mark.parametrize(('effect', 'name'), [case(*one) for one in AMPLITUDES])
 
@@ -95,16 +84,19 @@ def test_values_outside_the_bounds_are_refused(effect: type[Effect]):
 
 @EFFECT
 def test_neutral_changes_nothing(effect: type[Effect]):
-    points, neutral = door().points(), effect()
+    points, neutral = booth.door().points(), effect()
     film = np.linspace(0.0, 30.0, len(points))
-    context = PathContext(MODEL.projection, points.down, points.outward, points.centre_m)
+    context = PathContext(booth.MODEL.projection, points.down, points.outward, points.centre_m)
     assert np.array_equal(neutral.on_film(film, points), film)
     assert np.array_equal(neutral.on_gauge(film, points), film)
     path = neutral.on_path(PASSES, context)
     for column in fields(PASSES):
         before, after = getattr(PASSES, column.name), getattr(path, column.name)
         np.testing.assert_allclose(after, before, rtol=1e-14, atol=1e-14, err_msg=column.name)
-    film_of, base = painted(door(), PASSES, effect()), painted(door(), PASSES)
+    film_of, base = (
+        booth.painted(booth.door(), PASSES, effect()),
+        booth.painted(booth.door(), PASSES),
+    )
     assert neutral.is_neutral
     assert np.array_equal(film_of.gauge_um, base.gauge_um)
     for law in (effect.flux_factor, effect.pattern_scale):
@@ -118,7 +110,7 @@ def test_neutral_changes_nothing(effect: type[Effect]):
 def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect]):
     for end in ('low', 'high'):
         extreme = effect(**{name: at[end] for name, at in effect.parameters().items()})
-        film = painted(door(), PASSES, extreme)
+        film = booth.painted(booth.door(), PASSES, extreme)
         assert np.isfinite(film.gauge_um).all()
         assert film.raw_um.min() >= 0.0
 
@@ -127,11 +119,12 @@ def test_the_film_is_finite_and_flux_is_never_negative(effect: type[Effect]):
 def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str):
     described = effect.parameters()[name]
     neutral, step = described['neutral'], 1e-3 * described['typical']
-    surface = panel_with_screen() if effect.id == 'occlusion' else door()
+    surface = booth.panel_with_screen() if effect.id == 'occlusion' else booth.door()
 
     def slope(before: float, after: float) -> np.ndarray:
         films = [
-            painted(surface, PASSES, effect(**{name: value})).gauge_um for value in (before, after)
+            booth.painted(surface, PASSES, effect(**{name: value})).gauge_um
+            for value in (before, after)
         ]
         return (films[1] - films[0]) / (after - before)
 
@@ -148,9 +141,9 @@ def test_the_film_follows_the_amplitude_smoothly(effect: type[Effect], name: str
 
 @pytest.mark.parametrize('effect', [case(effect) for effect in WITH_LAW])
 def test_the_kernel_computes_the_law(effect: type[Effect]):
-    points = door().points().select(slice(None, None, 7))
-    path = path_of(serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
-    model = MODEL.with_effect(effect.typical())
+    points = booth.door().points().select(slice(None, None, 7))
+    path = booth.path_of(booth.serpentine((0.45,), half_width_m=0.2, opens_at_m=0.1))
+    model = booth.MODEL.with_effect(effect.typical())
     integrator = FilmIntegrator(points, model, 'double', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)
@@ -172,12 +165,12 @@ def test_the_law_stays_in_single_precision(effect: type[Effect]):
 
 @EFFECT
 def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
-    trajectory = serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
-    model = MODEL.with_effect(effect.typical())
-    whole = painted(panel(0.3, 0.05), trajectory, effect.typical())
-    part = panel(0.3, 0.05)
+    trajectory = booth.serpentine((0.05, -0.05), half_width_m=0.3, opens_at_m=0.2)
+    model = booth.MODEL.with_effect(effect.typical())
+    whole = booth.painted(booth.panel(0.3, 0.05), trajectory, effect.typical())
+    part = booth.panel(0.3, 0.05)
     live = FilmIntegrator(part.points(), model, 'double', part.occluder, parallel=False)
-    for piece in in_batches(trajectory, 7, model.needs_whole_strokes):
+    for piece in booth.in_batches(trajectory, 7, model.needs_whole_strokes):
         live.add(piece)
     assert np.array_equal(live.gauge_um, whole.gauge_um)
     assert live.emitted_cm3 == pytest.approx(whole.emitted_cm3, rel=1e-12)
@@ -185,12 +178,12 @@ def test_a_stream_paints_what_the_recording_does(effect: type[Effect]):
 
 @EFFECT
 def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect]):
-    sheet = painted(door(), PASSES, effect.typical()).gauge_um
+    sheet = booth.painted(booth.door(), PASSES, effect.typical()).gauge_um
     some = slice(11, None, 97)
     stencil_m = 0.01 if effect.needs_slope else None
-    at = door().at(door().vertices_m[some], door().normals[some], stencil_m)
-    model = MODEL.with_effect(effect.typical())
-    integrator = FilmIntegrator(at, model, 'double', door().occluder, parallel=False)
+    at = booth.door().at(booth.door().vertices_m[some], booth.door().normals[some], stencil_m)
+    model = booth.MODEL.with_effect(effect.typical())
+    integrator = FilmIntegrator(at, model, 'double', booth.door().occluder, parallel=False)
     integrator.add(PASSES)
     readings = integrator.gauge_um[: len(sheet[some])]
     # A stencil sees more than the triangles around a vertex.
@@ -200,10 +193,10 @@ def test_readings_are_predicted_as_the_surface_they_lie_on(effect: type[Effect])
 
 @pytest.mark.slow
 def test_laws_multiply():
-    points = door().points().select(slice(None, None, 7))
-    path = path_of(spot(z_m=0.45, standoff_m=0.35))
+    points = booth.door().points().select(slice(None, None, 7))
+    path = booth.path_of(booth.spot(z_m=0.45, standoff_m=0.35))
     chosen = [effect.typical() for effect in WITH_LAW]
-    model = MODEL.model_copy(update={'effects': tuple(chosen)})
+    model = booth.MODEL.model_copy(update={'effects': tuple(chosen)})
     integrator = FilmIntegrator(points, model, 'single', parallel=False)
     integrator.add(path)
     expected = reference_film_um(points, path, model)

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from paint_deposition.errors import PaintError
-from paint_deposition.files.meshes import read_mesh
-from paint_deposition.files.zones_file import read_zones
+import paint_deposition as pd
 from paint_deposition.part.surface import turned
 
 BAND = 'target_um: 30, tolerance_um: 5'
@@ -32,7 +30,7 @@ def bracket(tmp_path_factory):
 def zones_of(folder, *zones, mesh='part.stl'):
     path = folder / 'zones.yaml'
     path.write_text('zones:\n' + ''.join(f'  - {{{zone}}}\n' for zone in zones))
-    return read_zones(path, folder / mesh, 1e-3)
+    return pd.read_zones(path, folder / mesh, 1e-3)
 
 
 @pytest.mark.parametrize(
@@ -46,14 +44,14 @@ def zones_of(folder, *zones, mesh='part.stl'):
 )  # fmt: skip
 def test_a_region_is_the_same_however_it_is_told(bracket, place, mesh):
     """The crease belongs to both faces of the fold: each side of it to its own."""
-    for surface in (part := read_mesh(bracket / mesh, 1e-3), turned(part)):
+    for surface in (part := pd.read_mesh(bracket / mesh, 1e-3), turned(part)):
         wanted = np.abs(surface.normals[:, 2]) > 0.5
         found = zones_of(bracket, f'name: floor, {BAND}, {place}', mesh=mesh).on(surface)
         np.testing.assert_array_equal(found.number == 0, wanted)
 
 
 def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
-    surface = read_mesh(bracket / 'part.stl', 1e-3)
+    surface = pd.read_mesh(bracket / 'part.stl', 1e-3)
     found = zones_of(
         bracket, f'name: left, {BAND}, box: [[-1, -1, 0], [0.2, 1, 1]]',
         'name: wall, target_um: 50, tolerance_um: 9, faces: [0-1]',
@@ -87,12 +85,12 @@ def test_the_first_zone_that_holds_a_point_has_it_and_others_none(bracket):
     ],
 )  # fmt: skip
 def test_what_is_wrong_is_named_with_the_remedy(bracket, zones, message):
-    with pytest.raises(PaintError, match=message):
-        zones_of(bracket, *zones).on(read_mesh(bracket / 'part.stl', 1e-3))
+    with pytest.raises(pd.PaintError, match=message):
+        zones_of(bracket, *zones).on(pd.read_mesh(bracket / 'part.stl', 1e-3))
 
 
 @pytest.mark.parametrize('text', ['', 'zones: []', 'zones: {a: 1}', 'zone: [{name: a}]'])
 def test_a_file_without_zones_is_refused(tmp_path, text):
     (tmp_path / 'zones.yaml').write_text(text)
-    with pytest.raises(PaintError, match='zones'):
-        read_zones(tmp_path / 'zones.yaml', tmp_path / 'part.stl')
+    with pytest.raises(pd.PaintError, match='zones'):
+        pd.read_zones(tmp_path / 'zones.yaml', tmp_path / 'part.stl')

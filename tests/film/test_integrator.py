@@ -4,15 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+import paint_deposition as pd
 import scenes
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.motion.trajectory import Trajectory
 from paint_deposition.part.points import SurfacePoints
 from scenes import lying_plane, stamps_ns, straight_pass, weaving
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 
 
 def painted(points, motion, model=MODEL, precision='double'):
@@ -42,7 +41,7 @@ def sampled_unevenly():
     positions, quaternions = log.positions_m.copy(), log.quaternions_xyzw.copy()
     positions[again], quaternions[again] = positions[again - 1], quaternions[again - 1]
     assert len(again) > 5
-    return Trajectory(log.stamps_ns, positions, quaternions)
+    return pd.Trajectory(log.stamps_ns, positions, quaternions)
 
 
 @pytest.fixture(scope='module')
@@ -76,7 +75,7 @@ def test_the_film_does_not_depend_on_the_sampling(trajectory, limit, precision, 
 @pytest.mark.parametrize('standoff_m', [0.25, 0.4])
 def test_sub_steps_are_fine_enough(planar, standoff_m):
     """One segment of a whole pass with the gun opening and closing on it, cut by itself."""
-    model = DepositionModel(planar=planar)
+    model = pd.DepositionModel(planar=planar)
     trigger = {
         'trigger_stamps_ns': stamps_ns([0.0, 0.6101, 1.4]),
         'trigger_flow': np.array([0.0, 1.0, 0.0]),
@@ -96,7 +95,7 @@ def test_the_film_is_in_proportion_to_flow_k1_and_time():
     plain = painted(points, path).film_um
     less = painted(points, path.with_(flow=0.37 * path.flow)).film_um
     assert largest_error(less, 0.37 * plain) < 1e-12
-    more = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=3 * MODEL.planar.K1_cm3_per_s))
+    more = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=3 * MODEL.planar.K1_cm3_per_s))
     assert largest_error(painted(points, path, more).film_um, 3.0 * plain) < 1e-12
     slow = painted(points, straight_pass(np.linspace(0.0, 4.0, 401))).film_um
     fast = painted(points, straight_pass(np.linspace(0.0, 2.0, 401))).film_um
@@ -108,7 +107,7 @@ def test_moving_part_and_gun_together_changes_nothing():
     log = weaving(np.arange(0.0, 2.0, 0.02))
     turn, shift = Rotation.from_euler('xyz', [0.5, -1.2, 2.8]), np.array([4.0, -3.0, 1.5])
     moved = SurfacePoints(turn.apply(points.positions_m) + shift, turn.apply(points.normals))
-    moved_log = Trajectory(
+    moved_log = pd.Trajectory(
         log.stamps_ns,
         turn.apply(log.positions_m) + shift,
         (turn * Rotation.from_quat(log.quaternions_xyzw)).as_quat(),

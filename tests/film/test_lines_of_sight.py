@@ -5,17 +5,16 @@ import pytest
 from trimesh.creation import box
 from trimesh.util import concatenate
 
+import paint_deposition as pd
 from booth import LOOKING_ALONG_Y
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.layout import SIGHT_STEP_M, emission_points_m
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.path_builder import spray_path
-from paint_deposition.part.surface import Surface
 from scenes import straight_pass
 
-OPEN = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03))
+OPEN = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.3, r_m=0.05, sigma1_m=0.03))
 SHADED = OPEN.with_effect(Occlusion(strength=0.8))
 
 
@@ -29,7 +28,7 @@ def tray():
         box((0.03, 0.03, 0.5), transform=moved(0.05, -0.1, 0.0)),
     ]
     whole = concatenate(walls)
-    return Surface.from_triangles(whole.vertices, np.asarray(whole.faces), 0.03)
+    return pd.Surface.from_triangles(whole.vertices, np.asarray(whole.faces), 0.03)
 
 
 @pytest.fixture(scope='module')

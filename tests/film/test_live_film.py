@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from brushes import two_brushes
 from paint_deposition.effects.catalogue import effect_class
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import ModelError
 from paint_deposition.film.live_film import LiveFilm
 from paint_deposition.motion.pose_stream import PoseBatch, TriggerChange
-from paint_deposition.motion.trajectory import Trajectory
 from scenes import (
     START_NS,
     changes_of,
@@ -24,7 +23,7 @@ from scenes import (
     weaving,
 )
 
-MODEL = DepositionModel()
+MODEL = pd.DepositionModel()
 # Its film at a place depends on what lies ahead in the stroke.
 LAGGING = MODEL.with_effect(effect_class('corner_slowdown').typical())
 TIMES_S = np.arange(0.0, 4.0, 0.004)
@@ -103,7 +102,7 @@ def test_after_a_reset_the_gun_stays_as_it_was():
     film.replay(coming[half:])
     # The gun is off from 1.75 s to 2.2 s, so the reset between cuts nothing.
     rest = PoseBatch.joined([event for event in coming[half:] if isinstance(event, PoseBatch)])
-    second = Trajectory(
+    second = pd.Trajectory(
         rest.stamps_ns,
         rest.positions_m,
         rest.quaternions_xyzw,
@@ -262,7 +261,7 @@ def test_a_clock_that_is_set_back_within_a_part_gives_the_offline_film(batch, ba
     states = [(0, 0.0), (100, 1.0), *([(half, 0.5)] if switched else []), (half + 150, 0.0),
               (half + 220, 1.0)]  # fmt: skip
     rows = np.array([row for row, _ in states])
-    recorded = Trajectory(
+    recorded = pd.Trajectory(
         stamps, motion.positions_m, motion.quaternions_xyzw, trigger_stamps_ns=stamps[rows],
         trigger_flow=np.array([flow for _, flow in states]), trigger_rows=rows,
     )  # fmt: skip

@@ -9,13 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
-from paint_deposition.motion.path import (
-    LEVER_M,
-    MOST_SUB_STEPS,
-    slerp,
-    split_segments,
-    thin_poses,
-)
+from paint_deposition.motion import path
 
 GAP_NS = 250_000_000
 STEP_M = 0.008
@@ -24,7 +18,7 @@ STEP_M = 0.008
 def split(stamps_ns, positions, quaternions, cuts_ns=(), max_step_m=STEP_M):
     stamps_ns, cuts_ns = np.asarray(stamps_ns, np.int64), np.asarray(cuts_ns, np.int64)
     positions, quaternions = np.asarray(positions, float), np.asarray(quaternions, float)
-    return split_segments(stamps_ns, positions, quaternions, cuts_ns, GAP_NS, max_step_m)
+    return path.split_segments(stamps_ns, positions, quaternions, cuts_ns, GAP_NS, max_step_m)
 
 
 def random_motion(seed, count=12):
@@ -45,7 +39,7 @@ def test_slerp_turns_evenly_the_short_way(angle_rad, t):
     end = Rotation.from_rotvec(angle_rad * axis) * start
     expected = Rotation.from_rotvec(t * angle_rad * axis) * start
     for sign in (1.0, -1.0):
-        got = Rotation.from_quat(slerp(start.as_quat(), sign * end.as_quat(), t))
+        got = Rotation.from_quat(path.slerp(start.as_quat(), sign * end.as_quat(), t))
         if angle_rad != np.pi:  # both ways round are as short
             assert (got.inv() * expected).magnitude() < 1e-9
         assert (got.inv() * start).magnitude() == pytest.approx(t * angle_rad, abs=1e-7)
@@ -87,7 +81,7 @@ def test_no_sub_step_goes_further_than_allowed(seed, max_step_m):
     assert travel.max() <= max_step_m * (1 + 1e-9)
     turned = Rotation.from_matrix(rotation[:-1]).inv() * Rotation.from_matrix(rotation[1:])
     # Middles of neighbours may be one sub-step apart in all.
-    assert (turned.magnitude() * LEVER_M).max() <= max_step_m * (1 + 1e-6)
+    assert (turned.magnitude() * path.LEVER_M).max() <= max_step_m * (1 + 1e-6)
 
 
 def test_a_gap_gives_nothing_and_is_told():
@@ -103,7 +97,7 @@ def test_a_gap_gives_nothing_and_is_told():
 def test_a_pose_beyond_all_measure_costs_no_memory(away_m):
     positions = np.array([[0, 0, 0], [away_m, 0, 0], [0.001, 0, 0]])
     stamp, dwell, *_ = split([0, 10, 20], positions, np.tile([0, 0, 0, 1.0], (3, 1)))
-    assert len(stamp) == 2 * MOST_SUB_STEPS
+    assert len(stamp) == 2 * path.MOST_SUB_STEPS
     assert dwell.sum() == pytest.approx(20e-9)
 
 
@@ -113,7 +107,7 @@ def followed(times_s, x_m, y_m=0.0):
     x_m, y_m = np.broadcast_arrays(x_m, y_m, times_s)[:2]
     positions = np.column_stack([x_m, y_m, 0.0 * x_m])
     quaternions = np.tile([1.0, 0.0, 0.0, 0.0], (len(stamps), 1))
-    return thin_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
+    return path.thin_poses(stamps, positions, quaternions, GAP_NS, STEP_M)
 
 
 @pytest.mark.parametrize('rate_hz', [20, 125, 1000])

@@ -3,13 +3,7 @@
 import numpy as np
 
 from booth import panel
-from paint_deposition.part.gauge_places import (
-    can_stand,
-    from_edges_m,
-    grid_places,
-    on_face_m,
-    spread_places,
-)
+from paint_deposition.part import gauge_places
 from paint_deposition.part.surface import Surface
 from surfaces import triangulated
 
@@ -25,7 +19,7 @@ def folded(slope: float) -> Surface:
 
 def test_a_foot_keeps_off_edges():
     surface = panel()
-    standing = can_stand(surface, 0.03)
+    standing = gauge_places.can_stand(surface, 0.03)
     inside = np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.5 - 0.03
     np.testing.assert_array_equal(standing, inside)
 
@@ -33,16 +27,16 @@ def test_a_foot_keeps_off_edges():
 def test_a_foot_does_not_stand_on_a_bend():
     surface = folded(1.2)
     x = surface.vertices_m[:, 0]
-    standing = can_stand(surface)
+    standing = gauge_places.can_stand(surface)
     assert not standing[np.abs(x) < 0.005].any()
     assert standing[(np.abs(x) > 0.1) & (np.abs(x) < 0.17)].any()
-    assert can_stand(folded(0.1))[np.abs(x) < 0.005].any()
+    assert gauge_places.can_stand(folded(0.1))[np.abs(x) < 0.005].any()
 
 
 def test_spread_places_are_about_as_many_as_wanted_and_apart():
     surface = panel()
     usable = surface.vertices_m[:, 0] > 0.0
-    rows = spread_places(surface, usable, 100, seed=1)
+    rows = gauge_places.spread_places(surface, usable, 100, seed=1)
     assert usable[rows].all()
     assert 80 < len(rows) < 120
     positions = surface.vertices_m[rows]
@@ -52,9 +46,9 @@ def test_spread_places_are_about_as_many_as_wanted_and_apart():
 
 def test_a_grid_has_the_points_asked_for():
     surface = panel()
-    rows = grid_places(surface, can_stand(surface), 25)
+    rows = gauge_places.grid_places(surface, gauge_places.can_stand(surface), 25)
     assert len(set(rows)) == 25
-    face = from_edges_m(surface, surface.vertices_m[rows])
+    face = gauge_places.from_edges_m(surface, surface.vertices_m[rows])
     # Five rows and five columns, to the spacing of the vertices.
     for axis in range(2):
         assert np.count_nonzero(np.diff(np.sort(face[:, axis])) > 0.1) == 4
@@ -63,6 +57,6 @@ def test_a_grid_has_the_points_asked_for():
 def test_places_on_a_face_are_found_again():
     surface = folded(0.3)
     places = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
-    points, hit = on_face_m(surface, places)
+    points, hit = gauge_places.on_face_m(surface, places)
     assert hit.all()
-    np.testing.assert_allclose(from_edges_m(surface, points), places, atol=1e-9)
+    np.testing.assert_allclose(gauge_places.from_edges_m(surface, points), places, atol=1e-9)

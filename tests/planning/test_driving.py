@@ -14,8 +14,7 @@ import paint_deposition as pd
 import robot_arm
 from cli.command import paint
 from paint_deposition.api.planning import place, read_robot
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.errors import PaintError, PlanError
+from paint_deposition.errors import PlanError
 from paint_deposition.model.eq1_pattern import PlanarPattern
 from paint_deposition.motion.part_frame import Rigid, at_part, moved
 from paint_deposition.planning.driving import PartPlaces
@@ -27,7 +26,7 @@ from scenes import painted
 
 pytestmark = pytest.mark.slow
 
-ROUND = DepositionModel(
+ROUND = pd.DepositionModel(
     planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.0, r_m=0.05, sigma1_m=0.03, sigma2_m=0.04)
 )
 # The part lies on its back: the gun looks along its +y, which is down.
@@ -111,7 +110,7 @@ def test_a_slow_joint_slows_its_passes_each_as_a_whole(planned, cell, on_robot):
 
 
 def test_the_tool_rolls_where_its_pattern_is_round_only(planned, cell, on_robot):
-    lopsided = DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
+    lopsided = pd.DepositionModel(planar=PlanarPattern(K1_cm3_per_s=1.0, K3=0.3))
     kept = driven(plan(planned.surface, lopsided, PlanRequest(speed_m_per_s=0.2), 'part'), cell)
     for one, rolls in ((on_robot, True), (kept, False)):
         plain = one.trajectory.quaternions_xyzw[0]
@@ -146,7 +145,7 @@ def test_a_robot_without_speeds_is_refused(tmp_path):
     unknown.write_text(robot_arm.URDF.read_text().replace(' velocity="1"', '', 1))
     with pytest.raises(PlanError, match='no greatest speed of shoulder_pan'):
         read_robot(unknown, PART_POSE)
-    with pytest.raises(PaintError, match='give seven numbers'):
+    with pytest.raises(pd.PaintError, match='give seven numbers'):
         read_robot(robot_arm.URDF, [1.0, 2.0])
 
 

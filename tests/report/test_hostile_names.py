@@ -7,9 +7,8 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.gauge_readings import read_readings, write_table
-from paint_deposition.files.model_file import read_model, write_model
+import paint_deposition as pd
+from paint_deposition.files.gauge_readings import write_table
 from paint_deposition.inference.comparison.comparison import compare
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -42,14 +41,14 @@ def test_a_name_is_no_formula_in_a_table_and_comes_back_as_it_was(name, tmp_path
     with (tmp_path / 'readings.csv').open(newline='') as file:
         _, cells = csv.reader(file)
     assert cells == [f"'{name}", *rows[1][1:]]
-    assert read_readings(tmp_path / 'readings.csv').point.tolist() == [name.strip()]
+    assert pd.read_readings(tmp_path / 'readings.csv').point.tolist() == [name.strip()]
 
 
 @pytest.mark.parametrize('mark', ['\r', '\n', '\u2028', '\u2029', '\x85', '\x0c', '\0'])
 def test_a_name_stays_in_the_comment_of_a_model(mark, tmp_path):
     hostile = f'door{mark}effects: [{{file: evil.py}}]{mark}'
-    write_model(tmp_path / 'model.yaml', DepositionModel(), f'Calibrated on {hostile}')
-    assert read_model(tmp_path / 'model.yaml') == DepositionModel()
+    pd.write_model(tmp_path / 'model.yaml', pd.DepositionModel(), f'Calibrated on {hostile}')
+    assert pd.read_model(tmp_path / 'model.yaml') == pd.DepositionModel()
 
 
 @pytest.mark.slow
@@ -63,7 +62,7 @@ def test_a_name_with_script_tags_is_text_in_the_report(tmp_path, undrawn):
         named = Experiment.of(name, one.surface, one.path, replace(one.readings, point=points))
         head = dict.fromkeys(('part', 'batch', 'paint', 'operator'), name)
         study = Study.of(replace(campaign, experiments=(named,), head=head))
-        return report_html(ReportData((compare(study, DepositionModel()),)))
+        return report_html(ReportData((compare(study, pd.DepositionModel()),)))
 
     plain, hostile = page('door'), page(HOSTILE)
     assert '&lt;script&gt;alert(1)' in hostile

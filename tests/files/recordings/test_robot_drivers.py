@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.pose_topics import summarise
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
-from paint_deposition.motion.trajectory import Trajectory
 from robot_arm import sweep, tip_poses
 from scenes import stamps_ns
 
@@ -145,7 +144,7 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
     streams, given, words = DRIVERS[driver]
     log = streams(tmp_path / 'log.csv') if callable(streams) else bag(tmp_path / 'log', *streams)
     options = {k: str(ROBOTS / f'{v}.urdf') if k == 'urdf' else v for k, v in given.items()}
-    read = read_recording(log, **options)
+    read = pd.read_recording(log, **options)
     assert len(read) == len(TIMES_S) - ('rail' in driver and len(TIMES_S) % 2 == 0)
     moved = POSITIONS + [0.0, 1.0, 0.0] * RAIL_M[:, None] if 'rail' in driver else POSITIONS
     assert np.allclose(read.positions_m, moved, atol=1e-7)
@@ -156,7 +155,7 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
     if words:
         options.popitem()
         with pytest.raises(RecordingError, match=words.replace('[', r'\[')):
-            read_recording(log, **options)
+            pd.read_recording(log, **options)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +174,7 @@ def test_each_driver_gives_the_motion_of_the_arm(driver, tmp_path):
 )
 def test_what_was_taken_in_silence_is_told(stream, words, tmp_path):
     given = {} if stream is MILLIMETRES else {'urdf': str(ROBOTS / 'arm.urdf')}
-    read = read_recording(bag(tmp_path / 'run', stream), **given)
+    read = pd.read_recording(bag(tmp_path / 'run', stream), **given)
     (told,) = (line for line in read.warnings if line.startswith(('/rws: ', '/arm_')))
     assert re.match(words, told)
 
@@ -184,7 +183,7 @@ def test_repeated_poses_leave_the_speed_of_the_gun_and_the_same_path_live():
     """Two and three times in turns, as of a loop that asks more often than the robot answers."""
     kept = np.cumsum(np.arange(len(TIMES_S)) % 5 % 2 == 0) - 1
     rows = np.searchsorted(kept, kept)
-    path, counts = spray_path(Trajectory(STAMPS, POSITIONS[rows], QUATERNIONS[rows]))
+    path, counts = spray_path(pd.Trajectory(STAMPS, POSITIONS[rows], QUATERNIONS[rows]))
     assert counts.repeated_samples > 0.3 * len(TIMES_S)
     late = path.time_s > 0.5
     speed = np.linalg.norm(path.velocity_m_per_s, axis=1)[late]
@@ -221,5 +220,5 @@ def test_inspect_says_of_each_source_whether_it_will_do_and_how(tmp_path):
         if source.quality:
             words = shlex.split(source.options.replace('ROBOT', str(ROBOTS / 'arm.urdf')))
             options = {k[2:].replace('-', '_'): v for k, v in zip(*[iter(words)] * 2, strict=True)}
-            ends = read_recording(run, **options).positions_m[[0, -1]]
+            ends = pd.read_recording(run, **options).positions_m[[0, -1]]
             assert np.allclose(ends, POSITIONS[[0, -1]], atol=2e-3)

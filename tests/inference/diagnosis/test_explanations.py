@@ -10,18 +10,7 @@ from inference.diagnosis.linear import linear_fit
 from inference.diagnosis.readings_on_door import on_door, on_panel, plate_with_a_back, study_of
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.catalogue import EFFECTS
-from paint_deposition.inference.diagnosis.explanations import (
-    LAW_ERROR,
-    OTHER_ERROR,
-    OTHER_LAW,
-    UNKNOWN,
-    law_errors,
-    neutral_shapes,
-    nonparametric_laws_of,
-    of_effects,
-    of_footprint,
-    ways_off,
-)
+from paint_deposition.inference.diagnosis import explanations
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.study import Study
 
@@ -34,7 +23,7 @@ def study() -> Study:
 
 
 def errors(
-    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=law_errors
+    study: Study, *effects: Effect, kept: tuple[str, ...] | None = None, of=explanations.law_errors
 ) -> np.ndarray:
     """(P, n) of a model with these effects, of which all or some are kept."""
     model = MODEL.model_copy(update={'effects': effects})
@@ -51,7 +40,7 @@ def change_um(study: Study, effect: Effect) -> np.ndarray:
 
 def another_form(*laws) -> np.ndarray:
     """(P, n) the last of the ways in which laws may be off."""
-    return ways_off(*laws)[-1][0]
+    return explanations.ways_off(*laws)[-1][0]
 
 
 def size(columns: np.ndarray) -> np.ndarray:
@@ -72,15 +61,15 @@ def test_where_the_law_is_no_curve_each_reading_has_its_share_of_the_effect(stud
     """Over the conditions that the effect names, over all others, and of a law of another form."""
     effect = EFFECTS[name](**values)
     share = np.abs(change_um(study, effect)) / study.sigma_um
-    expected = np.hypot(LAW_ERROR, OTHER_ERROR) * share
+    expected = np.hypot(explanations.LAW_ERROR, explanations.OTHER_ERROR) * share
     assert size(errors(study, effect)) == pytest.approx(expected, rel=0.03)
     other_form = size(errors(study, effect, of=another_form))
-    assert other_form == pytest.approx(OTHER_LAW * share, rel=0.03)
+    assert other_form == pytest.approx(explanations.OTHER_LAW * share, rel=0.03)
 
 
 @pytest.mark.parametrize('effect', [e for e in EFFECTS.values() if e.exact], ids=lambda e: e.id)
 def test_geometry_and_gauge_have_no_law_that_could_be_off(study, effect):
-    for of in (law_errors, another_form):
+    for of in (explanations.law_errors, another_form):
         assert errors(study, effect.typical(), of=of).shape == (len(study), 0)
     assert errors(study, effect.typical(), EDGE).shape == errors(study, EDGE).shape
 
@@ -89,11 +78,11 @@ def test_a_law_that_may_have_any_form_is_off_by_a_share_of_its_largest_effect(st
     """Where it does least as much as where it does most: the law itself may be elsewhere."""
     change = change_um(study, EDGE)
     relative = change / study.forward.predict_um(MODEL.with_effect(EDGE))
-    over_others = OTHER_ERROR * change / study.sigma_um
+    over_others = explanations.OTHER_ERROR * change / study.sigma_um
     own = np.sqrt(size(errors(study, EDGE)) ** 2 - (0.97 * over_others) ** 2)
     found = own * study.sigma_um / study.forward.predict_um(MODEL)
-    assert found.max() < 1.2 * LAW_ERROR * np.abs(relative).max()
-    assert found.min() > 0.5 * LAW_ERROR * np.quantile(np.abs(relative), 0.95)
+    assert found.max() < 1.2 * explanations.LAW_ERROR * np.abs(relative).max()
+    assert found.min() > 0.5 * explanations.LAW_ERROR * np.quantile(np.abs(relative), 0.95)
 
 
 def test_errors_of_several_effects_are_independent(study):
@@ -124,10 +113,13 @@ def test_where_an_effect_was_switched_off_or_no_paint_lands_its_law_has_no_error
 def test_laws_of_any_form_leave_the_film_as_a_whole_as_it_is(study):
     """How much paint there is in all is the pattern's."""
     fit = study.fit(FreeParameters.of(MODEL))
-    for found in (nonparametric_laws_of(study, MODEL), of_footprint(study, fit)):
+    for found in (
+        explanations.nonparametric_laws_of(study, MODEL),
+        explanations.of_footprint(study, fit),
+    ):
         assert sum(explanation.share for explanation in found) == pytest.approx(1.0)
         for explanation in found:
-            assert explanation.cause == UNKNOWN
+            assert explanation.cause == explanations.UNKNOWN
             assert explanation.learns not in ('', 'film_um')
             film_um = explanation.columns * study.sigma_um[:, np.newaxis]
             assert np.abs(film_um.sum(axis=0)).max() < 1e-9 * np.abs(film_um).sum()
@@ -142,8 +134,10 @@ def test_what_the_model_has_is_not_looked_for():
     study = study_of(on_panel())
     fit = replace(linear_fit(np.random.default_rng(0), len(study)), model=MODEL.with_effect(EDGE))
     others = ('corner_slowdown', 'fog_gradient')
-    candidates = {name: neutral_shapes(EFFECTS[name]) for name in ('edge_build', *others)}
-    found = list(of_effects(study, fit, candidates))
+    candidates = {
+        name: explanations.neutral_shapes(EFFECTS[name]) for name in ('edge_build', *others)
+    }
+    found = list(explanations.of_effects(study, fit, candidates))
     assert {explanation.cause for explanation in found} == set(others)
     for cause in others:
         own = [explanation for explanation in found if explanation.cause == cause]

@@ -8,11 +8,7 @@ from scipy.integrate import dblquad
 from scipy.stats import f, kstest, multivariate_normal, multivariate_t, norm
 
 from inference.diagnosis.linear import KNOWN, PARAMETERS, linear_fit, null_of
-from paint_deposition.inference.diagnosis.gaussian import (
-    NullModel,
-    OrthogonalDirections,
-    simulated,
-)
+from paint_deposition.inference.diagnosis import gaussian
 from paint_deposition.inference.diagnosis.model_space import SIZES
 
 READINGS = 30
@@ -53,8 +49,10 @@ def test_the_null_model_has_the_covariance_of_pattern_nuisance_and_discrepancy(
     assert plain.lower @ plain.lower.T == pytest.approx(covariance)
     rows = np.arange(READINGS) % 3 > 0
     for null in (
-        NullModel.around(fit, columns, discrepancy=discrepancy),
-        NullModel.around(fit, columns, discrepancy=covariance).with_discrepancy(discrepancy),
+        gaussian.NullModel.around(fit, columns, discrepancy=discrepancy),
+        gaussian.NullModel.around(fit, columns, discrepancy=covariance).with_discrepancy(
+            discrepancy
+        ),
         plain.beside(np.sqrt(2.0) * columns),
     ):
         assert null.lower @ null.lower.T == pytest.approx(covariance + discrepancy)
@@ -79,15 +77,15 @@ def test_a_signed_amplitude_beside_free_ones_is_integrated_over_its_side(side):
         return np.exp(0.5 * (data @ data - left @ left)) * prior
 
     integral, _ = dblquad(likelihood_ratio, -7.0, 7.0, *sorted((0.0, 7.0 * side)))
-    directions = OrthogonalDirections.of(columns, np.array([0.0, side]))
+    directions = gaussian.OrthogonalDirections.of(columns, np.array([0.0, side]))
     found = directions.log_bayes_factors(data[:, np.newaxis], np.ones(1), np.inf)[0, 0]
     assert found == pytest.approx(np.log(integral), abs=1e-5)
 
 
 def test_simulated_deviations_are_as_wide_as_the_noise_is_uncertain():
-    squares = (simulated(1, 8.0, 4000, seed=3) ** 2).ravel()
+    squares = (gaussian.simulated(1, 8.0, 4000, seed=3) ** 2).ravel()
     assert kstest(squares, f(1, 8).cdf).pvalue > 0.01
-    assert np.std(simulated(50, np.inf, 400, seed=3)) == pytest.approx(1.0, abs=0.02)
+    assert np.std(gaussian.simulated(50, np.inf, 400, seed=3)) == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_parameter_that_a_bound_has_stopped_is_no_direction(fit):
@@ -111,7 +109,7 @@ def test_factor_is_the_ratio_of_densities_whatever_does_not_show(count, freedom)
     seen = random.normal(size=(12, count))
     columns = np.hstack([seen, seen @ random.normal(size=(count, 30))])
     data = random.normal(size=(12, 5))
-    found = OrthogonalDirections.of(columns, np.zeros(columns.shape[1]))
+    found = gaussian.OrthogonalDirections.of(columns, np.zeros(columns.shape[1]))
     assert found.columns.shape[1] == min(count, 12)
     factor = found.log_bayes_factors(data, np.array([0.7]), freedom)[0]
     covariance = np.eye(12) + 0.49 * columns @ columns.T
@@ -124,9 +122,9 @@ def test_factor_is_the_ratio_of_densities_whatever_does_not_show(count, freedom)
 
 @pytest.mark.parametrize('side', [0.0, 1.0])
 def test_shifted_deviations_are_weighed_as_if_they_were_there(columns, side):
-    draws = simulated(READINGS, 8.0, 4, seed=6)
+    draws = gaussian.simulated(READINGS, 8.0, 4, seed=6)
     shifts = np.random.default_rng(8).normal(size=(READINGS, 3))
     moved = (draws[:, np.newaxis] + shifts[:, :, np.newaxis]).reshape(READINGS, -1)
-    principal = OrthogonalDirections.of(columns, np.array([side, 0.0, 0.0]))
+    principal = gaussian.OrthogonalDirections.of(columns, np.array([side, 0.0, 0.0]))
     expected = principal.log_bayes_factors(moved, SIZES, 8.0)
     np.testing.assert_allclose(principal.log_bayes_factors(draws, SIZES, 8.0, shifts), expected)

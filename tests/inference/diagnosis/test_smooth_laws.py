@@ -11,13 +11,7 @@ from inference.diagnosis.linear import PARAMETERS, fit_linear
 from inference.diagnosis.readings_on_door import on_door, on_panel, study_of
 from paint_deposition.effects.catalogue import LEARNED
 from paint_deposition.effects.learned.law import LearnedLaw, hat_weights
-from paint_deposition.inference.diagnosis.smooth_laws import (
-    Basis,
-    RandomLaw,
-    bases_over,
-    footprint_basis,
-    map_bases,
-)
+from paint_deposition.inference.diagnosis import smooth_laws
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.readings.campaign import Experiment
@@ -54,7 +48,7 @@ def film_um(experiment: Experiment, model: pd.DepositionModel, law: LearnedLaw |
 @OF_ANY_KIND
 def test_a_random_law_changes_the_readings_as_the_law_in_the_model_does(law, kind, study):
     """No linearisation is left: film is linear in the values of one law at its knots."""
-    (basis,) = bases_over(study, MODEL, law, kind)
+    (basis,) = smooth_laws.bases_over(study, MODEL, law, kind)
     random = basis.random(0.03, 1.0)
     amplitudes = np.random.default_rng(2).normal(size=random.at_knots.shape[1])
     change_um = random.change_um @ amplitudes
@@ -68,7 +62,7 @@ def test_around_another_model_a_law_keeps_its_values_and_changes_other_film(stud
     twice = MODEL.planar.model_copy(update={'K1_cm3_per_s': 2.0 * MODEL.planar.K1_cm3_per_s})
     other = MODEL.model_copy(update={'planar': twice})
     for covariate in ('time_s', 'place', 'footprint'):
-        (basis,) = bases_over(study, MODEL, LEARNED[covariate], 'factor')
+        (basis,) = smooth_laws.bases_over(study, MODEL, LEARNED[covariate], 'factor')
         random = basis.random(0.05, 1.0)
         moved = random.around(study, other)
         assert np.array_equal(moved.at_knots, random.at_knots)
@@ -87,7 +81,7 @@ def test_around_another_model_a_law_keeps_its_values_and_changes_other_film(stud
 def test_values_have_the_size_and_the_correlation_that_were_asked_for(edges, lengths, correlation):
     step, knots = 0.5, np.arange(9)
     at = step * knots[:, np.newaxis]
-    basis = Basis(LEARNED['height_fraction'], {}, np.eye(9), at, step, edges=edges)
+    basis = smooth_laws.Basis(LEARNED['height_fraction'], {}, np.eye(9), at, step, edges=edges)
     away = step * np.abs(np.subtract.outer(knots, knots))
     for length in lengths:
         random = basis.random(0.2, length)
@@ -97,7 +91,7 @@ def test_values_have_the_size_and_the_correlation_that_were_asked_for(edges, len
 
 
 def test_harmonics_of_a_footprint_are_independent(study):
-    random = footprint_basis(study, MODEL).random(1.0, 2.0)
+    random = smooth_laws.footprint_basis(study, MODEL).random(1.0, 2.0)
     covariance = random.at_knots @ random.at_knots.T
     wave = np.arange(len(covariance)) % 5
     assert np.abs(covariance[wave[:, np.newaxis] != wave]).max() < 1e-9
@@ -107,7 +101,7 @@ def test_harmonics_of_a_footprint_are_independent(study):
 def test_each_part_has_a_map_of_its_own_and_parts_of_one_shape_share_it():
     study = study_of(on_door(count=12), on_panel('first'), on_panel('second'))
     owner = study.campaign.experiment_of
-    door, panel, both = map_bases(study, MODEL)
+    door, panel, both = smooth_laws.map_bases(study, MODEL)
     assert door.film_um[owner == 0].any()
     assert not door.film_um[owner > 0].any()
     assert not panel.film_um[owner == 0].any()
@@ -128,15 +122,15 @@ KNOTS, LENGTH, SIZE = 12, 3.0, 0.1
 FILM_UM, NOISE_UM = 30.0, 0.6
 
 
-def at_places(places: np.ndarray) -> RandomLaw:
+def at_places(places: np.ndarray) -> smooth_laws.RandomLaw:
     """Factors over a covariate, for readings (P,) of which each has one value, in knots."""
     settings = {'kind': 'factor', 'low': 0.0, 'high': KNOTS - 1.0}
     film_um = FILM_UM * hat_weights(places, KNOTS)
     at = np.arange(KNOTS, dtype=float)[:, np.newaxis]
-    return Basis(LEARNED['time_s'], settings, film_um, at, 1.0).random(SIZE, LENGTH)
+    return smooth_laws.Basis(LEARNED['time_s'], settings, film_um, at, 1.0).random(SIZE, LENGTH)
 
 
-def fitted(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fit:
+def fitted(law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fit:
     """The fit of readings of a true curve (K,), the level of all film being unknown, too."""
     jacobian = np.zeros((len(law.basis.film_um), len(PARAMETERS)))
     jacobian[:, 0] = FILM_UM / NOISE_UM
@@ -146,7 +140,9 @@ def fitted(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> Fi
     return replace(fit, nuisance=law.change_um / NOISE_UM)
 
 
-def covered(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def covered(
+    law: smooth_laws.RandomLaw, truth: np.ndarray, random: np.random.Generator
+) -> np.ndarray:
     """(K,) whether the band of a fit holds the true curve at the knots, but for its level."""
     learned = law.learned(*fitted(law, truth, random).amplitudes)
     away = np.array(learned.learned) - truth
@@ -155,7 +151,7 @@ def covered(law: RandomLaw, truth: np.ndarray, random: np.random.Generator) -> n
 
 
 @pytest.fixture
-def law() -> RandomLaw:
+def law() -> smooth_laws.RandomLaw:
     """Readings that are few on one side."""
     places = (KNOTS - 1) * np.random.default_rng(1).beta(1.0, 2.0, size=60)
     return at_places(places)

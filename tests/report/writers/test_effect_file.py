@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
+import paint_deposition as pd
 from paint_deposition.effects.catalogue import LEARNED, load_effect_file
-from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import CURVES
-from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
@@ -48,7 +47,7 @@ def door(tmp_path_factory):
     return small_campaign(folder, experiments=('door',)).experiments[0]
 
 
-def film_um(experiment, model: DepositionModel) -> np.ndarray:
+def film_um(experiment, model: pd.DepositionModel) -> np.ndarray:
     """What the gauge shows at the readings."""
     painted = FilmIntegrator(experiment.measured_points, model, 'double', parallel=False)
     painted.add(experiment.path)
@@ -84,21 +83,21 @@ def test_the_file_loads_and_gives_the_film_of_the_law_within_its_band(
     law = learned(covariate, shape, kind)
     forms = forms_of(law)
     assert forms
-    plain = film_um(door, DepositionModel())
+    plain = film_um(door, pd.DepositionModel())
     for number, form in enumerate(forms):
         file = write_effect_file(tmp_path / f'my_law_{number}.py', law, form)
         effect = load_effect_file(file)
         assert effect().is_neutral
-        assert film_um(door, DepositionModel(effects=(effect(),))) == pytest.approx(plain)
+        assert film_um(door, pd.DepositionModel(effects=(effect(),))) == pytest.approx(plain)
         entry = effect_entry(form, file.name)
         (tmp_path / 'model.yaml').write_text(f'effects: [{{{entry}}}]\n')
         assert entry in file.read_text().replace('"', '')
-        model = read_model(tmp_path / 'model.yaml')
+        model = pd.read_model(tmp_path / 'model.yaml')
         if law.flux_factor is not None:
             x = np.linspace(law.low, law.high, 200)
             assert np.abs(factor_at(*model.effects, x) - law.factor(x)).max() < 2.0 * SD
         if law.flux_factor is None or (number == 0 and (covariate, shape) in IN_KERNEL):
-            wanted = film_um(door, DepositionModel(effects=(law,)))
+            wanted = film_um(door, pd.DepositionModel(effects=(law,)))
             band = 2.0 * SD * (10.0 if kind == 'addition' else plain)
             # Rays beyond the range of the readings are few: there the law itself fades to neutral.
             assert np.mean(np.abs(film_um(door, model) - wanted) < band + 0.01) > 0.95

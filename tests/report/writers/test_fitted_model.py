@@ -6,9 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from paint_deposition.effects.deposition_model import DepositionModel
+import paint_deposition as pd
 from paint_deposition.effects.library.air_drift import AirDrift
-from paint_deposition.files.model_file import read_model
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.inference.diagnosis.refit import refit
 from paint_deposition.model.eq2_projection import Projection
@@ -23,7 +22,7 @@ BY_HAND = 0.3012345678901234
 @pytest.fixture(scope='module')
 def fitted(tmp_path_factory):
     campaign = small_campaign(tmp_path_factory.mktemp('campaign'))
-    start = DepositionModel(projection=Projection(model_plane_m=BY_HAND))
+    start = pd.DepositionModel(projection=Projection(model_plane_m=BY_HAND))
     return refit(campaign, start, AirDrift)
 
 
@@ -44,11 +43,11 @@ def test_fitted_numbers_have_few_digits_and_those_by_hand_all_of_theirs(file: Pa
 def test_the_file_gives_the_fitted_film(file: Path, fitted):
     experiment = fitted.study.campaign.experiments[1]
 
-    def film_um(model: DepositionModel) -> np.ndarray:
+    def film_um(model: pd.DepositionModel) -> np.ndarray:
         surface = experiment.surface
         integrator = FilmIntegrator(surface.points(), model, 'double', surface.occluder)
         integrator.add(experiment.path)
         return integrator.gauge_um
 
     expected = film_um(fitted.model)
-    assert np.abs(film_um(read_model(file)) - expected).max() < 1e-6 * expected.max()
+    assert np.abs(film_um(pd.read_model(file)) - expected).max() < 1e-6 * expected.max()
