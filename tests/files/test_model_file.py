@@ -1,5 +1,7 @@
-"""Model files: what is written reads back exactly, what is wrong is said in one line."""
+"""Model files and written files: read back exactly, whole or not at all."""
 
+import os
+import stat
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +15,7 @@ from paint_deposition.effects.learned.law import LearnedFootprint, LearnedLaw, L
 from paint_deposition.effects.library.corner_slowdown import CornerSlowdown
 from paint_deposition.effects.library.occlusion import Occlusion
 from paint_deposition.errors import ModelError
+from paint_deposition.files.atomic import write_text
 from paint_deposition.files.model_file import read_model, read_model_file, write_model
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.model.eq1_pattern import PATTERN, PlanarPattern
@@ -264,3 +267,15 @@ def test_what_is_wrong_with_a_posterior_is_said_in_one_line(
     message = refusal(with_posterior)
     assert message.startswith(f'{with_posterior}: posterior')
     assert words in message
+
+
+def test_files_have_the_rights_of_the_process_and_its_umask_is_never_changed(
+    tmp_path: Path, monkeypatch
+):
+    before = os.umask(0o027)
+    # The mask belongs to the process: two threads that set it and put it back can leave it at 0.
+    monkeypatch.setattr(os, 'umask', lambda mask: pytest.fail('the umask was changed'))
+    write_text(tmp_path / 'film.csv', 'x_m,y_m')
+    monkeypatch.undo()
+    assert stat.S_IMODE((tmp_path / 'film.csv').stat().st_mode) == 0o640
+    assert os.umask(before) == 0o027
