@@ -174,7 +174,7 @@ def test_a_footprint_is_the_pattern_times_its_factor(study):
 def test_the_footprint_is_shown_with_its_band(study):
     radius_m, eq1 = np.array([0.0, 0.1, 0.2]), np.array([0.5, 1.0, 0.1])
     profile = FootprintProfile(radius_m, eq1, eq1 + 0.1, np.array([0.5, 0.1, 0.01]))
-    figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, profile)
+    figures = DiscrepancyFigures(0.02, 0.0, 0.03, 0.1, (0.06, 2.0), profile)
     assert profile_figure(shown(study)) is None
     diagnosed = replace(shown(study), diagnosis=SimpleNamespace(discrepancy=figures))
     band, plain, found = profile_figure(diagnosed)['charts'][0]['data']

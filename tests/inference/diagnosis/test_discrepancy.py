@@ -70,6 +70,17 @@ def test_choices_are_covariances_and_as_probable_as_one(discrepancy, alone):
     assert (best.setting, best.part) == (0.02, 0.01)
 
 
+def test_what_an_earlier_job_says_of_the_footprint_is_a_prior_of_its_size(discrepancy):
+    told = replace(discrepancy, known_footprint=(PRIOR.footprints[0], 1.1)).choices()
+    prior = np.zeros(len(PRIOR.footprints))
+    for sizes in told:
+        prior[sizes.footprint] += np.exp(sizes.log_prior) * (not sizes.is_beyond_nature)
+    assert prior.sum() == pytest.approx(1.0)
+    # Three times the size is more than two standard deviations off: jobs differ by half.
+    assert 0.02 < prior[1] < 0.1
+    assert prior[2] < 1e-4
+
+
 def test_parts_painted_alike_share_the_setting_and_others_the_footprint(study, discrepancy):
     """Those painted alike differ by the part. They were measured at the same places."""
     shapes = discrepancy.shapes

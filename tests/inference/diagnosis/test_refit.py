@@ -81,7 +81,8 @@ def test_a_law_is_learned_with_its_band_and_counts_as_no_named_effect(done):
 
 
 def test_the_model_written_reads_back_and_goes_on(done, campaign, tmp_path):
-    write_fitted(tmp_path / 'model.yaml', done.study, done.history)
+    known = done.posterior, estimates(done.history[-1].fit)
+    write_fitted(tmp_path / 'model.yaml', done.study, done.history, *known)
     file = read_model_file(tmp_path / 'model.yaml')
     law, read = done.model.effects[0], file.model.effects[0]
     np.testing.assert_allclose(read.learned, law.learned, rtol=1e-7)

@@ -11,12 +11,14 @@ import paint_deposition as pd
 from inference.fitting.panels import column, painted_by, panel_of, passes, readings_at
 from paint_deposition.effects.library.edge_build import EdgeBuild
 from paint_deposition.errors import ReadingsError
+from paint_deposition.files.model_file import read_model_file
 from paint_deposition.film.pass_film import sampled_collapse
 from paint_deposition.inference.fitting.calibration import calibrate
 from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.inference.fitting.panel import Panel, fit_collapse, short_reaches
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.model.eq1_pattern import PlanarPattern
+from paint_deposition.report.writers.write import write as write_results
 from virtual_paint_shop.files import write
 from virtual_paint_shop.shop import panel_study
 
@@ -196,9 +198,9 @@ def test_a_panel_that_shows_both_edges_is_not_warned_of():
     assert [v.sigma for v in result.parameters] == [v.sigma for v in estimates(result.fit)]
 
 
-def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(small):
+def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(small, tmp_path):
     """What the fit alone is sure of is wrong by many of its standard deviations."""
-    found = calibrate(small)
+    found = pd.calibrate(small)
     (warning,) = (line for line in found.warnings if 'lands further out' in line)
     assert warning.startswith('panel: the readings end 0.23 and 0.23 m to the sides of a pass')
     assert 'on a larger panel if need be' in warning
@@ -208,6 +210,10 @@ def test_a_panel_too_small_is_named_and_the_widened_intervals_hold_the_truth(sma
     at = found.posterior.names.index('r_m')
     widths = {v.name: v.sigma for v in found.parameters}
     assert np.sqrt(found.posterior.matrix[at, at]) == pytest.approx(widths['r_m'], rel=0.05)
+    write_results(found, tmp_path)
+    file = read_model_file(tmp_path / 'model.yaml')
+    np.testing.assert_allclose(file.posterior.matrix, found.posterior.matrix, rtol=1e-6)
+    assert file.uncertainty['planar']['r_m'] == pytest.approx(widths['r_m'], rel=0.01)
 
 
 def test_a_comparison_with_a_pattern_fitted_to_such_a_panel_warns(small):

@@ -17,6 +17,7 @@ from paint_deposition.film.statistics import film_statistics
 from paint_deposition.inference.diagnosis import closed_forms
 from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.refit import refit
+from paint_deposition.inference.fitting.estimates import estimates
 from paint_deposition.kernel.laws import Ray
 from paint_deposition.model.eq2_projection import Projection
 from paint_deposition.report.writers.inference import (
@@ -171,7 +172,8 @@ def fitted(tmp_path_factory):
 @pytest.fixture(scope='module')
 def file(tmp_path_factory, fitted) -> Path:
     path = tmp_path_factory.mktemp('model') / 'model.yaml'
-    write_fitted(path, fitted.study, fitted.history)
+    known = fitted.posterior, estimates(fitted.history[-1].fit)
+    write_fitted(path, fitted.study, fitted.history, *known)
     return path
 
 

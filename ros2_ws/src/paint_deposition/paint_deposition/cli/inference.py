@@ -290,6 +290,11 @@ def _diagnosis_lines(diagnosis: pd.Diagnosis) -> Iterator[str]:
     yield from (f'{amount}' for amount in diagnosis.random_effects if amount.is_notable)
     for region in diagnosis.comparisons[0].regions:
         yield f'misfit before: {region.experiment}: {region.description}'
+    if diagnosis.calibrate_first:
+        yield (
+            'next: paint calibrate a flat panel, and diagnose with its model: a pattern that is '
+            'known cannot stand for an effect'
+        )
     for spray in diagnosis.proposals[1][:2]:
         todo = f'next: spray {spray.what}, and measure {spray.readings} points'
         yield f'{todo}: {words.separation_words(spray)}'

@@ -12,6 +12,8 @@ from paint_deposition.errors import ModelError, did_you_mean
 from paint_deposition.model.eq1_pattern import PATTERN
 
 Number = Annotated[float, Field(strict=True, allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0.0)]
+Factor = Annotated[Number, Field(ge=1.0)]
 # What coordinates of a brush begin with.
 BRUSH = 'brush_'
 REMEDY = 'copy the whole section from the file that was written, or take it out'
@@ -30,6 +32,11 @@ class Posterior(BaseModel, frozen=True, extra='forbid'):
     )
     readings: tuple[str, ...] = Field((), description='fingerprints of the readings behind it')
     process: dict[str, Number] = Field({}, description='numbers by name')
+    footprint: tuple[Positive, Factor] | None = Field(
+        None,
+        description='typical deviation of the footprint from the model, over its peak, and the '
+        'factor by which that is uncertain (one standard deviation)',
+    )
 
     @staticmethod
     def of(

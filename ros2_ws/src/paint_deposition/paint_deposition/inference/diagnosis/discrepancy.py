@@ -62,6 +62,8 @@ class DiscrepancyPrior:
     # in shares of its radius; a fan ends sharply.
     lengths: tuple[float, ...] = (0.1, 0.2, 0.6)
     footprint_lengths: tuple[float, ...] = (0.1, 0.3)
+    # Factor by which the size of a bell's footprint's deviations differs between jobs.
+    footprint_between_jobs: float = 1.5
     # The pattern differs between settings by this share of what it differs between jobs, and moves
     # sideways by this share of its root mean square radius: 0.01 to 0.03 were measured.
     of_jobs: float = 1.0 / 3.0
@@ -159,6 +161,8 @@ class ModelDiscrepancy:
     is_repeated: bool  # whether any were
     lengths_m: tuple[float, ...]  # of these fields [m]
     setting_of: np.ndarray  # (P,) number of the setting of each point, see ``painted_alike``
+    # What an earlier job says of the size of the footprint's deviations, see ``Posterior``.
+    known_footprint: tuple[float, float] | None = None
 
     @staticmethod
     def of(study: Study, fit: Fit) -> 'ModelDiscrepancy':
@@ -186,6 +190,7 @@ class ModelDiscrepancy:
             bool(repeated.any()),
             lengths_m,
             setting_of,
+            fit.parameters.known and fit.parameters.known.footprint,
         )
 
     def around(self, study: Study, fit: Fit) -> 'ModelDiscrepancy':
@@ -199,10 +204,17 @@ class ModelDiscrepancy:
         parts = {0.0: 0.0}
         if self.is_repeated:
             parts = {size: _log_prior(size, *PRIOR.usual_part) for size in PRIOR.parts}
-        kinds = range(len(PRIOR.lengths)), range(len(PRIOR.footprints))
+        footprints = [0.0] * len(PRIOR.footprints)
+        if self.known_footprint:
+            size, factor = self.known_footprint
+            jobs = np.log(PRIOR.footprint_between_jobs)
+            widened = float(np.exp(np.hypot(np.log(factor), jobs)))
+            footprints = [_log_prior(one, size, widened) for one in PRIOR.footprints]
         found = [
-            DiscrepancyHyperparameters(setting, part, *kind, settings[setting] + parts[part])
-            for setting, part, kind in product(settings, parts, product(*kinds))
+            DiscrepancyHyperparameters(setting, part, length, k, of_setting + of_part + of_print)
+            for (setting, of_setting), (part, of_part), length, (k, of_print) in product(
+                settings.items(), parts.items(), range(len(PRIOR.lengths)), enumerate(footprints)
+            )
         ]
         total = {
             beyond: np.logaddexp.reduce(

@@ -17,6 +17,7 @@ from scipy.special import expit
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.learned.law import WAVES
 from paint_deposition.inference.diagnosis.discrepancy import (
+    PRIOR,
     DiscrepancyHyperparameters,
     ModelDiscrepancy,
 )
@@ -268,12 +269,16 @@ class ModelSpace:
         spread = np.eye(seen.shape[1]) - seen.T @ seen
         sd = np.sqrt(np.einsum('kn,nm,km->k', of_peak, spread, of_peak))
         found = [one.sizes for one in self.nature]
+        logs = np.log([PRIOR.footprints[one.footprint] for one in found])
+        middle = self.share @ logs
+        typical = float(np.exp(middle)), float(np.exp(np.sqrt(self.share @ (logs - middle) ** 2)))
         # A deviation of the footprint shows from this many of its standard deviations on.
         return DiscrepancyFigures(
             float(self.share @ [one.setting for one in found]),
             float(self.share @ [one.part for one in found]),
             float(self.share @ [self.discrepancy.lengths_m[one.length] for one in found]),
             float(np.max(np.abs(mean), where=np.abs(mean) > 2.0 * sd, initial=0.0)),
+            typical,
             FootprintProfile(
                 footprint.radius_m,
                 footprint.flux,

@@ -17,6 +17,7 @@ from paint_deposition.inference.diagnosis.closed_forms import forms_of
 from paint_deposition.inference.diagnosis.proposals import Place, Spray
 from paint_deposition.inference.fitting.estimates import DiscrepancyFigures
 from paint_deposition.inference.fitting.least_squares import Fit
+from paint_deposition.inference.fitting.panel import Panel
 from paint_deposition.inference.fitting.posterior import PatternShift, posterior_of
 from paint_deposition.inference.fitting.random_effects import Amount, amounts
 from paint_deposition.inference.fitting.study import Study
@@ -204,6 +205,18 @@ class Diagnosis(Tabular):
         return PatternShift.of(self.history[-1].fit)
 
     @cached_property
+    def calibrate_first(self) -> bool:
+        """Whether it is open what is missing, and no panel has shown the pattern alone.
+
+        A pattern that is known cannot stand for an effect.
+        """
+        is_open = self.verdict in ('undecided', 'unknown_effect') or any(
+            len(found.members) > 1 for found in self.classes if found.best in self.accepted
+        )
+        panels = map(Panel.of, self.study.campaign.experiments)
+        return is_open and self.pattern_shift is None and not any(panels)
+
+    @cached_property
     def random_effects(self) -> tuple[Amount, ...]:
         """Estimated levels of parts and zeros of gauge sessions."""
         return amounts(self.history[-1].fit, self.study.random_effects)
@@ -230,7 +243,11 @@ class Diagnosis(Tabular):
     @property
     def posterior(self) -> Posterior:
         """What is known of the model with what was accepted: a prior for the next job."""
-        return posterior_of(self.history[-1].fit, self.study.campaign)
+        return self.posterior_at(self.history[-1])
+
+    def posterior_at(self, step: Step) -> Posterior:
+        """The same of one model of the history."""
+        return posterior_of(step.fit, self.study.campaign, self.discrepancy)
 
     @property
     def noise_floor_um(self) -> float:
@@ -294,6 +311,7 @@ class Diagnosis(Tabular):
             'regions': [region.to_dict() for region in self.comparisons[0].regions],
             'zones': [zone.to_dict() for zone in self.comparisons[-1].zones],
             'next': {
+                'calibrate': self.calibrate_first,
                 'measure': [place.to_dict() for place in places],
                 'spray': [spray.to_dict() for spray in sprays],
             },

@@ -153,7 +153,7 @@ class Calibration:
     @property
     def posterior(self) -> Posterior:
         """What is known of the model's parameters: a prior for other jobs."""
-        return posterior_of(self.fit, self.study.campaign, self.shifts)
+        return posterior_of(self.fit, self.study.campaign, self.discrepancy, self.shifts)
 
     @property
     def chi_square_per_freedom(self) -> float:

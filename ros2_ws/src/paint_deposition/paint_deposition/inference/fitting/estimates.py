@@ -176,6 +176,8 @@ class DiscrepancyFigures:
     length_m: float  # over which neighbours differ alike [m]
     # Largest deviation of the footprint from eq. (1) that shows, over its peak.
     footprint_of_peak: float
+    # Size of its deviations, over its peak, and the factor that is one standard deviation of it.
+    footprint_size: tuple[float, float]
     profile: FootprintProfile  # of the footprint
 
     def to_dict(self) -> dict[str, float]:

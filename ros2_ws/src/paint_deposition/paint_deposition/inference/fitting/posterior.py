@@ -14,8 +14,9 @@ from scipy.special import chdtri
 from paint_deposition.effects.base import Effect
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.effects.learned.curves import LearnedCurve
+from paint_deposition.effects.learned.law import LearnedFootprint
 from paint_deposition.errors import ModelError, ReadingsError
-from paint_deposition.inference.fitting.estimates import scaled_covariance
+from paint_deposition.inference.fitting.estimates import DiscrepancyFigures, scaled_covariance
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.parameters import FreeParameters
 from paint_deposition.inference.fitting.pattern_vector import PatternVector
@@ -25,8 +26,23 @@ from paint_deposition.model.eq1_pattern import Brush, SetPoints, listed
 from paint_deposition.motion.trajectory import ONLY_BRUSH
 
 
-def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None) -> Posterior:
-    """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is."""
+def posterior_of(
+    fit: Fit,
+    campaign: Campaign,
+    figures: DiscrepancyFigures | None = None,
+    shifts: np.ndarray | None = None,
+) -> Posterior:
+    """The posterior of a fit to a campaign, widened as ``scaled_covariance`` is.
+
+    Args:
+        figures: of the discrepancy, if they are known. Where the fit has learned the footprint,
+            it is off by as much as the readings leave open.
+    """
+    footprint = figures and figures.footprint_size
+    if figures and fit.model.effect(LearnedFootprint.id):
+        footprint = float(np.sqrt(np.mean(figures.profile.sd**2))), 2.0
+    if footprint:
+        footprint = float(f'{footprint[0]:.3g}'), float(f'{footprint[1]:.3g}')
     parameters = fit.parameters
     scale = parameters.scale
     covariance = scaled_covariance(fit.marginal, shifts) * np.outer(scale, scale)
@@ -35,7 +51,7 @@ def posterior_of(fit: Fit, campaign: Campaign, shifts: np.ndarray | None = None)
     return Posterior.of(
         parameters.coordinates, parameters.offset + scale * fit.vector,
         0.5 * (covariance + covariance.T), readings=(*known, *own),
-        process=campaign.settings,
+        process=campaign.settings, footprint=footprint,
     )  # fmt: skip
 
 
@@ -76,7 +92,8 @@ def _select(known: Posterior, whole: PatternVector, kept: PatternVector) -> Post
     order = [known.names.index(name) for name in (*names, *of_effects)]
     matrix = linear @ known.matrix[np.ix_(order, order)] @ linear.T
     new = [*(c.name for c in kept.coordinates), *of_effects]
-    return Posterior.of(new, mean, matrix, readings=known.readings, process=known.process)
+    of = {name: getattr(known, name) for name in ('readings', 'process', 'footprint')}
+    return Posterior.of(new, mean, matrix, **of)
 
 
 def prior_for(

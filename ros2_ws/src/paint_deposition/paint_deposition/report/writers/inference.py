@@ -25,10 +25,9 @@ from paint_deposition.inference.diagnosis.closed_forms import (
 )
 from paint_deposition.inference.diagnosis.verdict import Diagnosis, Step
 from paint_deposition.inference.fitting.calibration import Calibration
-from paint_deposition.inference.fitting.estimates import estimates
+from paint_deposition.inference.fitting.estimates import Estimate, estimates
 from paint_deposition.inference.fitting.least_squares import Fit
 from paint_deposition.inference.fitting.pattern_vector import PATTERN_NAMES
-from paint_deposition.inference.fitting.posterior import posterior_of
 from paint_deposition.inference.fitting.study import Study
 from paint_deposition.inference.posterior import Posterior
 from paint_deposition.report.data import ReportData, history_as_list
@@ -72,7 +71,8 @@ def _write_calibration(
         *(f'Warning: {warning}.' for warning in result.warnings),
     ]
     step = Step.of(study, '', result.fit)
-    write_fitted(model_file, study, [step], start, '\n'.join(header))
+    known = result.posterior, result.parameters
+    write_fitted(model_file, study, [step], *known, start, '\n'.join(header))
     write_json(figures, result.to_dict() | _provenance(study, result.model))
     return [model_file, figures, *write_calibration_pictures(folder, result, pictures)]
 
@@ -92,8 +92,9 @@ def _write_diagnosis(
 ) -> list[Path]:
     start = start or ModelFile(result.history[0].model)
     models = [folder / 'model_before.yaml', folder / 'model.yaml']
-    write_fitted(models[0], result.study, result.history[:1], start)
-    write_fitted(models[1], result.study, result.history, start)
+    for file, steps in zip(models, (result.history[:1], result.history), strict=True):
+        known = result.posterior_at(steps[-1]), estimates(steps[-1].fit)
+        write_fitted(file, result.study, steps, *known, start)
     data = ReportData.of(result, start.history)
     return models + _write_results(folder, 'diagnosis.json', result.to_dict(), data, pictures)
 
@@ -144,6 +145,8 @@ def write_fitted(
     path: str | Path,
     study: Study,
     steps: Sequence[Step],
+    posterior: Posterior,
+    values: Sequence[Estimate],
     start: ModelFile | None = None,
     header_comment: str = '',
 ) -> None:
@@ -155,6 +158,8 @@ def write_fitted(
         path: YAML.
         study: the readings that it was fitted to.
         steps: the models, the start model, refitted, first.
+        posterior: of the last one.
+        values: its parameters with their uncertainties.
         start: what was started from: the name stays, the history goes on, and uncertainties
             stay where the fit has no newer ones.
         header_comment: lines to put at the top.
@@ -166,18 +171,17 @@ def write_fitted(
     uncertainty = {
         key: dict(value) for key, value in start.uncertainty.items() if isinstance(value, Mapping)
     }
-    for value in estimates(fit):
+    for value in values:
         section, _, name = value.name.rpartition('.')
         section = 'planar' if value.name in PATTERN_NAMES else section
         uncertainty.setdefault(section, {})[name] = float(f'{value.sigma:.3g}')
     fitted = _rounded(fit, steps[0].model.effects)
-    found = posterior_of(fit, study.campaign)
-    few = {'mean': _short(found.mean), 'covariance': _short(found.covariance)}
-    posterior: Posterior | None = found.model_copy(update=few)
+    few = {name: _short(getattr(posterior, name)) for name in ('mean', 'covariance')}
+    posterior = posterior.model_copy(update=few)
     whole = fitted.with_missing_brushes(start.model)
     if whole is not fitted:
         # It is that of some brushes only and would be taken for that of all.
-        fitted, posterior = whole, None
+        return write_model(path, whole, header_comment, history, uncertainty, start.name)
     write_model(path, fitted, header_comment, history, uncertainty, start.name, posterior)
 
 
