@@ -100,35 +100,6 @@ def test_a_stream_that_begins_again_is_painted_again(whole_strokes):
         assert np.array_equal(getattr(path, name), np.concatenate([column, column]))
 
 
-def test_a_live_stream_that_begins_again_follows_its_new_triggers():
-    once = to_and_fro()
-    builder = PathBuilder()
-    pieces = []
-    for _ in range(2):
-        for stamp, flow in zip(TRIGGER['trigger_stamps_ns'], TRIGGER['trigger_flow'], strict=True):
-            builder.add_trigger(stamp, flow)
-        for row in range(0, len(once), 10):
-            add_rows(builder, once, slice(row, row + 10))
-            if row:  # the first poses of a stream that begins again are only waiting yet
-                pieces.append(builder.take())
-    pieces.append(builder.take(finish=True))
-    sprayed = SprayPath.joined(pieces).spraying_time_s
-    assert sprayed == pytest.approx(2.0 * spray_path(once)[0].spraying_time_s, rel=1e-12)
-    assert builder.counts.restarts == 1
-
-
-def test_a_late_trigger_is_counted_and_holds_from_there_on():
-    trajectory = scenes.straight_pass(TIMES_S)
-    builder = PathBuilder()
-    builder.add_trigger(scenes.stamps_ns(0.0), 1.0)
-    add_rows(builder, trajectory, slice(0, 101))
-    assert builder.take().spraying_time_s == pytest.approx(2.0)
-    builder.add_trigger(scenes.stamps_ns(1.9), 0.0)
-    add_rows(builder, trajectory, slice(101, None))
-    assert builder.take(finish=True).spraying_time_s == 0.0
-    assert builder.counts.late_triggers == 1
-
-
 @pytest.mark.parametrize('count', [0, 1])
 def test_too_few_poses_paint_nothing(count):
     path, counts = spray_path(
@@ -214,15 +185,6 @@ def test_no_sub_step_goes_further_than_allowed(seed, max_step_m):
     turned = Rotation.from_matrix(rotation[:-1]).inv() * Rotation.from_matrix(rotation[1:])
     # Middles of neighbours may be one sub-step apart in all.
     assert (turned.magnitude() * path.LEVER_M).max() <= max_step_m * (1 + 1e-6)
-
-
-def test_a_gap_gives_nothing_and_is_told():
-    stamps = [0, 10_000_000, 10_000_000 + GAP_NS + 1, 20_000_000 + GAP_NS + 1]
-    positions = [[0, 0, 0], [0.001, 0, 0], [0.5, 0, 0], [0.501, 0, 0]]
-    stamp, dwell, *_, after_gap = split(stamps, positions, np.tile([0, 0, 0, 1.0], (4, 1)))
-    assert dwell.sum() == pytest.approx(0.02)
-    assert after_gap.tolist() == [False, True]
-    assert np.all((stamp < stamps[1]) | (stamp > stamps[2]))
 
 
 @pytest.mark.parametrize('away_m', [1e3, 1e30, 1e300])

@@ -11,12 +11,12 @@ from paint_deposition.part import gauge_places
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.sprayable_faces import sprayable_faces
 from paint_deposition.part.surface import Surface, facing, toward_the_gun
-from surfaces import triangulated
+from surfaces import ball, flat, fold, refined, triangulated
 
 
 @pytest.mark.parametrize('offset_m', [np.zeros(3), np.array([40.0, -25.0, 3.0])])
-def test_all_of_an_open_surface_is_seen_wherever_it_is(triangles, ball, offset_m):
-    vertices, faces = triangles(ball(0.5), 0.02, jitter=0.3)
+def test_all_of_an_open_surface_is_seen_wherever_it_is(offset_m):
+    vertices, faces = triangulated(ball(0.5), 0.02, jitter=0.3)
     surface = Surface.from_triangles(vertices + offset_m, faces, 0.02)
     eyes = np.array([[0.0, -0.3, 0.0], [0.3, -0.4, 0.2]]) + offset_m
     seen = surface.occluder.sees(eyes[:, None], surface.vertices_m)
@@ -38,19 +38,17 @@ def test_the_shadow_of_a_bar_ends_where_geometry_says():
     np.testing.assert_array_equal(seen[clear], (np.abs(z) > edge_m)[clear])
 
 
-def test_sky_view_factor_of_a_plane_and_of_convex_surface_is_one(make_surface, flat, ball):
-    np.testing.assert_array_equal(make_surface(flat, 0.05).points().sky_view_factor, 1.0)
-    np.testing.assert_allclose(
-        make_surface(ball(0.4), 0.01).points().sky_view_factor, 1.0, atol=2e-3
-    )
+def test_sky_view_factor_of_a_plane_and_of_convex_surface_is_one():
+    np.testing.assert_array_equal(refined(flat, 0.05).points().sky_view_factor, 1.0)
+    np.testing.assert_allclose(refined(ball(0.4), 0.01).points().sky_view_factor, 1.0, atol=2e-3)
 
 
 @pytest.mark.parametrize(('opening_deg', 'share'), [(60.0, 0.5), (90.0, 0.2), (140.0, 0.9)])
-def test_sky_view_factor_in_a_groove(make_surface, fold, opening_deg, share):
+def test_sky_view_factor_in_a_groove(opening_deg, share):
     half = np.radians(opening_deg) / 2
     slant_m, length_m = 0.1, 3.0
     depth_m = slant_m * np.sin(half)
-    groove = make_surface(
+    groove = refined(
         fold(half - np.pi / 2), 0.1, 0.1, half_width_m=length_m, half_height_m=depth_m
     )
     s = share * slant_m
@@ -128,8 +126,8 @@ EYES = np.array([[0.0, -0.25, 0.0], [0.1, -0.25, 0.1], [-0.1, -0.25, 0.0], [3.0,
 AHEAD = np.tile([0.0, 1.0, 0.0], (4, 1))
 
 
-def test_a_part_sprayed_from_behind_is_turned_and_says_so(make_surface, ball):
-    surface = make_surface(ball(0.5), 0.05)
+def test_a_part_sprayed_from_behind_is_turned_and_says_so():
+    surface = refined(ball(0.5), 0.05)
     assert toward_the_gun(surface, EYES, AHEAD) is surface
     turned = toward_the_gun(surface, EYES * [1, -3, 1], -AHEAD)
     np.testing.assert_array_equal(turned.normals, -surface.normals)

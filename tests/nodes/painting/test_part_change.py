@@ -359,6 +359,8 @@ def test_poses_that_wait_for_their_transform_are_of_the_part_they_were_sent_for(
     if placed:
         figures = json.loads(Path(answer.paths[2]).read_text())
         assert figures['poses']['received'] == len(MOTION)
+        saved = np.loadtxt(answer.paths[1], delimiter=',', skiprows=1)[:, 3]
+        assert saved == pytest.approx(offline_um(node, MOTION), rel=1e-7)
     else:
         assert not answer.paths
     assert np.array_equal(painted(node, len(MOTION)), offline_um(node, later(MOTION)))

@@ -46,26 +46,6 @@ def guns(ros_context, spin, wait_until):
     return guns
 
 
-def test_the_film_is_the_sum_of_the_guns_whoever_comes_first(simulator, guns, painted, tmp_path):
-    pd.write_model(tmp_path / 'thin.yaml', THIN)
-    node = simulator(atomizers=GUNS, model_files=['', str(tmp_path / 'thin.yaml')])
-    first, second = guns(node)
-    expected = offline_um(node, HIGH) + offline_um(node, LOW, THIN)
-    alone = [offline_um(node, HIGH).max(), offline_um(node, LOW, THIN).max()]
-    assert min(alone) > 1.0
-    # One after the other.
-    first.send(HIGH)
-    second.send(LOW)
-    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
-    # In turn, the second first.
-    node.reset()
-    for start in range(0, len(HIGH), 37):
-        second.send(LOW, slice(start, start + 37))
-        first.send(HIGH, slice(start, start + 37))
-        painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(LOW)))
-    assert np.array_equal(painted(node, len(HIGH) + len(LOW)), expected)
-
-
 def test_each_guns_share_is_reported(simulator, guns, painted, onlooker, wait_until):
     node = simulator(atomizers=GUNS)
     fields = {f'{gun}/thickness/field': (ThicknessField, topics.RESULTS) for gun in GUNS}
@@ -131,22 +111,31 @@ def test_what_does_not_go_together_is_refused(simulator, tmp_path):
             simulator(**{'atomizers': GUNS} | values)
 
 
-def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
-    simulator, record, guns, wait_until, painted, play
+def test_the_film_is_the_sum_of_the_guns_whoever_comes_first_and_that_of_their_run_replayed(
+    simulator, record, guns, wait_until, painted, play, tmp_path
 ):
-    """Live, from one bag by a player for each gun, and offline: the same film to the last bit."""
+    """In turn, one after the other, from one bag by a player for each gun, and offline."""
+    pd.write_model(tmp_path / 'thin.yaml', THIN)
     low = moved(two_passes(poses=320), [0.1, 0.0, -0.15])
-    node, poses = simulator(atomizers=GUNS), len(HIGH) + len(low)
+    node = simulator(atomizers=GUNS, model_files=['', str(tmp_path / 'thin.yaml')])
+    poses = len(HIGH) + len(low)
     recorder, (first, second) = record(atomizers=GUNS), guns(node)
     wait_until(lambda: first.has_subscribers(2) and second.has_subscribers(2), what='discovery')
     for start in range(0, len(HIGH), 37):
         second.send(low, slice(start, start + 37))
         first.send(HIGH, slice(start, start + 37))
+        painted(node, min(start + 37, len(HIGH)) + min(start + 37, len(low)))
     live = painted(node, poses)
-    assert np.array_equal(live, offline_um(node, HIGH) + offline_um(node, low))
+    alone = offline_um(node, HIGH), offline_um(node, low, THIN)
+    assert min(film.max() for film in alone) > 1.0
+    assert np.array_equal(live, sum(alone))
     recorder.close()
     run = recorder.run.folder
 
+    node.reset()
+    first.send(HIGH)
+    second.send(low)
+    assert np.array_equal(painted(node, poses), live)
     node.reset()
     players = [
         play(
@@ -159,6 +148,6 @@ def test_a_run_of_two_guns_replayed_is_the_film_that_was_painted(
     assert np.array_equal(painted(node, poses), live)
 
     motions = [gun.trajectory for gun in read_gun_motions([run], MotionSource(), GUNS)]
-    film = pd.simulate(node.surface, motions, names=GUNS)
+    film = pd.simulate(node.surface, motions, [pd.DepositionModel(), THIN], names=GUNS)
     assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
     assert np.abs(film.film_um - live).max() < 1e-5 * live.max()
