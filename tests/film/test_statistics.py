@@ -205,12 +205,10 @@ def test_automatic_ends_are_round_figures(value, rounded):
 @pytest.mark.parametrize(
     ('film', 'ends'),
     [
-        ((16.7, 50.9), (15, 55)),
-        ((17.7, 21.9), (17, 22)),
-        ((5, 100), (0, 100)),
+        ((16.7, 50.9), (15, 55)), ((17.7, 21.9), (17, 22)), ((5, 100), (0, 100)),
         ((20, 20), (20, 20.05)),
     ],
-)
+)  # fmt: skip
 def test_a_film_that_is_thick_everywhere_has_the_colours_for_itself(film, ends):
     scale = colour_scales.film_scale(np.array(film, dtype=float))
     assert (scale.low, scale.high) == pytest.approx(ends)
