@@ -10,7 +10,7 @@ import yaml
 import paint_deposition as pd
 from booth import LOOKING_ALONG_Y, SAMPLES
 from brushes import NARROW, WIDE
-from cli.command import paint, ran
+from cli.command import paint, ran, rows_of
 from paint_deposition.effects.library.air_drift import AirDrift
 from paint_deposition.effects.library.sag import Sag
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -179,8 +179,8 @@ def test_layers_tell_what_parts_of_one_coat_each_tell(folder, tmp_path):
         assert (one.rmse_um > 1.0) == off
     pd.write_model(tmp_path / 'hidden.yaml', hidden)
     ran('compare', campaign(folder), '--model', tmp_path / 'hidden.yaml', '-o', tmp_path)
-    header, *rows = (tmp_path / 'residuals.csv').read_text().splitlines()
-    assert header.endswith(',layer')
-    assert {(row.split(',')[0], row.split(',')[-1]) for row in rows} == {
+    rows = rows_of(tmp_path / 'residuals.csv')
+    assert list(rows[0])[-1] == 'layer'
+    assert {(row['experiment'], row['layer']) for row in rows} == {
         ('panel: base', 'base'), ('panel: total', 'total')
     }  # fmt: skip

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import assert_refused, figures_of, film_in, paint, ran, sheet
+from cli.command import assert_refused, figures_of, film_in, paint, ran, rows_of, sheet
 from folded_parts import hood
 from paint_deposition.cli.results import MARKER
 from paint_deposition.errors import ReadingsError
@@ -254,11 +254,6 @@ def measured(tmp_path_factory):
     folder = tmp_path_factory.mktemp('measured')
     done = ran('measure', *PAINTED, '--points', 30, '-o', folder)
     return folder, done
-
-
-def rows_of(path) -> list[dict]:
-    with path.open(newline='') as file:
-        return list(csv.DictReader(file))
 
 
 @pytest.mark.slow

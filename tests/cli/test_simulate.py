@@ -9,7 +9,7 @@ import yaml
 
 import paint_deposition as pd
 from booth import SAMPLES
-from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran
+from cli.command import COARSE, TRIGGER, assert_refused, level_pass, paint, ran, rows_of
 from paint_deposition.cli.results import MARKER
 from paint_deposition.effects.library.gauge_gain import GaugeGain
 from paint_deposition.files.recordings.bags import write_pose_bag
@@ -219,15 +219,13 @@ def test_simulate_counts_each_zone_against_its_band(panel, one_pass, zones, tmp_
     within = np.dot(painted, [zone['within_target'] for zone in figures['zones']]) / sum(painted)
     assert figures['within_target'] == pytest.approx(within)
     assert f'head, left, 9 ± 1 µm: {head["mean_um"]:.1f} µm mean' in done.stdout
-    table = np.genfromtxt(
-        tmp_path / 'out/film.csv', delimiter=',', skip_header=1, usecols=(2, 3), comments='"'
-    )
-    names = [row.split(',', 4)[4] for row in (tmp_path / 'out/film.csv').read_text().splitlines()]
-    assert names[0] == 'zone'
-    assert set(names[1:]) == {'foot', '"head, left"', ''}
-    low = [name == 'foot' for name in names[1:]]
-    np.testing.assert_array_equal(low, table[:, 0] <= 0.0)
-    assert table[low, 1].max() == pytest.approx(foot['max_um'])
+    rows = rows_of(tmp_path / 'out/film.csv')
+    assert list(rows[0])[4:] == ['zone']
+    assert {row['zone'] for row in rows} == {'foot', 'head, left', ''}
+    low = [row for row in rows if float(row['z_m']) <= 0.0]
+    assert low == [row for row in rows if row['zone'] == 'foot']
+    highest_um = max(float(row['thickness_um']) for row in low)
+    assert highest_um == pytest.approx(foot['max_um'])
     zones.write_text(ZONES.replace('0.0]]}', '-1.0]]}'))
     assert_refused(paint(*whole, '--zones', zones), "zone 'foot' holds no vertex of the part")
 
@@ -247,8 +245,7 @@ def test_compare_tells_the_readings_of_each_zone(zones, tmp_path):
     done = ran('compare', file, '-o', tmp_path / 'out')
     written = json.loads((tmp_path / 'out/comparison.json').read_text())
     foot, _ = written['zones']
-    lines = (tmp_path / 'out/residuals.csv').read_text().splitlines()
-    rows = [dict(zip(lines[0].split(','), line.split(','), strict=True)) for line in lines[1:]]
+    rows = rows_of(tmp_path / 'out/residuals.csv')
     own = [row for row in rows if float(row['z_m']) <= 0.3 and row['used'] == '1']
     film = np.array([float(row['thickness_um']) for row in own])
     assert (foot['readings'], foot['target_um']) == (len(own), 22.0)
