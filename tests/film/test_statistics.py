@@ -1,17 +1,15 @@
-"""Figures of a film and of its paint against what can be worked out by hand, and its colours."""
+"""Figures of a film and of its paint against what can be worked out by hand."""
 
 import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from matplotlib import colormaps
 
 import scenes
 from brushes import NARROW, WIDE, switched
 from paint_deposition.effects.deposition_model import DepositionModel
 from paint_deposition.errors import PaintError
-from paint_deposition.film import colour_scales
 from paint_deposition.film.integrator import FilmIntegrator
 from paint_deposition.film.statistics import (
     PaintUsed,
@@ -170,52 +168,3 @@ def test_more_solids_than_are_sprayed_are_told():
     assert line.startswith('brush 1 would lay 1.30 times the solids that it sprays')
     assert math.isnan(efficiency(Brush(number=2, planar=WIDE)))
     assert impossible_brushes(DepositionModel.of_brushes([Brush(number=2, planar=WIDE)])) == ()
-
-
-@pytest.mark.parametrize(
-    ('palette', 'name'),
-    [(colour_scales.FILM_PALETTE, 'viridis'), (colour_scales.RESIDUAL_PALETTE, 'coolwarm')],
-)
-def test_the_tables_are_the_published_maps(palette, name):
-    published = colormaps[name](np.arange(256))[:, :3] * 255
-    assert np.abs(palette[:256, :3] - published).max() <= 0.5
-
-
-def test_under_over_and_bare_stand_out():
-    scale = colour_scales.film_scale(np.empty(0), 20.0, 50.0)
-    values = np.array([19.9, 20.0, 50.0, 50.1, 35.0, np.nan])
-    shown = np.array([True, True, True, True, False, True])
-    rgba = scale.rgba(values, shown)
-    assert tuple(rgba[0, :3]) == colour_scales.UNDER_RGB
-    assert np.array_equal(rgba[1], colour_scales.FILM_PALETTE[0])
-    assert np.array_equal(rgba[2], colour_scales.FILM_PALETTE[255])
-    assert tuple(rgba[3, :3]) == colour_scales.OVER_RGB
-    assert tuple(rgba[4, :3]) == tuple(rgba[5, :3]) == colour_scales.BARE_RGB
-    assert np.all(rgba[:, 3] == 255)
-
-
-@pytest.mark.parametrize(
-    ('value', 'rounded'), [(0, 1), (0.97, 1), (1, 1), (33, 40), (100, 100), (101, 150), (6.1, 8)]
-)
-def test_automatic_ends_are_round_figures(value, rounded):
-    assert colour_scales.round_up(value) == pytest.approx(rounded)
-    assert colour_scales.film_scale(np.array([0.0, value])).high == pytest.approx(rounded)
-
-
-@pytest.mark.parametrize(
-    ('film', 'ends'),
-    [
-        ((16.7, 50.9), (15, 55)), ((17.7, 21.9), (17, 22)), ((5, 100), (0, 100)),
-        ((20, 20), (20, 20.05)),
-    ],
-)  # fmt: skip
-def test_a_film_that_is_thick_everywhere_has_the_colours_for_itself(film, ends):
-    scale = colour_scales.film_scale(np.array(film, dtype=float))
-    assert (scale.low, scale.high) == pytest.approx(ends)
-
-
-def test_residual_scale_is_even_about_zero():
-    scale = colour_scales.residual_scale(np.array([-7.0, 3.0]))
-    assert (scale.low, scale.high) == (-8.0, 8.0)
-    grey = scale.rgba(np.array([0.0]), np.array([True]))[0, :3]
-    assert np.ptp(grey.astype(int)) < 5

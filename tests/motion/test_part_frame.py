@@ -5,13 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from paint_deposition.errors import RecordingError
-<<<<<<< HEAD
+from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
 from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose
 from paint_deposition.planning.part_places import locate
-=======
-from paint_deposition.motion.frame_tree import LONGEST_GAP_NS, FrameTree, NoTransform
-from paint_deposition.motion.part_frame import Rigid, is_frame, is_pose, locate
->>>>>>> c
 
 
 def random_poses(count: int) -> tuple[np.ndarray, np.ndarray]:

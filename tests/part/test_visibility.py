@@ -1,14 +1,10 @@
-"""What is seen: lines of sight and rays, the sides of a part, and where a gauge can stand."""
+"""What is seen: lines of sight and rays, and the sides of a part."""
 
 import numpy as np
 import pytest
-from paint_deposition.part.sprayable_faces import sprayable_faces
 from trimesh.creation import box
 from trimesh.util import concatenate
 
-from booth import panel
-from folded_parts import bumper, hood
-from paint_deposition.part import gauge_places
 from paint_deposition.part.orientation import across_axis, downhill_axis
 from paint_deposition.part.surface import Surface, facing, toward_the_gun
 from surfaces import ball, flat, fold, refined, triangulated
@@ -136,96 +132,3 @@ def test_a_part_sprayed_from_behind_is_turned_and_says_so():
     assert turned.notes == (
         '3 of 3 poses look at the back of the mesh: its triangles were turned round',
     )
-
-
-def outward(face) -> np.ndarray:
-    mean = face.surface.vertex_areas_m2 @ face.surface.normals
-    return mean / np.linalg.norm(mean)
-
-
-def test_a_plane_is_one_face():
-    (face,) = sprayable_faces(panel())
-    assert face.surface.area_m2 == pytest.approx(panel().area_m2)
-    assert np.isinf(face.seam_distance_m).all()
-    assert face.without_margin(0.1) is face
-
-
-def test_a_hood_is_its_top_and_its_flange():
-    top, flange = sprayable_faces(hood())
-    assert outward(top)[2] > 0.99
-    assert outward(flange)[1] > 0.95
-    assert top.surface.area_m2 + flange.surface.area_m2 == pytest.approx(hood().area_m2)
-    assert flange.surface.area_m2 == pytest.approx(1.0 * (0.18 + 0.04), rel=0.15)
-
-
-def test_a_bumper_is_its_front_and_two_wings():
-    """The wings look the same way where it is bent into a U; they do not hang together."""
-    front, *wings = sprayable_faces(bumper())
-    assert outward(front)[1] == pytest.approx(-1.0, abs=1e-3)
-    assert sorted(round(outward(wing)[0], 1) for wing in wings) == [-1.0, 1.0]
-    assert len(sprayable_faces(bumper(wing_m=0.3), np.radians(60.0))) == 3
-
-
-def test_a_margin_is_taken_from_the_seam_alone():
-    front, *_ = sprayable_faces(bumper())
-    seam = np.abs(front.surface.vertices_m[:, 0]).max()
-    less = front.without_margin(0.1)
-    assert seam - np.abs(less.surface.vertices_m[:, 0]).max() == pytest.approx(0.1, abs=0.05)
-    assert np.ptp(less.surface.vertices_m[:, 2]) == pytest.approx(0.4)
-    # However great the margin, the middle of the face is left.
-    assert front.without_margin(5.0).surface.area_m2 > 0.1 * front.surface.area_m2
-    assert front.without_margin(0.0) is front
-
-
-def folded(slope: float) -> Surface:
-    """A sheet with a bend along z at x = 0, its radius 40 mm over the slope where it is slight."""
-
-    def depth(x: np.ndarray, z: np.ndarray) -> np.ndarray:
-        return slope * 0.01 * np.logaddexp(0.0, x / 0.01)
-
-    return Surface.from_triangles(*triangulated(depth, 0.01), 0.02)
-
-
-def test_a_foot_keeps_off_edges():
-    surface = panel()
-    standing = gauge_places.can_stand(surface, 0.03)
-    inside = np.abs(surface.vertices_m[:, [0, 2]]).max(axis=1) < 0.5 - 0.03
-    np.testing.assert_array_equal(standing, inside)
-
-
-def test_a_foot_does_not_stand_on_a_bend():
-    surface = folded(1.2)
-    x = surface.vertices_m[:, 0]
-    standing = gauge_places.can_stand(surface)
-    assert not standing[np.abs(x) < 0.005].any()
-    assert standing[(np.abs(x) > 0.1) & (np.abs(x) < 0.17)].any()
-    assert gauge_places.can_stand(folded(0.1))[np.abs(x) < 0.005].any()
-
-
-def test_spread_places_are_about_as_many_as_wanted_and_apart():
-    surface = panel()
-    usable = surface.vertices_m[:, 0] > 0.0
-    rows = gauge_places.spread_places(surface, usable, 100, seed=1)
-    assert usable[rows].all()
-    assert 80 < len(rows) < 120
-    positions = surface.vertices_m[rows]
-    distance = np.linalg.norm(positions[:, np.newaxis] - positions, axis=2) + np.eye(len(rows))
-    assert distance.min() > 0.05
-
-
-def test_a_grid_has_the_points_asked_for():
-    surface = panel()
-    rows = gauge_places.grid_places(surface, gauge_places.can_stand(surface), 25)
-    assert len(set(rows)) == 25
-    face = gauge_places.from_edges_m(surface, surface.vertices_m[rows])
-    # Five rows and five columns, to the spacing of the vertices.
-    for axis in range(2):
-        assert np.count_nonzero(np.diff(np.sort(face[:, axis])) > 0.1) == 4
-
-
-def test_places_on_a_face_are_found_again():
-    surface = folded(0.3)
-    places = np.array([[0.05, 0.1], [0.21, 0.33], [0.3, 0.02]])
-    points, hit = gauge_places.on_face_m(surface, places)
-    assert hit.all()
-    np.testing.assert_allclose(gauge_places.from_edges_m(surface, points), places, atol=1e-9)

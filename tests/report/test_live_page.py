@@ -12,8 +12,6 @@ import paint_deposition as pd
 from chromium import CHROMIUM, Chromium
 from paint_deposition.api.replaying import Replay
 from paint_deposition.cli.main import run
-from paint_deposition.effects.deposition_model import DepositionModel
-from paint_deposition.files.motion_files import GunMotion
 from paint_deposition.report.live_page import STEP_UM, Page, Scene, Seen
 
 ARRAYS = {'float32': np.float32, 'uint32': np.uint32, 'uint16': np.uint16, 'uint8': np.uint8}
@@ -103,8 +101,7 @@ def test_a_run_is_painted_as_simulate_paints_it(door):
     surface, motion = door
     film = pd.simulate(surface, motion, target_um=20.0, tolerance_um=3.0)
     wanted = {'rate': 0.0, 'target_um': 20.0, 'tolerance_um': 3.0}
-    replay = Replay(surface, [('', motion)], [DepositionModel()], **wanted)
-    replay = Replay(surface, [GunMotion('', motion)], [pd.DepositionModel()], **wanted)
+    replay = Replay(surface, [('', motion)], [pd.DepositionModel()], **wanted)
     shown = []
     replay.scene.show_film = shown.append
     replay.paint(Event())
@@ -166,8 +163,7 @@ def test_watch_says_what_it_lacks(words, reason, capsys):
 def test_a_painted_run_on_a_phone(door, tmp_path):
     surface, motion = door
     film = pd.simulate(surface, motion)
-    replay = Replay(surface, [('', motion)], [DepositionModel()], rate=0.0)
-    replay = Replay(surface, [GunMotion('', motion)], [pd.DepositionModel()], rate=0.0)
+    replay = Replay(surface, [('', motion)], [pd.DepositionModel()], rate=0.0)
     replay.scene.tell('about', text='door.stl')
     replay.paint(Event())
     goes_on = Event()

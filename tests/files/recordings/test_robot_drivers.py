@@ -10,13 +10,8 @@ import pytest
 import paint_deposition as pd
 from files.recorded import Messages, write_bag
 from paint_deposition.errors import RecordingError
-<<<<<<< HEAD
-from paint_deposition.files.motion_files import read_recording
 from paint_deposition.files.recordings.bag_files import open_bag
 from paint_deposition.files.recordings.pose_topics import sources_of_poses
-=======
-from paint_deposition.files.recordings.pose_topics import summarise
->>>>>>> c
 from paint_deposition.motion.path_builder import PathBuilder, spray_path
 from robot_arm import sweep, tip_poses
 from scenes import stamps_ns

@@ -147,12 +147,7 @@ def test_the_film_is_the_sum_of_the_guns_whoever_comes_first_and_that_of_their_r
     wait_until(lambda: all(player.finished.done() for player in players), what='both replays')
     assert np.array_equal(painted(node, poses), live)
 
-<<<<<<< HEAD
     motions = [motion for _, motion in read_gun_motions([run], MotionSource(), GUNS)]
-    film = simulate(node.surface, motions, names=GUNS)
-=======
-    motions = [gun.trajectory for gun in read_gun_motions([run], MotionSource(), GUNS)]
     film = pd.simulate(node.surface, motions, [pd.DepositionModel(), THIN], names=GUNS)
->>>>>>> c
     assert film.film_um.max() == pytest.approx(live.max(), rel=1e-6)
     assert np.abs(film.film_um - live).max() < 1e-5 * live.max()
