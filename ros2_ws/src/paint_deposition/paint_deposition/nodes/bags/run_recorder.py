@@ -192,7 +192,7 @@ class RunRecorder(ManagedNode):
 
         Later transforms may still tell where the part was.
         """
-        here = {name: topic.newest_sent_ns for name, topic in self.recorded.items()}
+        here = {name: topic.sent_ns for name, topic in self.recorded.items()}
         misses = any(here.get(name, 0) < sent_ns for name, sent_ns in self._left_ns.items())
         return not (misses or TF in leaving.counts) or time.monotonic() > self._leaves_s
 
