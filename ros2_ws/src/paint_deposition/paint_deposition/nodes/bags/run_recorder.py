@@ -192,8 +192,7 @@ class RunRecorder(ManagedNode):
 
         Later transforms may still tell where the part was.
         """
-        here = {name: topic.sent_ns for name, topic in self.recorded.items()}
-        misses = any(here.get(name, 0) < sent_ns for name, sent_ns in self._left_ns.items())
+        misses = any(t.sent_ns < self._left_ns.get(name, 0) for name, t in self.recorded.items())
         return not (misses or TF in leaving.counts) or time.monotonic() > self._leaves_s
 
     def _drain(self) -> None:
