@@ -165,6 +165,16 @@ def test_poses_of_several_frames_are_brought_to_the_part(tmp_path):
         assert np.allclose(read.positions_m, written.positions_m, atol=1e-12)
         assert np.allclose(read.quaternions_xyzw, written.quaternions_xyzw, atol=1e-12)
     assert len(pd.read_recording(bare)) == 8
+    # However many are of a frame that nothing connects with the part.
+    poses = [(0, 'cell'), *((row, 'nowhere') for row in range(1, 19)), (19, 'cell')]
+    for row, frame in poses:
+        pose = messages.pose(written.stamps_ns[row], seen[0][row], seen[1][row], frame)
+        entries[row] = (*entries[row][:2], pose)
+    read = pd.read_recording(
+        write_bag(tmp_path / 'few', [('/tf_static', START_NS, static), *entries])
+    )
+    assert read.stamps_ns.tolist() == written.stamps_ns[[0, 19]].tolist()
+    assert np.allclose(read.positions_m, written.positions_m[[0, 19]], atol=1e-12)
 
 
 def test_poses_without_stamps_are_refused(tmp_path):

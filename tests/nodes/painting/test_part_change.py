@@ -19,6 +19,7 @@ import paint_deposition as pd
 from brushes import two_brushes
 from nodes.cell import PANEL_M, offline_um, parameters, two_passes, write_panel
 from paint_deposition.files.recordings.bag_files import open_bag
+from paint_deposition.film.common_film import LiveFilms
 from paint_deposition.model.eq1_pattern import Brush
 from paint_deposition.nodes.runtime import topics
 from paint_deposition.nodes.runtime.node import ERROR, OK
@@ -333,6 +334,27 @@ def test_each_run_is_of_its_part_though_the_gun_stays_open_while_a_mesh_is_read(
         assert len(motion) == half
         assert np.array_equal(offline_um(of, motion), live)
     assert second.max() > 1.0
+
+
+def test_a_pose_that_comes_while_the_film_is_reset_is_of_the_run_that_begins(
+    simulator, robot, painted, change, monkeypatch
+):
+    node = simulator()
+    source, reset = robot(node), LiveFilms.reset
+    assert change(serial='1').success
+    source.send(WITHOUT_TRIGGER, slice(0, 10))
+    painted(node, 10)
+
+    def meanwhile(film: LiveFilms) -> None:
+        reset(film)
+        source.send(WITHOUT_TRIGGER, slice(10, 11))
+
+    monkeypatch.setattr(LiveFilms, 'reset', meanwhile)
+    node.reset()
+    painted(node, 1)
+    assert node.parts.part.run == '1_reset_1'
+    # The recorder goes by that.
+    assert node.parts.part.last_sent_ns < node.inputs[0].sent_ns
 
 
 @pytest.mark.parametrize('placed', [True, False])

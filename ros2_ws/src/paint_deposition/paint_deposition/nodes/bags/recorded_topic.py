@@ -98,6 +98,7 @@ class RecordedTopic(AdaptiveSubscription):
         unnumbered: messages without a sequence number, whose losses cannot be counted.
         gaps, longest_gap_ns: intervals between header stamps above the limit.
         newest_stamp_ns: header stamp of the last message.
+        sent_ns: when the last message was sent.
     """
 
     def __init__(
@@ -110,7 +111,7 @@ class RecordedTopic(AdaptiveSubscription):
         depth: int,
     ) -> None:
         self.run_topic, self.name = run_topic, run_topic.name
-        self.messages = self.lost = self._log_time_ns = 0
+        self.messages = self.lost = self._log_time_ns = self.sent_ns = 0
         # How each publisher was first heard: number of the message, when it was sent, and how
         # long after the begin of the run; and how many came before, by its rate.
         self._first: dict[bytes, tuple[int, int, int]] = {}
@@ -168,7 +169,8 @@ class RecordedTopic(AdaptiveSubscription):
                 self.longest_gap_ns = max(self.longest_gap_ns, gap_ns)
         # Log times order the messages; times of receipt may go back a little under load.
         self._log_time_ns = max(self._log_time_ns, info['received_timestamp'])
-        self._pass_on(self.name, cdr, self._log_time_ns, info['source_timestamp'])
+        self.sent_ns = info['source_timestamp']
+        self._pass_on(self.name, cdr, self._log_time_ns, self.sent_ns)
 
     def _count_before_first(self, publisher: bytes, number: int, info: Mapping[str, Any]) -> None:
         """Count what a publisher sent in the run before it was heard, by how often it sends."""

@@ -93,11 +93,10 @@ class DepositionSimulator(PaintingNode):
     def reset(self) -> tuple[bool, str]:
         """Clear the film and all counts; a new run begins, if there were poses."""
         self.catch_up()
-        had_poses = self.film.counts.received > 0
-        answer = super().reset()
-        if had_poses:
+        # First, since poses that come meanwhile are of the new run.
+        if self.film.counts.received:
             self.parts.begin_again()
-        return answer
+        return super().reset()
 
     def publish(self) -> None:
         """Publish the film if it has changed, or to new subscribers."""
