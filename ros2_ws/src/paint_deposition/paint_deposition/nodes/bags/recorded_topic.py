@@ -26,6 +26,7 @@ from paint_deposition.nodes.runtime.parameters import (
 )
 from paint_deposition.nodes.runtime.topics import (
     MOST_PUBLISHERS,
+    TRUST_TOPIC,
     AdaptiveSubscription,
     gun_topic,
     header_stamp_ns,
@@ -79,7 +80,7 @@ def default_topics(guns: Sequence[str]) -> list[str]:
     motion = [gun_topic(gun, topic) for gun in guns for topic in (POSES, STATES)]
     shares = [gun_topic(gun, 'thickness/field') for gun in guns if len(guns) > 1]
     return [
-        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats',
+        *motion, *shares, 'thickness/cloud', 'thickness/field', 'thickness/stats', TRUST_TOPIC,
         'comparison/stats', 'planned_path', PART_POSE, '/tf', STATIC_TF, '/diagnostics',
         PARAMETER_EVENTS,
     ]  # fmt: skip

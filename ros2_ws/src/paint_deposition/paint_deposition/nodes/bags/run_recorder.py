@@ -42,6 +42,7 @@ from paint_deposition.nodes.runtime.topics import (
 
 # The run of a part that has left takes poses that were sent for it until none has come so long.
 LATE_S = 2.0
+MOTION_TYPES = {POSE_TYPE, definitions.STATE_TYPE, definitions.JOINT_TYPE, *definitions.TF_TYPES}
 
 
 class RunRecorder(ManagedNode):
@@ -156,7 +157,7 @@ class RunRecorder(ManagedNode):
                 self._guarded(self.run.add_topic, run_topic)
                 self.recorded[name] = RecordedTopic(
                     self, run_topic, self._write, max_gap_ns, self._begun_ns,
-                    depth=5000 if is_pose or name == TF else 100,
+                    depth=5000 if types[0] in MOTION_TYPES else 100,
                 )  # fmt: skip
             except RecordingError as error:
                 self._refused.add(name)
