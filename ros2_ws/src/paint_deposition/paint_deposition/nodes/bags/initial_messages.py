@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from geometry_msgs.msg import TransformStamped
 from paint_msgs.msg import AtomizerState, Part
@@ -79,8 +79,9 @@ class InitialMessages:
             changed = (*event.new_parameters, *event.changed_parameters)
             self._replace((event.node, *(parameter.name for parameter in changed)), message)
         elif topic == STATIC_TF:
-            placed = own_types().deserialize_cdr(cdr, TF_TYPES[0]).transforms
-            self._replace(frozenset(each.child_frame_id for each in placed), message)
+            placed: Any = own_types().deserialize_cdr(cdr, TF_TYPES[0])
+            children = frozenset(each.child_frame_id for each in placed.transforms)
+            self._replace((STATIC_TF, children), message)
 
     def begin_part(self, part: Part, sent_ns: int) -> tuple[dict[str, int], dict[str, int]]:
         """Forget what only the parts before needed.

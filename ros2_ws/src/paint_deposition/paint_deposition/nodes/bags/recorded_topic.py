@@ -15,6 +15,8 @@ from rosbags.interfaces import (
 )
 
 from paint_deposition.files.recordings.mcap_run import COMPRESSIONS, RunTopic
+from paint_deposition.files.recordings.messages import JOINT_TYPE, STATE_TYPE, TF_TYPES
+from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.runtime.managed_node import MANAGED
 from paint_deposition.nodes.runtime.parameters import (
     CONFIGURED,
@@ -34,6 +36,8 @@ from paint_deposition.nodes.runtime.topics import (
 )
 
 POSES, STATES = 'atomizer/pose', 'atomizer/state'
+# A message of these that is lost is lost motion, or paint.
+MOTION_TYPES = {POSE_TYPE, STATE_TYPE, JOINT_TYPE, *TF_TYPES}
 STATIC_TF, PART_POSE, PARAMETER_EVENTS = '/tf_static', 'part_pose', '/parameter_events'
 
 RECORDER = dict(

@@ -20,6 +20,7 @@ from paint_deposition.files.recordings.pose_topics import POSE_TYPE
 from paint_deposition.nodes.bags.initial_messages import TF, InitialMessages
 from paint_deposition.nodes.bags.recorded_topic import (
     MISSED_BEFORE_DISCOVERY,
+    MOTION_TYPES,
     PARAMETER_EVENTS,
     PART_POSE,
     POSES,
@@ -42,7 +43,6 @@ from paint_deposition.nodes.runtime.topics import (
 
 # The run of a part that has left takes poses that were sent for it until none has come so long.
 LATE_S = 2.0
-MOTION_TYPES = {POSE_TYPE, definitions.STATE_TYPE, definitions.JOINT_TYPE, *definitions.TF_TYPES}
 
 
 class RunRecorder(ManagedNode):
